@@ -52,13 +52,31 @@ def test_a_sweep_is_its_single_runs(rig, unit):
             sample_time=0.005,
             sensors=sensors,
         )
-        assert (all_of_them.run["joint_angle"][k] == one.angle).all()
+        # side by side in lanes, the single ones are not: the last digits differ
+        np.testing.assert_allclose(all_of_them.run["joint_angle"][k], one.angle, rtol=1e-8)
         single = one.metrics(unit=unit)
-        assert all_of_them.squared_error[k] == pytest.approx(single.squared_error, rel=1e-12)
-        assert all_of_them.curvature[k] == pytest.approx(single.curvature, rel=1e-12)
-        assert all_of_them.rms[k] == pytest.approx(single.rms, rel=1e-12)
-        assert all_of_them.largest[k] == pytest.approx(single.largest, rel=1e-12)
-        assert all_of_them.final[k] == pytest.approx(single.final, rel=1e-12)
+        assert all_of_them.squared_error[k] == pytest.approx(single.squared_error, rel=1e-7)
+        assert all_of_them.curvature[k] == pytest.approx(single.curvature, rel=1e-7)
+        assert all_of_them.rms[k] == pytest.approx(single.rms, rel=1e-7)
+        assert all_of_them.largest[k] == pytest.approx(single.largest, rel=1e-7)
+        assert all_of_them.final[k] == pytest.approx(single.final, rel=1e-7)
+
+
+def test_the_loops_of_a_map_run_side_by_side(rig, monkeypatch):
+    ways = []
+
+    class Watched(pamrs.Batch):
+        def control(self, *args, **options):
+            ways.append(self.side_by_side)
+            return super().control(*args, **options)
+
+    monkeypatch.setattr("pamrs.simulation.Batch", Watched)
+    axes = {"kp": [0.5, 1.0], "ki": [0.0, 1.0]}
+    gain_map(rig, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
+    assert [way.tolist() for way in ways] == [[True] * 8]
+    leaky = rig.with_effect("leak_muscle")
+    gain_map(leaky, pid, axes, LIFT, payloads=[2.0, 9.0], **FAST)
+    assert [way.tolist() for way in ways[1:]] == [[False] * 8]
 
 
 def test_a_map_is_a_sweep_of_every_combination(rig):
@@ -69,8 +87,8 @@ def test_a_map_is_a_sweep_of_every_combination(rig):
         run = closed_loop(
             rig.with_parameters({"arm.payload": mass}), pid(2.0, 1.0), LIFT, 3.0, sample_time=0.01
         ).metrics()
-        assert found.squared_error[p, 2, 1] == pytest.approx(run.squared_error, rel=1e-12)
-        assert found.curvature[p, 2, 1] == pytest.approx(run.curvature, rel=1e-12)
+        assert found.squared_error[p, 2, 1] == pytest.approx(run.squared_error, rel=1e-8)
+        assert found.curvature[p, 2, 1] == pytest.approx(run.curvature, rel=1e-8)
     # J of the best is one only if it is best in both; each payload is a set of its own
     best = found.best()
     assert [row["payload"] for row in best] == [2.0, 9.0]

@@ -4,9 +4,12 @@
 
 use std::fmt::Write as _;
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use pam_core::batch::Batch;
+use pam_core::lanes::{simulate as side_by_side, Request, Signal, Spent};
 use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
-use pam_core::simulate::Timing;
+use pam_core::simulate::{Initial, Timing};
 use pam_core::{Rig, RigSpec};
 use rigs::{antagonists, effect, lone_tank, regulated, shoulder, two_joints, TYPICAL};
 
@@ -105,4 +108,76 @@ fn steps_of_a_sample() {
         writeln!(table, "{}: {}", typical.id, steps(spec)).unwrap();
     }
     compare("steps.txt", &table);
+}
+
+/// Plants of a run, more than one block of them.
+const PLANTS: usize = 70;
+/// Rows of time.
+const ROWS: usize = 81;
+
+/// The rate at which each of some plants begins [rad/s].
+type Rates = fn(usize) -> f64;
+
+/// What 70 plants cost that differ in where they begin, as whole runs and sample by sample.
+fn spent(spec: RigSpec, rate: Rates) -> [Spent; 2] {
+    let rig = Arc::new(Rig::new(spec).unwrap());
+    let timing = Timing { sample_time: 0.005, substeps: 1 };
+    let valves: Vec<f64> =
+        rig.spec().valves.iter().map(|v| v.null_voltage + 0.4 * v.half_range).collect();
+    let signals: Vec<(String, Vec<f64>)> =
+        rig.names().inputs.iter().cloned().zip(valves.iter().map(|v| vec![*v; ROWS])).collect();
+    let is_rate = |(name, _): &&(String, usize)| name.contains("rate");
+    let (name, _) = rig.names().initial.iter().find(is_rate).unwrap().clone();
+    let rates: Vec<f64> = (0..PLANTS).map(rate).collect();
+    let request = Request {
+        plants: PLANTS,
+        timing,
+        rows: ROWS,
+        signals: signals.iter().map(|(n, s)| (n.as_str(), Signal::Common(s))).collect(),
+        parameters: Vec::new(),
+        initial: vec![(&name, &rates)],
+        record: vec![0],
+        every: 1,
+        reduce: Vec::new(),
+        threads: 1,
+    };
+    let whole = side_by_side(&rig, &request, &mut || Ok(())).unwrap().spent;
+    let start = |rate: &f64| Initial::rest(&rig).with(&rig, &name, *rate).unwrap();
+    let initial: Vec<Initial> = rates.iter().map(start).collect();
+    let mut batch = Batch::new(&vec![Arc::clone(&rig); PLANTS], timing, &initial, 1).unwrap();
+    let held: Vec<Vec<f64>> = valves.iter().map(|v| vec![*v; PLANTS]).collect();
+    let signals: Vec<(&str, &[f64])> =
+        rig.names().inputs.iter().zip(&held).map(|(n, v)| (n.as_str(), &v[..])).collect();
+    for _ in 1..ROWS {
+        batch.advance(1, &signals, true, &mut || Ok(())).unwrap();
+    }
+    [whole, batch.spent()]
+}
+
+/// What lanes do for whole runs and for a batch, and what they leave to plants alone.
+#[test]
+fn work_of_the_lanes() {
+    let mut table = String::from(
+        "# rig, way: blocks; in lanes steps of all plants, rates of them; samples alone\n",
+    );
+    let still: Rates = |_| 0.0;
+    let thrown: Rates = |k| if k % 10 == 3 { 20.0 } else { 0.0 };
+    let mut soft = shoulder();
+    (soft.joints[0].stop_stiffness, soft.joints[0].stop_damping) = (5.0, 0.0);
+    let mut leaky = shoulder();
+    leaky.effects = vec![effect("leak_muscle", &[("conductance", 2e-10), ("laminar_share", 0.4)])];
+    let rigs: [(&str, RigSpec, Rates); 5] = [
+        ("shoulder", shoulder(), still),
+        ("antagonists", antagonists(), still),
+        ("regulated", regulated(), still),
+        ("shoulder, some thrown at soft stops", soft, thrown),
+        ("shoulder with a leak", leaky, still),
+    ];
+    for (name, spec, rate) in rigs {
+        for (way, spent) in ["whole runs", "batch"].iter().zip(spent(spec, rate)) {
+            let Spent { blocks, steps, evaluations, alone } = spent;
+            writeln!(table, "{name}, {way}: {blocks}; {steps} {evaluations}; {alone}").unwrap();
+        }
+    }
+    compare("lanes.txt", &table);
 }

@@ -7,8 +7,8 @@ use crate::convert::{array, error, values};
 use crate::rig::{borrowed, owned, Rig, Signals};
 use crate::simulator::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
-use pam_core::simulate::batch::{of_row, Batch as Plants, Failure};
-use pam_core::simulate::{Initial, Timing};
+use pam_core::batch::Batch as Plants;
+use pam_core::simulate::{of_row, Failure, Initial, Timing};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 
@@ -92,7 +92,7 @@ impl Batch {
     /// Numbers of each row that restore it bit for bit.
     #[getter]
     fn states<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyArray1<f64>>>> {
-        self.with(|plants| Ok(plants.states().map(|state| array(py, state)).collect()))
+        self.with(|plants| Ok(plants.states().into_iter().map(|state| array(py, state)).collect()))
     }
 
     /// Time and reason of the end of each row that has ended.
@@ -121,6 +121,12 @@ impl Batch {
     #[getter]
     fn samples(&self) -> PyResult<u64> {
         self.with(|plants| Ok(plants.samples()))
+    }
+
+    /// Which rows run side by side in lanes.
+    #[getter]
+    fn side_by_side(&self) -> PyResult<Vec<bool>> {
+        self.with(|plants| Ok(plants.side_by_side()))
     }
 
     /// Most RK4 steps per sample.

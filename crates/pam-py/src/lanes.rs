@@ -55,7 +55,7 @@ pub fn side_by_side<'py>(
         done = Some(simulate(&core, &request, look)?);
         Ok(())
     })?;
-    let Some(Outcome { recorded, reduced, failures }) = done else {
+    let Some(Outcome { recorded, reduced, failures, .. }) = done else {
         return Err(PyValueError::new_err("nothing was simulated"));
     };
     let kept = rows.div_ceil(every.max(1));

@@ -258,7 +258,7 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
 
 class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     """Many arms in one :class:`pamrs.Batch`; arm ``i`` of a reset with ``seed`` is
-    :class:`ShoulderEnv` reset with ``seed + i``.
+    :class:`ShoulderEnv` reset with ``seed + i``, to some 1e-9 where the batch runs in lanes.
 
     All episodes begin and end together: the batch has one clock. When one plant leaves the range of
     its model, that one is terminated and all others are truncated. The step after an end begins the

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.channels import channel_of, dotted
 from pamrs.errors import ParameterError
+from pamrs.simulation._plants import rowwise
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
@@ -191,21 +192,8 @@ class Inputs:
         """Commands of one sample of several plants, one number for each; whether the numbers are
         possible is not looked at.
         """
-        given = {}
-        for name, values in self.named(**signals).items():
-            try:
-                array = np.asarray(values, dtype=np.float64)
-            except (TypeError, ValueError):
-                raise ParameterError(f"{name} is not allowed: numbers are needed") from None
-            if array.ndim == 0:
-                array = np.full(rows, float(array))
-            if array.shape != (rows,):
-                raise ParameterError(
-                    f"{name} has the shape {array.shape}; ({rows},) is needed, one value for each "
-                    "plant"
-                )
-            given[name] = array
-        return given
+        given = self.named(**signals).items()
+        return {name: rowwise(name, values, rows, finite=False) for name, values in given}
 
     def range(self, name: str) -> tuple[float, float, str]:
         """Lowest and highest value of a signal, and the words for it."""

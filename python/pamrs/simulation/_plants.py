@@ -41,8 +41,8 @@ def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -
     return count
 
 
-def rowwise(name: str, values: ArrayLike, n: int) -> Array:
-    """A number for each plant."""
+def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Array:
+    """A number for each plant; whether it is finite is only looked at where that is asked for."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
@@ -53,7 +53,7 @@ def rowwise(name: str, values: ArrayLike, n: int) -> Array:
         raise ParameterError(
             f"{name} has the shape {array.shape}; ({n},) is needed, one value for each plant"
         )
-    for row in np.flatnonzero(~np.isfinite(array))[:1]:
+    for row in np.flatnonzero(~np.isfinite(array))[:1] if finite else ():
         raise ParameterError(
             f"{name}[{row}] = {array[row]} is not allowed: a finite number is needed"
         )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, NamedTuple
@@ -148,32 +149,33 @@ class Blocks(NamedTuple):
         return start, start + math.prod(part.stop - part.start for part in region)
 
 
-class Axes:
+class Axes(ABC):
     """What varies from run to run: made by :class:`Grid` or :class:`Samples`."""
 
     @property
+    @abstractmethod
     def names(self) -> tuple[str, ...]:
         """What varies."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def shape(self) -> tuple[int, ...]:
         """Of the result."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def dims(self) -> tuple[str, ...]:
         """Names of the dimensions of the result."""
-        raise NotImplementedError
 
+    @abstractmethod
     def rows(self, start: int, stop: int) -> dict[str, Array]:
         """Values of the runs from ``start`` to before ``stop``, each of shape (stop - start,)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def describe(self) -> dict[str, str]:
         """What makes these runs these: name -> digest or words."""
-        raise NotImplementedError
 
+    @abstractmethod
     def check(self, known: Callable[[str], Quantity]) -> None:
         """Refuse names that nobody knows, and values outside their bounds.
 
@@ -187,7 +189,6 @@ class Axes:
         ParameterError
             Naming parameter, value and what is allowed.
         """
-        raise NotImplementedError
 
     def __len__(self) -> int:
         return math.prod(self.shape)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -134,28 +135,28 @@ class Done(NamedTuple):
     first: tuple[int, str] | None
 
 
-class Drive:
+class Drive(ABC):
     """What runs are driven by; a subclass says how a group of runs of one rig is worked out."""
 
     def quantity(self, rig: Rig, name: str) -> Quantity:
         """What is known of a number that varies; errors as of :func:`quantity`."""
         return quantity(rig, name)
 
+    @abstractmethod
     def metric_units(self) -> dict[str, str]:
         """SI unit of each metric."""
-        raise NotImplementedError
 
+    @abstractmethod
     def describe(self) -> dict[str, str]:
         """What makes this drive this one: name -> digest or words."""
-        raise NotImplementedError
 
+    @abstractmethod
     def run(self, rig: Rig, n: int, values: Mapping[str, Array], threads: int | None) -> Done:
         """The numbers of n runs of one rig, with values that need no other rig."""
-        raise NotImplementedError
 
+    @abstractmethod
     def rig_names(self, rig: Rig, names: Iterable[str]) -> list[str]:
         """Of the names that vary, those that need a rig of its own for each value."""
-        raise NotImplementedError
 
 
 def failed_rows(status: tuple[Any, ...]) -> tuple[Array, tuple[int, str] | None]:

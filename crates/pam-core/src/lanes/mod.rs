@@ -8,13 +8,19 @@
 
 mod blocks;
 mod curves;
+mod flight;
+pub(crate) mod group;
 mod num;
+mod queue;
 mod rates;
+mod reads;
 mod reduce;
 mod request;
+mod rk4;
 mod run;
 mod steps;
 
+pub use group::Spent;
 pub use reduce::{Reduce, Reduction};
 pub use request::{Outcome, Request, Signal};
 pub use run::simulate;

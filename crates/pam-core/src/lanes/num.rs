@@ -160,6 +160,24 @@ impl<S: Simd> Num<S> {
         sine * (odd * -2.0 + 1.0)
     }
 
+    /// Natural logarithm of positive, normal numbers, to 4e-16 of it or absolutely.
+    #[inline(always)]
+    pub fn ln(self) -> Self {
+        // self = 2^k m with m from sqrt(1/2) to sqrt(2), and ln m = 2 artanh((m - 1)/(m + 1)).
+        const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1; // so few digits that k times it is exact
+        const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
+        let (mut whole, mut rest) = (self, self);
+        for (whole, rest) in whole.numbers_mut().iter_mut().zip(rest.numbers_mut()) {
+            let bits = rest.to_bits();
+            let above = bits.wrapping_sub(std::f64::consts::FRAC_1_SQRT_2.to_bits());
+            *whole = f64::from((above as i64 >> 52) as i32);
+            *rest = f64::from_bits(bits.wrapping_sub(above & (0xfff << 52)));
+        }
+        let s = (rest - 1.0) / (rest + 1.0);
+        let logarithm = s * (s * s).polynomial(&ARTANH);
+        whole * LN_2_HIGH + (logarithm + whole * LN_2_LOW)
+    }
+
     /// Hyperbolic tangent of numbers, to 1e-14 absolutely; what is not a number counts as positive.
     #[inline(always)]
     pub fn tanh(self) -> Self {
@@ -194,6 +212,17 @@ const SINE: [f64; 9] = [
     1.0 / 355_687_428_096_000.0,
     -1.0 / 121_645_100_408_832_000.0,
 ];
+
+/// `2 artanh(s)/s` in powers of `s^2`: below `s^2` = 0.03 the rest is below 1e-17.
+const ARTANH: [f64; 11] = {
+    let mut terms = [2.0; 11];
+    let mut k = 1;
+    while k < 11 {
+        terms[k] = 2.0 / (2 * k + 1) as f64;
+        k += 1;
+    }
+    terms
+};
 
 /// Taylor's series of the exponential: from -0.625 to 0 the rest is below 1e-16.
 const EXPONENTIAL: [f64; 14] = {
@@ -272,31 +301,36 @@ mod tests {
     use super::*;
     use pulp::{Arch, WithSimd};
 
-    /// Largest distance of sine and tangent from those of the standard library.
+    /// Largest distance of sine, tangent and logarithm from those of the standard library.
     struct Furthest;
 
     impl WithSimd for Furthest {
-        type Output = (f64, f64);
+        type Output = [f64; 3];
 
         #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) -> (f64, f64) {
-            let (mut sine, mut tangent) = (0.0_f64, 0.0_f64);
+        fn with_simd<S: Simd>(self, simd: S) -> [f64; 3] {
+            let [mut sine, mut tangent, mut logarithm] = [0.0_f64; 3];
             for k in -4000..=4000 {
                 let x = f64::from(k) * 0.0025 + 1e-5;
                 let number = Num::splat(simd, x);
                 sine = sine.max((number.sin().numbers()[0] - x.sin()).abs());
                 let steep = Num::splat(simd, 3.0 * x);
                 tangent = tangent.max((steep.tanh().numbers()[0] - (3.0 * x).tanh()).abs());
+                // From 5e-5 to 2e4, as a pressure over that of the room.
+                let ratio = x.exp();
+                let error = Num::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
+                logarithm = logarithm.max(error.abs() / ratio.ln().abs().max(1.0));
             }
-            (sine, tangent)
+            [sine, tangent, logarithm]
         }
     }
 
     #[test]
-    fn sine_and_tangent_are_those_of_the_standard_library() {
-        let (sine, tangent) = Arch::new().dispatch(Furthest);
+    fn functions_are_those_of_the_standard_library() {
+        let [sine, tangent, logarithm] = Arch::new().dispatch(Furthest);
         assert!(sine < 4e-16, "{sine:e}");
         assert!(tangent < 1e-14, "{tangent:e}");
+        assert!(logarithm < 4e-16, "{logarithm:e}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::blocks::{Body, Supply, Tube};
 use super::num::{side_by_side, Mask, Num, MOST_LANES};
 use super::Plan;
 use crate::blocks::supply::Supply as OneSupply;
-use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE_COUNT};
+use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig};
 use pulp::Simd;
 
 #[derive(Clone, Copy)]
@@ -53,15 +53,16 @@ pub(super) struct Lanes<'a, S: Simd> {
 }
 
 impl<'a, S: Simd> Lanes<'a, S> {
-    /// One lane for each plant of a rig that the plan is for.
-    pub fn new(simd: S, plan: &'a Plan, plants: &[Plant<'a, f64>], sums: bool) -> Option<Self> {
-        let first = plants.first()?;
+    /// One lane for each plant of a rig that the plan is for, one at least; the lanes that are left
+    /// over are as the last of them.
+    pub fn new(simd: S, plan: &'a Plan, plants: &[&Plant<'a, f64>], sums: bool) -> Self {
+        let first = plants[0];
         let rig = first.rig();
         let zero = Num::splat(simd, 0.0);
         let each = |of: &dyn Fn(&Plant<'a, f64>) -> f64| {
             let mut values = [0.0; MOST_LANES];
-            for (value, plant) in values.iter_mut().zip(plants) {
-                *value = of(plant);
+            for (lane, value) in values.iter_mut().enumerate() {
+                *value = of(plants[lane.min(plants.len() - 1)]);
             }
             Num::load(simd, &values[..side_by_side::<S>()])
         };
@@ -84,7 +85,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
         });
         let layout = rig.layout;
         let zeros = |n: usize| vec![zero; n];
-        Some(Self {
+        Self {
             supplies,
             set_pressure: zeros(layout.supplies),
             fixed_volume: (0..layout.gases).map(|k| each(&|p| p.fixed_volume[k])).collect(),
@@ -92,7 +93,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
             valves: valves.collect(),
             lines,
             scales: (0..wiring.groups.len()).map(|k| each(&|p| p.scales[k])).collect(),
-            body: body(first, &each)?,
+            body: body(first, &each),
             sums,
             volume: zeros(layout.gases),
             volume_rate: zeros(layout.gases),
@@ -106,13 +107,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
             rig,
             plan,
             layout,
-        })
-    }
-
-    /// States that are integrated: with the masses and the sums of the balance where they are
-    /// wanted.
-    pub fn states(&self) -> usize {
-        self.layout.states() + if self.sums { BALANCE_COUNT } else { 0 }
+        }
     }
 
     /// Openings of a valve over the sample that comes [m2], above zero where the chamber is filled,
@@ -264,9 +259,8 @@ impl<'a, S: Simd> Lanes<'a, S> {
                 taken = back.select(zero, *flow);
             }
             drawn += taken;
-            let mut raised = state[layout.supply(k)] / gas.ambient_pressure;
-            raised.numbers_mut().iter_mut().for_each(|ratio| *ratio = libm::log(*ratio));
-            exergy += raised * taken * rt;
+            let raised = state[layout.supply(k)] / gas.ambient_pressure;
+            exergy += raised.ln() * taken * rt;
         }
         let power = self.torque[0] * state[layout.rate(0)];
         let sums = [drawn, vented, drawn * rt, exergy, self.muscle_work, power.or_above(zero)];
@@ -319,12 +313,12 @@ fn passage<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>)
     }
 }
 
-/// One coordinate; none for a body that lanes do not know.
-fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Option<Body<S>> {
+/// One coordinate. A plan is for no other bodies: in their place stands what is no number.
+fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Body<S> {
     let (turns, coulomb_speed, stops) = match &first.body {
         OneBody::OneLink(arm, stops) => (true, arm.coulomb_speed, *stops),
         OneBody::Mass(load, stops) => (false, load.coulomb_speed, *stops),
-        _ => return None,
+        _ => (false, f64::NAN, None),
     };
     let of = |number: fn(&OneBody<f64>) -> [f64; 4], k: usize| each(&|p| number(&p.body)[k]);
     let numbers = |body: &OneBody<f64>| match body {
@@ -336,7 +330,7 @@ fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Option<Bo
         _ => [f64::NAN; 4],
     };
     let coulomb = of(numbers, 3);
-    Some(Body {
+    Body {
         mobility: of(numbers, 0),
         weight: of(numbers, 1),
         turns,
@@ -345,5 +339,5 @@ fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Option<Bo
         rubs: coulomb.numbers().iter().any(|c| *c != 0.0),
         coulomb_slope: 1.0 / coulomb_speed,
         stops,
-    })
+    }
 }

@@ -1,10 +1,10 @@
 //! What is asked of many plants, and what comes of it.
 
+use super::group::Spent;
 use super::reduce::Reduce;
 use crate::plant::{ParameterId, Rig};
-use crate::simulate::batch::{of_row, Failure};
-use crate::simulate::drive::{check_value, command_missing, input_range, set_pressure};
-use crate::simulate::{Initial, Timing};
+use crate::simulate::drive::{check_value, command_missing, input_range};
+use crate::simulate::{of_row, Failure, Initial, Timing};
 use crate::{Error, Result};
 
 /// A signal over time, the same for every row or one for each.
@@ -62,15 +62,15 @@ pub struct Outcome {
     pub reduced: Vec<Vec<f64>>,
     /// Why plants ended, of those that did.
     pub failures: Vec<Option<Failure>>,
+    /// What it cost.
+    pub spent: Spent,
 }
 
-/// A request that was checked, with its parameters and commands found.
+/// A request that was checked, with its parameters found.
 pub(super) struct Checked<'a, 'r> {
     pub rig: &'a Rig,
     pub request: &'a Request<'r>,
     pub places: Vec<ParameterId>,
-    /// One for each input of the rig.
-    pub commands: Vec<Signal<'r>>,
 }
 
 impl<'a, 'r> Checked<'a, 'r> {
@@ -78,7 +78,7 @@ impl<'a, 'r> Checked<'a, 'r> {
     /// [`Error::Length`] for signals, parameters or initial values of another number,
     /// [`Error::Model`] for an unknown or a missing one, [`Error::Parameter`] for a command that
     /// is not possible; they name the row.
-    pub fn new(rig: &'a Rig, request: &'a Request<'r>, resting: &'r [Vec<f64>]) -> Result<Self> {
+    pub fn new(rig: &'a Rig, request: &'a Request<'r>) -> Result<Self> {
         let Request { plants, rows, .. } = *request;
         let given = request.parameters.iter().chain(&request.initial);
         for (name, values) in given {
@@ -94,18 +94,14 @@ impl<'a, 'r> Checked<'a, 'r> {
         }
         let find = |(name, _): &(&str, &[f64])| rig.parameters().find(name);
         let places = request.parameters.iter().map(find).collect::<Result<_>>()?;
-        let mut commands = Vec::new();
         for (input, name) in rig.names().inputs.iter().enumerate() {
-            let given = request.signals.iter().find(|(n, _)| n == name).map(|(_, s)| *s);
-            let signal = match (given, resting.get(input)) {
-                (Some(signal), _) => signal,
-                (None, Some(values)) if !values.is_empty() => Signal::Common(values),
-                _ => return Err(command_missing(name)),
-            };
-            check_commands(rig, request, input, &signal)?;
-            commands.push(signal);
+            match request.signals.iter().find(|(given, _)| given == name) {
+                Some((_, signal)) => check_commands(rig, request, input, signal)?,
+                None if input < rig.spec().valves.len() => return Err(command_missing(name)),
+                None => {}
+            }
         }
-        Ok(Self { rig, request, places, commands })
+        Ok(Self { rig, request, places })
     }
 
     /// All parameter values of a plant.
@@ -125,14 +121,6 @@ impl<'a, 'r> Checked<'a, 'r> {
         }
         Ok(initial)
     }
-}
-
-/// What inputs are held at that nobody commands, one signal for each; empty where one is needed.
-pub(super) fn resting(rig: &Rig, rows: usize) -> Vec<Vec<f64>> {
-    let valves = rig.spec().valves.len();
-    let held =
-        |input| if input < valves { Vec::new() } else { vec![set_pressure(rig, input); rows] };
-    (0..rig.names().inputs.len()).map(held).collect()
 }
 
 fn check_length(name: &str, found: usize, expected: usize, why: &str) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use super::request::Checked;
 use crate::plant::{ParameterId, Path};
-use crate::simulate::batch::of_row;
+use crate::simulate::of_row;
 use crate::Result;
 
 /// Parameters whose extremes are tried together, at most.

@@ -18,7 +18,6 @@ mod wiring;
 mod wiring_motion;
 
 pub(crate) use body::Body as OneBody;
-pub(crate) use layout::BALANCE_COUNT;
 pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use linear::{LinearModel, Side};
 pub use memory::Memory;

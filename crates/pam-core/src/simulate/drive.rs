@@ -87,6 +87,26 @@ impl<'a> Drive<'a> {
         Self { samples, commands, prescribed }
     }
 
+    /// Room for a value of each of some rows that are driven as this one is.
+    pub(crate) fn of_rows(&self, rows: usize) -> Drive<'static> {
+        let room = || Cow::Owned(vec![0.0; rows]);
+        Drive {
+            samples: rows,
+            commands: self.commands.iter().map(|_| room()).collect(),
+            prescribed: self.prescribed.iter().map(|(place, _)| (*place, room())).collect(),
+        }
+    }
+
+    /// Drive a row as a sample of another drive does.
+    pub(crate) fn set(&mut self, row: usize, other: &Drive<'_>, sample: usize) {
+        for (own, values) in self.commands.iter_mut().zip(&other.commands) {
+            own.to_mut()[row] = values[sample];
+        }
+        for ((_, own), (_, values)) in self.prescribed.iter_mut().zip(&other.prescribed) {
+            own.to_mut()[row] = values[sample];
+        }
+    }
+
     pub(crate) fn places(&self) -> impl Iterator<Item = usize> + '_ {
         self.prescribed.iter().map(|(place, _)| *place)
     }

@@ -1,10 +1,10 @@
 //! Fixed-step simulation: commands are held over each sample, RK4 steps fill it.
 
-pub mod batch;
 pub mod drive;
 pub mod events;
 mod initial;
 pub mod integrate;
+mod row;
 pub mod run;
 pub(crate) mod team;
 
@@ -12,6 +12,7 @@ use self::drive::Drive;
 use self::events::Event;
 pub use self::initial::Initial;
 use self::integrate::Rk4;
+pub use self::row::{of_row, Failure};
 use self::run::Run;
 use crate::clock::late;
 use crate::description::dotted;
@@ -287,7 +288,12 @@ impl Progress {
     /// # Errors
     /// As [`Plant::new`].
     pub fn start(rig: &Rig, initial: &Initial) -> Result<Self> {
-        let plant = Plant::new(rig, rig.parameters().lift(), true)?;
+        Ok(Self::of(&Plant::new(rig, rig.parameters().lift(), true)?, initial))
+    }
+
+    /// The start of a plant.
+    pub(crate) fn of(plant: &Plant<'_, f64>, initial: &Initial) -> Self {
+        let rig = plant.rig();
         let mut state = initial.state(rig, plant.states());
         for gas in 0..rig.layout.gases {
             state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
@@ -302,7 +308,32 @@ impl Progress {
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
         let kept = if plant.skewed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
-        Ok(Self { state, memory, flags, samples: 0, past: Vec::new(), kept })
+        Self { state, memory, flags, samples: 0, past: Vec::new(), kept }
+    }
+
+    /// The state, to be moved by who advances it in another way.
+    pub(crate) fn state_mut(&mut self) -> &mut [f64] {
+        &mut self.state
+    }
+
+    /// One sample more, of a state that was moved.
+    pub(crate) fn count(&mut self) {
+        self.samples += 1;
+    }
+
+    /// Bring the conditions of events up to date, of a state that was moved under these controls.
+    pub(crate) fn look(&mut self, run: &mut Run<'_>, controls: &Controls<f64>) {
+        let plant = &run.stepper.plant;
+        run.after.look(plant, &self.state, controls);
+        run.after.report(plant.rig(), None, 0.0, &mut self.flags, &mut Vec::new());
+    }
+
+    /// Whether the state is in the model's range.
+    ///
+    /// # Errors
+    /// [`Error::Integration`] where it is not.
+    pub(crate) fn check(&self, plant: &Plant<'_, f64>, timing: Timing) -> Result<()> {
+        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)
     }
 
     /// Samples since the start.
@@ -399,7 +430,7 @@ impl Progress {
         timing: Timing,
         out: &mut Trajectory,
     ) -> Result<()> {
-        check_state(plant, &self.state, self.samples as f64 * timing.sample_time)?;
+        self.check(plant, timing)?;
         plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
         if self.kept > 0 {
             let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
@@ -407,7 +438,8 @@ impl Progress {
             let first = plant.rig().names.inputs.len();
             for (column, channel) in gauges(plant.rig()).enumerate() {
                 let rows = || self.past.chunks(self.kept).rev();
-                if let Some(reading) = out.channels[channel].last_mut() {
+                let seen = out.channels.get_mut(channel).and_then(|samples| samples.last_mut());
+                if let Some(reading) = seen {
                     *reading =
                         late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
                 }

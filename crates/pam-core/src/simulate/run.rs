@@ -29,15 +29,20 @@ impl<'a> Run<'a> {
     /// # Errors
     /// As [`Plant::new`].
     pub fn new(rig: &'a Rig) -> Result<Self> {
-        Ok(Self {
-            stepper: Stepper::new(Plant::new(rig, rig.parameters().lift(), true)?),
-            simulated: Simulated::all_but(rig, &[]),
+        Ok(Self::of(Plant::new(rig, rig.parameters().lift(), true)?))
+    }
+
+    /// Room for a plant.
+    pub(crate) fn of(plant: Plant<'a, f64>) -> Self {
+        Self {
+            simulated: Simulated::all_but(plant.rig(), &[]),
+            stepper: Stepper::new(plant),
             places: Vec::new(),
             before: Watch::default(),
             after: Watch::default(),
             next: Progress::default(),
             unseen: 0,
-        })
+        }
     }
 
     /// Integrate everything but what a drive prescribes.

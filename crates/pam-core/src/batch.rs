@@ -1,58 +1,57 @@
 //! Many plants advanced together, each as if it were alone.
 //!
 //! What happens to a row depends on its own rig, start and commands only: which thread advances it,
-//! and beside which others, changes no bit. A row whose state leaves the model's range stays at its
-//! last good sample and says why; the others go on.
+//! and beside which others, changes no bit. Rows whose rig allows it run in lanes
+//! ([`crate::lanes`]). A row whose state leaves the model's range stays at its last good sample and
+//! says why; the others go on.
 
 use std::borrow::Cow;
 use std::sync::Arc;
 
+use crate::lanes::group::{grouped, Group, Rigs, Row};
+use crate::lanes::Spent;
 use crate::plant::Rig;
 use crate::simulate::drive::{
     check_frame, check_value, command_missing, input_range, prescribable, set_pressure, Drive,
 };
-use crate::simulate::run::OwnedRun;
+use crate::simulate::run::Run;
 use crate::simulate::team::Team;
-use crate::simulate::{Initial, Progress, Timing, Trajectory};
+use crate::simulate::{of_row, Failure, Initial, Progress, Timing, Trajectory};
 use crate::{Error, Result};
+use self_cell::self_cell;
 
 /// Rows that one thread advances at a time, at most: small enough that no thread is left with much
 /// to do alone.
 const MOST_ROWS: usize = 64;
-/// RK4 steps that are worth a second thread (some 50 us).
-const WORTH_A_THREAD: usize = 50;
-/// RK4 steps of all rows between two looks outside: some hundredths of a second.
-const STEPS_UNSEEN: usize = 50_000;
+/// Rows that fill the widest registers: chunks of those that run in lanes are multiples of it.
+const FLIGHT: usize = 16;
+/// What an RK4 step of a plant alone costs, in steps of a plant in lanes.
+const ALONE: usize = 20;
+/// Work that is worth a second thread, in steps in lanes (some 50 us).
+const WORTH_A_THREAD: usize = 1_000;
+/// The same between two looks outside: some hundredths of a second.
+const UNSEEN: usize = 200_000;
 
-/// Why and when a row has ended.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Failure {
-    /// Simulated time [s].
-    pub time: f64,
-    /// What happened.
-    pub message: String,
-}
+/// Groups of rows, which stand on the rigs of their chunk.
+type Groups<'a> = Vec<Box<dyn Group + 'a>>;
 
-/// One plant.
-struct Row {
-    /// Which run of its chunk is its rig's.
-    run: usize,
-    timing: Timing,
-    progress: Progress,
-    /// Channels at the last good sample.
-    sample: Vec<f64>,
-    failure: Option<Failure>,
-}
+self_cell!(
+    struct Held {
+        owner: Vec<Arc<Rig>>,
+        #[covariant]
+        dependent: Groups,
+    }
+);
 
-/// Rows that one thread advances, with a run for each rig among them.
+/// Rows that one thread advances.
 struct Chunk {
     /// Number of its first row.
     first: usize,
-    rows: Vec<Row>,
-    runs: Vec<OwnedRun>,
-    /// Where a sample is read, and where it is not.
-    seen: Trajectory,
-    blind: Trajectory,
+    groups: Held,
+    /// Group of each row, and its place there.
+    seats: Vec<(usize, usize)>,
+    /// The present sample: a channel of all rows, then the next channel.
+    sample: Vec<f64>,
 }
 
 /// Plants with the same inputs and channels that are advanced sample by sample.
@@ -63,6 +62,7 @@ pub struct Batch {
     /// For each input that need not be commanded, its value in each row.
     defaults: Vec<Option<Vec<f64>>>,
     chunks: Vec<Chunk>,
+    sample_time: f64,
     samples: u64,
     substeps: usize,
     team: Team,
@@ -104,7 +104,9 @@ impl Batch {
             (input >= valves).then(|| rigs.iter().map(|rig| set_pressure(rig, input)).collect())
         };
         let defaults = (0..first.names().inputs.len()).map(default).collect();
+        let whole = if first.lanes().is_some() { FLIGHT } else { 1 };
         let size = rigs.len().div_ceil(4 * threads.max(1)).clamp(1, MOST_ROWS);
+        let size = size.next_multiple_of(whole);
         let mut chunks = Vec::new();
         for begin in (0..rigs.len()).step_by(size) {
             let end = (begin + size).min(rigs.len());
@@ -116,6 +118,7 @@ impl Batch {
             rig_of,
             defaults,
             chunks,
+            sample_time: timing.sample_time,
             samples: 0,
             substeps,
             team: Team::new(threads),
@@ -140,14 +143,33 @@ impl Batch {
         self.substeps
     }
 
+    /// Which rows run side by side in lanes, wherever their state allows it.
+    #[must_use]
+    pub fn side_by_side(&self) -> Vec<bool> {
+        self.each().map(|(group, _)| group.side_by_side()).collect()
+    }
+
+    /// What the plants cost since the start of the batch.
+    #[must_use]
+    pub fn spent(&self) -> Spent {
+        let mut spent = Spent { blocks: self.chunks.len() as u64, ..Spent::default() };
+        for chunk in &self.chunks {
+            chunk.groups.borrow_dependent().iter().for_each(|group| spent += group.spent());
+        }
+        spent
+    }
+
     /// Why each row has ended, of those that have.
     pub fn failures(&self) -> impl Iterator<Item = Option<&Failure>> + '_ {
-        self.each().map(|row| row.failure.as_ref())
+        self.each().map(|(group, k)| group.rows()[k].failure.as_ref())
     }
 
     /// The numbers of each row that [`Self::restore`] goes on from, bit for bit.
-    pub fn states(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
-        self.each().map(|row| row.progress.to_vec())
+    pub fn states(&mut self) -> Vec<Vec<f64>> {
+        for chunk in &mut self.chunks {
+            chunk.change(|groups| groups.iter_mut().for_each(|group| group.settle()));
+        }
+        self.each().map(|(group, k)| group.rows()[k].progress.to_vec()).collect()
     }
 
     /// The present sample: every channel of all rows, then the next channel. Of a row that has
@@ -156,16 +178,21 @@ impl Batch {
     pub fn observe(&self) -> Vec<f64> {
         let (n, channels) = (self.rows(), self.rigs[0].names().channels.len());
         let mut out = vec![0.0; n * channels];
-        for (k, row) in self.each().enumerate() {
-            for (channel, value) in row.sample.iter().enumerate() {
-                out[channel * n + k] = *value;
+        for chunk in &self.chunks {
+            let rows = chunk.seats.len();
+            for (out, own) in out.chunks_exact_mut(n).zip(chunk.sample.chunks_exact(rows)) {
+                out[chunk.first..chunk.first + rows].copy_from_slice(own);
             }
         }
         out
     }
 
-    fn each(&self) -> impl Iterator<Item = &Row> + '_ {
-        self.chunks.iter().flat_map(|chunk| &chunk.rows)
+    /// Group and place of each row.
+    fn each(&self) -> impl Iterator<Item = (&dyn Group, usize)> + '_ {
+        self.chunks.iter().flat_map(|chunk| {
+            let groups = chunk.groups.borrow_dependent();
+            chunk.seats.iter().map(move |(group, k)| (&*groups[*group], *k))
+        })
     }
 
     /// Go on from other numbers of each row.
@@ -188,22 +215,23 @@ impl Batch {
             }
         }
         let mut restored = Vec::with_capacity(n);
-        for (k, row) in self.each().enumerate() {
-            let at = |e| of_row(k, e);
+        for (k, (group, seat)) in self.each().enumerate() {
+            let (at, row) = (|e| of_row(k, e), &group.rows()[seat]);
             let progress = row.progress.restored(&states[k]).map_err(at)?;
             let stands = progress.samples();
             if stands > samples || (failures[k].is_none() && stands != samples) {
                 let allowed = format!("{samples}, as of the batch (less where the row has ended)");
                 return Err(at(Error::parameter("state.samples", stands as f64, allowed)));
             }
-            let mut out = Trajectory::new(&self.rigs[self.rig_of[k]], 1);
-            progress.observe(&self.rigs[self.rig_of[k]], row.timing, &mut out).map_err(at)?;
-            restored.push((progress, out.channels.into_iter().flatten().collect()));
+            let rig = &self.rigs[self.rig_of[k]];
+            progress.observe(rig, row.timing, &mut Trajectory::new(rig, 1)).map_err(at)?;
+            restored.push(progress);
         }
         self.samples = samples;
-        let rows = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.rows);
-        for ((row, (progress, sample)), failure) in rows.zip(restored).zip(failures) {
-            (row.progress, row.sample, row.failure) = (progress, sample, failure.clone());
+        let mut restored = restored.into_iter().zip(failures.iter().cloned());
+        for chunk in &mut self.chunks {
+            let some: Vec<_> = restored.by_ref().take(chunk.seats.len()).collect();
+            chunk.restore(some);
         }
         Ok(())
     }
@@ -238,17 +266,14 @@ impl Batch {
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
         let (drive, bad) = self.driven(defaults, signals, strict)?;
-        let now = self.samples as f64 * self.chunks[0].rows[0].timing.sample_time;
+        let size = self.chunks[0].seats.len();
         for (row, error) in bad {
-            let size = self.chunks[0].rows.len();
-            let row = &mut self.chunks[row / size].rows[row % size];
-            row.failure.get_or_insert(Failure { time: now, message: error.to_string() });
+            self.chunks[row / size].end(row % size, self.samples as f64 * self.sample_time, &error);
         }
         let mut left = samples;
         while left > 0 {
-            let alive = self.failures().filter(Option::is_none).count();
-            let each = (alive * self.substeps).max(1);
-            let count = (STEPS_UNSEEN / each).clamp(1, left);
+            let each = self.chunks.iter().map(Chunk::cost).sum::<usize>() * self.substeps;
+            let count = (UNSEEN / each.max(1)).clamp(1, left);
             self.team.share(&mut self.chunks, each * count >= WORTH_A_THREAD, |chunk| {
                 chunk.advance(count, &drive)
             });
@@ -316,57 +341,100 @@ impl Batch {
 
 impl Chunk {
     fn new(first: usize, rigs: &[Arc<Rig>], timing: Timing, initial: &[Initial]) -> Result<Self> {
-        let mut known: Vec<&Arc<Rig>> = Vec::new();
-        let (mut rows, mut runs) = (Vec::new(), Vec::new());
+        let mut known: Vec<Arc<Rig>> = Vec::new();
+        let mut rows = Vec::new();
         for (k, (rig, initial)) in rigs.iter().zip(initial).enumerate() {
             let at = |e| of_row(first + k, e);
-            let run = known.iter().position(|other| Arc::ptr_eq(other, rig)).unwrap_or(known.len());
-            if run == known.len() {
-                known.push(rig);
-                runs.push(OwnedRun::new(Arc::clone(rig)).map_err(at)?);
+            let place = known.iter().position(|other| Arc::ptr_eq(other, rig));
+            if place.is_none() {
+                known.push(Arc::clone(rig));
             }
             let progress = Progress::start(rig, initial).map_err(at)?;
-            let mut out = Trajectory::new(rig, 1);
             let timing = timing.stable(rig);
-            progress.observe(rig, timing, &mut out).map_err(at)?;
-            let sample = out.channels.into_iter().flatten().collect();
-            rows.push(Row { run, timing, progress, sample, failure: None });
+            progress.observe(rig, timing, &mut Trajectory::new(rig, 1)).map_err(at)?;
+            let rig = place.unwrap_or(known.len() - 1);
+            rows.push(Row { place: first + k, rig, timing, progress, failure: None });
         }
-        let blind = Trajectory { channels: Vec::new(), events: Vec::new() };
-        let seen = rigs.first().map_or_else(|| blind.clone(), |rig| Trajectory::new(rig, 1));
-        Ok(Self { first, rows, runs, seen, blind })
+        let channels = rigs[0].names().channels.len();
+        let wanted: Vec<usize> = (0..channels).collect();
+        let groups = Held::try_new(known, |rigs| grouped(rows, &&rigs[..], true, &wanted))
+            .map_err(|e| of_row(first, e))?;
+        let mut seats = vec![(0, 0); rigs.len()];
+        for (group, rows) in groups.borrow_dependent().iter().enumerate() {
+            for (k, row) in rows.rows().iter().enumerate() {
+                seats[row.place - first] = (group, k);
+            }
+        }
+        let sample = vec![0.0; channels * rigs.len()];
+        let mut chunk = Self { first, groups, seats, sample };
+        chunk.read();
+        Ok(chunk)
+    }
+
+    /// What a step of all its rows costs, in steps in lanes.
+    fn cost(&self) -> usize {
+        let of = |group: &dyn Group| {
+            let alive = group.rows().iter().filter(|row| row.failure.is_none()).count();
+            alive * if group.side_by_side() { 1 } else { ALONE }
+        };
+        self.groups.borrow_dependent().iter().map(|group| of(&**group)).sum()
+    }
+
+    fn change(&mut self, act: impl FnOnce(&mut Groups<'_>)) {
+        self.groups.with_dependent_mut(|_, groups| act(groups));
     }
 
     /// Hold the commands of each row for some samples and read the last of them.
     fn advance(&mut self, samples: usize, drive: &Drive<'_>) {
-        let Self { first, rows, runs, seen, blind } = self;
-        for (k, row) in rows.iter_mut().enumerate().filter(|(_, row)| row.failure.is_none()) {
-            let Row { run, timing, progress, sample, failure } = row;
-            let own = *first + k..*first + k + 1;
-            runs[*run].with(|run| {
-                for left in (0..samples).rev() {
-                    let out = if left == 0 { &mut *seen } else { &mut *blind };
-                    out.events.clear();
-                    let done =
-                        progress.advance_in(run, *timing, drive, own.clone(), out, &mut || Ok(()));
-                    if let Err(error) = done {
-                        let time = match error {
-                            Error::Integration { time, .. } => time,
-                            _ => progress.samples() as f64 * timing.sample_time,
-                        };
-                        *failure = Some(Failure { time, message: error.to_string() });
-                        // The last good sample is inside the model's range: it was when it was
-                        // reached.
-                        let _ = progress.observe_in(run, *timing, seen);
-                        break;
+        self.change(|groups| groups.iter_mut().for_each(|group| group.advance(samples, drive)));
+        self.read();
+    }
+
+    /// Read the present sample.
+    fn read(&mut self) {
+        let Self { first, groups, seats, sample } = self;
+        let rows = seats.len();
+        groups.with_dependent_mut(|_, groups| {
+            for group in groups {
+                let mut own = vec![0.0; sample.len() / rows * group.rows().len()];
+                group.read(&mut own);
+                let channels = own.chunks_exact(group.rows().len());
+                for (out, own) in sample.chunks_exact_mut(rows).zip(channels) {
+                    for (row, value) in group.rows().iter().zip(own) {
+                        out[row.place - *first] = *value;
                     }
                 }
-            });
-            for (value, channel) in sample.iter_mut().zip(&mut seen.channels) {
-                *value = channel.first().copied().unwrap_or(*value);
-                channel.clear();
             }
-        }
+        });
+    }
+
+    /// End a row at a time [s] for an error.
+    fn end(&mut self, row: usize, time: f64, error: &Error) {
+        let (group, k) = self.seats[row];
+        let failure = Failure { time, message: error.to_string() };
+        self.change(|groups| groups[group].end(k, failure));
+    }
+
+    /// Other progress and ends of all rows.
+    fn restore(&mut self, rows: Vec<(Progress, Option<Failure>)>) {
+        let seats = self.seats.clone();
+        self.change(|groups| {
+            for ((group, k), (progress, failure)) in seats.into_iter().zip(rows) {
+                groups[group].change(k, progress, failure);
+            }
+        });
+        self.read();
+    }
+}
+
+impl<'a> Rigs<'a> for &'a [Arc<Rig>] {
+    fn rig(&self, number: usize) -> &'a Rig {
+        let rigs: &'a [Arc<Rig>] = self;
+        &rigs[number]
+    }
+
+    fn run(&self, number: usize) -> Result<Run<'a>> {
+        Run::new(self.rig(number))
     }
 }
 
@@ -387,25 +455,4 @@ fn same_ports(first: &Rig, rig: &Rig) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// An error of one row, which it then names.
-#[must_use]
-pub fn of_row(row: usize, error: Error) -> Error {
-    let named = |name: String| format!("row {row}: {name}");
-    match error {
-        Error::Parameter { name, value, allowed } => {
-            Error::Parameter { name: named(name), value, allowed }
-        }
-        Error::Length { name, found, expected, why } => {
-            Error::Length { name: named(name), found, expected, why }
-        }
-        Error::Choice { name, value, allowed } => {
-            Error::Choice { name: named(name), value, allowed }
-        }
-        Error::Integration { time, name, value, allowed } => {
-            Error::Integration { time, name: named(name), value, allowed }
-        }
-        Error::Model(message) => Error::Model(named(message)),
-    }
 }

@@ -1,0 +1,349 @@
+//! Plants side by side in lanes, sample by sample. A plant that a sample takes beyond the range of
+//! the curves, or of the model, runs that sample alone from where it began; what happens to it
+//! depends on its own state and commands only.
+
+use super::group::{Group, Rigs, Row, Runs, Spent};
+use super::num::{side_by_side, Num, MOST_LANES};
+use super::rates::Lanes;
+use super::reads::Reads;
+use super::rk4::Rk4;
+use super::Plan;
+use crate::blocks::valve::spool_position;
+use crate::plant::Plant;
+use crate::simulate::drive::Drive;
+use crate::simulate::{Failure, Progress, Timing, Trajectory};
+use crate::Result;
+use pulp::{Arch, Scalar, Simd, WithSimd};
+
+/// Rows that run faster two by two than in wide registers.
+const FEW: usize = 4;
+
+/// Rows of one structure and step in as many flights as they fill.
+///
+/// # Errors
+/// As [`crate::simulate::run::Run::new`].
+pub(super) fn flights<'a>(
+    plan: &'a Plan,
+    rows: Vec<Row>,
+    rigs: &dyn Rigs<'a>,
+    wanted: &[usize],
+) -> Result<Vec<Box<dyn Group + 'a>>> {
+    let few = rows.len() <= FEW;
+    let fill = Fill { plan, rows, rigs, wanted };
+    // A few rows have no use for wide registers.
+    if few {
+        fill.with_simd(Scalar)
+    } else {
+        Arch::new().dispatch(fill)
+    }
+}
+
+struct Fill<'a, 'f> {
+    plan: &'a Plan,
+    rows: Vec<Row>,
+    rigs: &'f dyn Rigs<'a>,
+    wanted: &'f [usize],
+}
+
+impl<'a> WithSimd for Fill<'a, '_> {
+    type Output = Result<Vec<Box<dyn Group + 'a>>>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let Self { plan, rows, rigs, wanted } = self;
+        let (mut flights, mut rows): (Vec<Box<dyn Group + 'a>>, _) =
+            (Vec::new(), rows.into_iter().peekable());
+        while rows.peek().is_some() {
+            let some = rows.by_ref().take(side_by_side::<S>()).collect();
+            flights.push(Box::new(Flight::new(simd, plan, some, rigs, wanted)?));
+        }
+        Ok(flights)
+    }
+}
+
+/// Rows side by side, one at least, at most one for each lane.
+struct Flight<'a, S: Simd> {
+    simd: S,
+    plan: &'a Plan,
+    timing: Timing,
+    rows: Vec<Row>,
+    runs: Runs<'a>,
+    lanes: Lanes<'a, S>,
+    state: Vec<Num<S>>,
+    /// The state at the beginning of a sample.
+    before: Vec<Num<S>>,
+    method: Rk4<S>,
+    reads: Reads,
+    /// Commands that are held: an input of all rows, then the next input.
+    held: Vec<f64>,
+    /// Lanes that are beyond the curves.
+    away: [bool; MOST_LANES],
+    /// Rows whose progress is not that of their lane.
+    stale: [bool; MOST_LANES],
+    /// Room for a sample that nobody reads.
+    blind: Trajectory,
+    spent: Spent,
+}
+
+impl<'a, S: Simd> Flight<'a, S> {
+    #[inline(always)]
+    fn new(
+        simd: S,
+        plan: &'a Plan,
+        rows: Vec<Row>,
+        rigs: &dyn Rigs<'a>,
+        wanted: &[usize],
+    ) -> Result<Self> {
+        let runs = Runs::new(&rows, rigs)?;
+        let rig = rigs.rig(rows[0].rig);
+        let plants: Vec<&Plant<'a, f64>> =
+            runs.run_of.iter().map(|run| &runs.runs[*run].stepper.plant).collect();
+        let states = plants[0].states();
+        let lanes = Lanes::new(simd, plan, &plants, states > rig.layout.states());
+        let reads = Reads::new(rig, &plants, wanted);
+        let state = vec![Num::splat(simd, 0.0); states];
+        let mut flight = Self {
+            held: vec![0.0; rig.names().inputs.len() * rows.len()],
+            before: state.clone(),
+            method: Rk4::new(&state),
+            timing: rows[0].timing,
+            away: [false; MOST_LANES],
+            stale: [false; MOST_LANES],
+            blind: Trajectory { channels: Vec::new(), events: Vec::new() },
+            spent: Spent::default(),
+            simd,
+            plan,
+            rows,
+            runs,
+            lanes,
+            state,
+            reads,
+        };
+        (0..side_by_side::<S>()).for_each(|lane| flight.load(lane));
+        flight.away = flight.beyond();
+        Ok(flight)
+    }
+
+    /// Put a row's progress into its lane; the lanes that are left over run as the last row does.
+    #[inline(always)]
+    fn load(&mut self, lane: usize) {
+        let row = lane.min(self.rows.len() - 1);
+        for (value, own) in self.state.iter_mut().zip(self.rows[row].progress.state_mut()) {
+            value.numbers_mut()[lane] = *own;
+        }
+    }
+
+    /// Which lanes are beyond the range in which the model, or the curves, hold.
+    #[inline(always)]
+    fn beyond(&self) -> [bool; MOST_LANES] {
+        let layout = self.runs.runs[0].stepper.plant.rig().layout;
+        let mut beyond = [false; MOST_LANES];
+        for (place, value) in self.state.iter().enumerate().take(layout.states()) {
+            let pressure = place < layout.mass(0);
+            let angle = place >= layout.angle(0) && place < layout.rate(0);
+            for (beyond, value) in beyond.iter_mut().zip(value.numbers()) {
+                *beyond |= !value.is_finite()
+                    || (pressure && *value < 0.0)
+                    || (angle && !self.plan.contains(*value));
+            }
+        }
+        beyond
+    }
+
+    /// Set the commands of a drive.
+    #[inline(always)]
+    fn hold(&mut self, drive: &Drive<'_>) {
+        let rows = self.rows.len();
+        for (held, commands) in self.held.chunks_exact_mut(rows).zip(&drive.commands) {
+            for (held, row) in held.iter_mut().zip(&self.rows) {
+                // What would end a row is no number.
+                *held = if row.failure.is_none() { commands[row.place] } else { 0.0 };
+            }
+        }
+        let rig = self.runs.runs[0].stepper.plant.rig();
+        let mut values = [0.0; MOST_LANES];
+        let values = &mut values[..side_by_side::<S>()];
+        for (k, unit) in rig.wiring.valves.iter().enumerate() {
+            for (lane, value) in values.iter_mut().enumerate() {
+                let row = lane.min(rows - 1);
+                let valve = &self.runs.of(row).stepper.plant.valves[k];
+                let spool: f64 =
+                    spool_position(self.held[k * rows + row], valve.null, unit.half_range);
+                *value = valve.area * unit.table.eval(spool.abs()) * spool.signum();
+            }
+            self.lanes.open(k, values);
+        }
+        let mut regulator = rig.wiring.valves.len();
+        for (k, spec) in rig.spec().supplies.iter().enumerate() {
+            let regulated = spec.kind == "regulator";
+            for (lane, value) in values.iter_mut().enumerate() {
+                let gauge = if regulated {
+                    self.held[regulator * rows + lane.min(rows - 1)]
+                } else {
+                    spec.initial_pressure
+                };
+                *value = gauge + rig.gas.ambient_pressure;
+            }
+            regulator += usize::from(regulated);
+            self.lanes.set_pressure[k] = Num::load(self.simd, values);
+        }
+    }
+
+    /// Hold the commands of each row for some samples.
+    #[inline(always)]
+    fn fly(&mut self, samples: usize, drive: &Drive<'_>) {
+        self.hold(drive);
+        // What is prescribed is so to plants alone.
+        let driven = drive.places().next().is_some();
+        for _ in 0..samples {
+            let here = |lane: usize| !driven && !self.away[lane];
+            let goes = |lane: usize| self.rows[lane].failure.is_none();
+            let was: [bool; MOST_LANES] =
+                std::array::from_fn(|lane| lane < self.rows.len() && goes(lane) && here(lane));
+            if !(0..self.rows.len()).any(goes) {
+                break;
+            }
+            self.before.copy_from_slice(&self.state);
+            let fly = was.iter().filter(|flies| **flies).count() as u64;
+            if fly > 0 {
+                let before = self.method.evaluations;
+                self.sample();
+                self.spent.evaluations += fly * (self.method.evaluations - before);
+            }
+            self.landed(&was, drive);
+        }
+    }
+
+    /// The steps of one sample, and which lanes they led beyond the curves.
+    #[inline(always)]
+    fn sample(&mut self) {
+        let angle = self.runs.runs[0].stepper.plant.rig().layout.angle(0);
+        let (mut low, mut high) = (self.state[angle], self.state[angle]);
+        let step = self.timing.step();
+        for _ in 0..self.timing.substeps {
+            self.method.step(&mut self.lanes, &mut self.state, step);
+            low = self.state[angle].or_below(low);
+            high = self.state[angle].or_above(high);
+        }
+        self.away = self.beyond();
+        for (lane, away) in self.away.iter_mut().enumerate().take(side_by_side::<S>()) {
+            let (low, high) = (low.numbers()[lane], high.numbers()[lane]);
+            *away |= !(self.plan.contains(low) && self.plan.contains(high));
+        }
+    }
+
+    /// The rows after a sample: those that did not fly it, `was`, or not well, run it alone; those
+    /// that have ended stay where they are.
+    #[inline(always)]
+    fn landed(&mut self, was: &[bool; MOST_LANES], drive: &Drive<'_>) {
+        let mut others = false;
+        for (lane, flew) in was.iter().enumerate().take(self.rows.len()) {
+            if *flew && !self.away[lane] {
+                self.rows[lane].progress.count();
+                self.stale[lane] = true;
+                self.spent.steps += self.timing.substeps as u64;
+                continue;
+            }
+            for (value, before) in self.state.iter_mut().zip(&self.before) {
+                value.numbers_mut()[lane] = before.numbers()[lane];
+            }
+            if self.rows[lane].failure.is_none() {
+                self.alone(lane, drive);
+                self.load(lane);
+            }
+            others = true;
+        }
+        if others {
+            self.away = self.beyond();
+        }
+    }
+
+    /// One sample of a row alone, from where its lane stands.
+    #[inline(never)]
+    fn alone(&mut self, lane: usize, drive: &Drive<'_>) {
+        self.store(lane);
+        let (row, run) = (&mut self.rows[lane], self.runs.of(lane));
+        self.spent.alone += 1;
+        row.advance(run, 1, drive, &mut self.blind);
+        if row.failure.is_some() {
+            self.look(lane);
+        }
+    }
+
+    /// Bring the progress of a row up to date with its lane.
+    fn store(&mut self, lane: usize) {
+        if !std::mem::take(&mut self.stale[lane]) {
+            return;
+        }
+        for (own, value) in self.rows[lane].progress.state_mut().iter_mut().zip(&self.state) {
+            *own = value.numbers()[lane];
+        }
+    }
+
+    /// The conditions of events of a row under the commands that it is held at.
+    fn look(&mut self, lane: usize) {
+        let rows = self.rows.len();
+        let (run, held) = (self.runs.of(lane), &self.held);
+        let controls = run.stepper.plant.controls(|input| held[input * rows + lane]);
+        self.rows[lane].progress.look(run, &controls);
+    }
+}
+
+impl<S: Simd> Group for Flight<'_, S> {
+    fn rows(&self) -> &[Row] {
+        &self.rows
+    }
+
+    fn advance(&mut self, samples: usize, drive: &Drive<'_>) {
+        self.simd.vectorize(Advance { flight: self, samples, drive });
+    }
+
+    fn read(&mut self, out: &mut [f64]) {
+        self.reads.write(&self.state, &mut self.runs, out);
+    }
+
+    fn settle(&mut self) {
+        for lane in 0..self.rows.len() {
+            if self.stale[lane] {
+                self.store(lane);
+                self.look(lane);
+            }
+        }
+    }
+
+    fn change(&mut self, row: usize, progress: Progress, failure: Option<Failure>) {
+        (self.rows[row].progress, self.rows[row].failure) = (progress, failure);
+        self.stale[row] = false;
+        self.load(row);
+        self.away = self.beyond();
+    }
+
+    fn end(&mut self, row: usize, failure: Failure) {
+        self.settle();
+        self.rows[row].failure.get_or_insert(failure);
+    }
+
+    fn spent(&self) -> Spent {
+        self.spent
+    }
+
+    fn side_by_side(&self) -> bool {
+        true
+    }
+}
+
+/// A call that is compiled for the registers of the flight.
+struct Advance<'f, 'a, 'd, S: Simd> {
+    flight: &'f mut Flight<'a, S>,
+    samples: usize,
+    drive: &'f Drive<'d>,
+}
+
+impl<S: Simd> WithSimd for Advance<'_, '_, '_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<T: Simd>(self, _: T) {
+        self.flight.fly(self.samples, self.drive);
+    }
+}
