@@ -211,8 +211,8 @@ class EffectInfo:
         Kind of the blocks of which it can take one by its name, ``""`` for an effect on the whole
         rig.
     equation, fingerprint, separates : str
-        Governing equation of the first form; what it looks like in recordings; what it is confused with and what
-        separates them.
+        Governing equation of the first form; what it looks like in recordings; what it is confused
+        with and what separates them.
     forms : tuple of Form
         Its forms; the first one is meant where none is named.
     reference : str

@@ -285,8 +285,10 @@ def _pliable(candidate: Candidate) -> bool:
     """Whether it takes up a good part of anything: values of the baseline, and what happens
     differently in every recording.
     """
-    free = (EFFECTS[effect] for effect in candidate.effects if EFFECTS[effect].transient)
-    return bool(candidate.wrong) or any(not info.leading.same_everywhere for info in free)
+    happening = () if candidate.fit.events is None else (candidate.fit.events.effect,)
+    return bool(candidate.wrong) or any(
+        not EFFECTS[effect].leading.same_everywhere for effect in happening
+    )
 
 
 def capped(odds: float, most: float) -> float:

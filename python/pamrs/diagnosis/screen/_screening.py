@@ -241,17 +241,17 @@ def screen(
 
     for effect in effects:
         starts = starts_of(effect, sealed=sealed)
-        info = EFFECTS[effect]
-        if any(p.scan for p in info.parameters):
-            for start in _nearest(starts[0], lambda start: try_(start, 1), signatures):
-                try_(start)
-        elif info.with_role("threshold"):
-            before = len(signatures)
-            best = _switched(starts[0], problem, lambda start: try_(start, 1))
-            signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
-        else:
-            for form in dict.fromkeys(start.form for start in starts):
-                own = [start for start in starts if start.form == form]
+        for form in dict.fromkeys(start.form for start in starts):
+            own = [start for start in starts if start.form == form]
+            parameters = EFFECTS[effect].form(form).parameters
+            if any(p.scan for p in parameters):
+                for start in _nearest(own[0], lambda start: try_(start, 1), signatures):
+                    try_(start)
+            elif any(p.role == "threshold" for p in parameters):
+                before = len(signatures)
+                best = _switched(own[0], problem, lambda start: try_(start, 1))
+                signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
+            else:
                 for start in _placed(own, problem, fitted.rig):
                     try_(start)
     return Screen(stand, signatures, settings)
@@ -300,7 +300,7 @@ def _nearest(
     They are tried with more damping than the effect has, which makes the resonance broader than the
     distance between two values.
     """
-    parameters = EFFECTS[start.effect].parameters
+    parameters = EFFECTS[start.effect].form(start.form).parameters
     scanned = next(p for p in parameters if p.scan)
     assert scanned.scan is not None
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
