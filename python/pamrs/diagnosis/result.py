@@ -184,7 +184,8 @@ class Diagnosis(Findings):
                 )
         for effect in self.effects:
             lines.append("")
-            lines.append(effect.name or words.label(effect.id))
+            form = f", form: {words.label(effect.form)}" if effect.form else ""
+            lines.append((effect.name or words.label(effect.id)) + form)
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)

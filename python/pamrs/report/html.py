@@ -67,7 +67,8 @@ def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
         rows.append(
             {
                 "id": effect.id,
-                "name": effect.name or words.label(effect.id),
+                "name": (effect.name or words.label(effect.id))
+                + (f", form: {words.label(effect.form)}" if effect.form else ""),
                 "probability": words.format_probability(effect.probability),
                 "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
                 "parameters": parameters,

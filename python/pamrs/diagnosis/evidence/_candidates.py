@@ -351,6 +351,24 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
+    def freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
+        """The baseline with some parameters freed, a few steps from the nominal values: enough to
+        see which of many are worth a whole fit.
+        """
+        try:
+            found = fit(
+                self.inner,
+                self.nominal,
+                (),
+                {},
+                self.white,
+                freed=names,
+                evaluations=self.settings.wrong_parameters.first_evaluations,
+            )
+            return replace(self.judged((), found), wrong=names)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
     def freed(self, names: tuple[str, ...], baseline: Fit) -> Candidate | None:
         """The baseline with some parameters freed from their tolerance, fitted to its end; None
         where it cannot be run.

@@ -8,6 +8,8 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pamrs.diagnosis.evidence import (
     Attempts,
     Candidate,
@@ -282,7 +284,52 @@ def _hypotheses(
         tell(f"looking for {effect} beside {beside.effects[0]}")
         found = trial.transient(effect, beside)
         pairs += [] if found is None else [found]
-    return [start, *singles, *pairs, *mistaken]
+    return [start, *singles, *pairs, *_grown(trial, screened, pairs, tell), *mistaken]
+
+
+def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say) -> list[Candidate]:
+    """Sets of three effects and more: the pair that leaves least with one effect after the other,
+    as long as held-out recordings are clearly predicted better.
+    """
+    settings = trial.settings.search
+    lasting = [c for c in pairs if c.fit.events is None]
+    best = min(lasting, key=_left_everywhere, default=None)
+    found: list[Candidate] = []
+    while best is not None and len(best.effects) < settings.most_terms:
+        stand = stand_of(best.fit, trial.inner, trial.white)
+        ranked = by_effect(screened.scores(stand, without=best.effects)).values()
+        least = max(settings.least_gain, settings.partner_share * stand.power_left)
+        likely = [scores[0] for scores in ranked if scores[0].gain > least]
+        tried = []
+        for score in likely[: settings.most_partners]:
+            tell(f"trying {' + '.join([*best.effects, score.effect])}")
+            begun = [trial.start_of(best.fit, effect) for effect in best.effects]
+            more = [*begun, score.start.scaled(score.size)]
+            candidate = trial.fitted(more, best.fit, trial.white)
+            tried += [] if candidate is None else [candidate]
+        further = min(tried, key=_left_everywhere, default=None)
+        if further is None or not _predicts_better(further, best, trial):
+            break
+        found.append(further)
+        best = further
+    return found
+
+
+def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
+    """Whether a larger set takes a telling share of what a smaller one leaves of held-out
+    recordings, and more than the pieces of the recordings differ in it.
+    """
+    settings = trial.settings.search
+    taken, left = [], 0.0
+    for block in trial.suspects:
+        before, after = (c.held_out[block.name].pieces for c in (best, further))
+        taken += [n * (was - now) for (was, n), (now, _) in zip(before, after, strict=True)]
+        left += sum(n * (was - 1.0) for was, n in before)
+    if len(taken) < 2 or left <= 0.0:
+        return False
+    error = math.sqrt(len(taken)) * float(np.std(taken, ddof=1))
+    gained = float(sum(taken))
+    return gained > settings.further_errors * error and gained > settings.further_share * left
 
 
 def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:

@@ -119,14 +119,28 @@ def freed(
         : settings.most_pairs
     ]
     found = []
-    for names in [n for n in ranked if len(n) == 1 or n in pairs]:
-        say(f"trying another value of {' and '.join(names)}")
-        candidate = trial.freed(names, baseline)
+    for names, short in _tried(trial, [n for n in ranked if len(n) == 1 or n in pairs], say):
+        candidate = trial.freed(names, baseline) if short is None else short
         if candidate is not None and all(
             abs(candidate.fit.moved[name]) > walls for name in names
         ):  # else it is not wrong
             found.append(replace(candidate, gain=gains[names]))
     return found
+
+
+def _tried(
+    trial: Attempts, sets: list[tuple[str, ...]], say: Callable[[str], None]
+) -> list[tuple[tuple[str, ...], Candidate | None]]:
+    """The sets that are tried: those that leave least after a few steps are to be fitted to their
+    end, the others come as they are.
+    """
+    most = trial.settings.wrong_parameters.most_finished
+    if len(sets) <= most:
+        return [(names, None) for names in sets]
+    say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
+    short = {names: c for names in sets if (c := trial.freed_shortly(names)) is not None}
+    best = sorted(short, key=lambda names: short[names].misfit)[:most]
+    return [(names, None if names in best else short[names]) for names in short]
 
 
 def _predicted_gain(

@@ -128,6 +128,25 @@ class SearchSettings(SettingsGroup):
     most_partners: int = setting(
         2, unit="count", least=0, reason="partners of each", origin="judgement; docs/decisions/0013"
     )
+    most_terms: int = setting(
+        5, unit="count", least=2, reason="effects of a set", origin="judgement: more have no proof"
+    )
+    further_errors: float = setting(
+        2.0,
+        unit="standard errors",
+        least=0.0,
+        reason="improvement of held-out recordings, over their pieces, from which a further effect "
+        "stays in the set",
+        origin="judgement",
+    )
+    further_share: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of what a set leaves that a further effect has to take",
+        origin="judgement: what takes less is the form of the others",
+    )
     partner_share: float = setting(
         0.01,
         unit="1",
@@ -298,6 +317,21 @@ class WrongParameterSettings(SettingsGroup):
         least=0.0,
         reason="gain by the linear model from which a parameter is freed: twice file_log_odds",
         origin="docs/decisions/0025",
+    )
+    first_evaluations: int = setting(
+        6,
+        unit="count",
+        least=2,
+        reason="evaluations of the first fit of a freed parameter, which says whether it is worth "
+        "a whole one",
+        origin="judgement; docs/decisions/0031",
+    )
+    most_finished: int = setting(
+        3,
+        unit="count",
+        least=1,
+        reason="freed parameters, and pairs of them, that are fitted to their end",
+        origin="judgement; docs/decisions/0031",
     )
     most_pairs: int = setting(
         2,
