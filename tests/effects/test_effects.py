@@ -169,12 +169,16 @@ def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str) -> None:
     assert EFFECTS[effect].acts_in or ACTS[EFFECTS[effect].block]
-    restricting = {f"{effect}.{p.name}" for p in EFFECTS[effect].parameters if p.restricts}
     for sealed in (True, False):
         starts = starts_of(effect, sealed=sealed)
-        assert starts
+        usual, lasting = EFFECTS[effect].forms[:1], EFFECTS[effect].lasting
+        assert {start.form or usual[0].name for start in starts} == {
+            form.name for form in lasting or usual
+        }
         for start in starts:
-            assert {*start.free, *start.held} == set(EFFECTS[effect].dotted())
+            parameters = EFFECTS[effect].form(start.form).parameters
+            restricting = {f"{effect}.{p.name}" for p in parameters if p.restricts}
+            assert {*start.free, *start.held} == {f"{effect}.{p.name}" for p in parameters}
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
             assert all(
