@@ -66,10 +66,10 @@ def test_a_snippet_takes_values():
 
 
 def two_forms(monkeypatch):
-    """The leak with a second form."""
+    """The leak with another second form."""
     leak = EFFECTS["leak_muscle"]
     second = Form("porous", leak.parameters[:1], (), ("leak",))
-    grown = dataclasses.replace(leak, forms=(*leak.forms, second))
+    grown = dataclasses.replace(leak, forms=(leak.forms[0], second))
     monkeypatch.setitem(CATALOGUE, "leak_muscle", grown)
     return grown
 

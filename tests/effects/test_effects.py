@@ -91,6 +91,41 @@ def test_all_at_once_run_and_restart() -> None:
     )
 
 
+FORMS = [(effect, form.name) for effect in sorted(EFFECTS) for form in EFFECTS[effect].forms[1:]]
+
+
+@pytest.mark.parametrize(("effect", "form"), FORMS)
+def test_a_form_survives_its_file_and_off_it_changes_nothing(effect: str, form: str) -> None:
+    plain = rig_for(effect)
+    rig = plain.with_effect(effect, form=form)
+    again = parse_rig(rig.to_toml_text())
+    assert again.effects == rig.effects
+    one, two = run(rig), run(again)
+    for channel in one:
+        np.testing.assert_array_equal(one[channel], two[channel])
+    assert all(np.isfinite(one[channel]).all() for channel in one)
+    neutral = {p.name: p.neutral for p in EFFECTS[effect].form(form).parameters if p.neutral == 0.0}
+    one, two = run(plain), run(plain.with_effect(effect, neutral, form=form))
+    for channel in one:
+        np.testing.assert_array_equal(one[channel], two[channel])
+
+
+@pytest.mark.parametrize(("effect", "form"), FORMS)
+def test_parameters_of_one_name_are_the_same_in_every_form(effect: str, form: str) -> None:
+    info = EFFECTS[effect]
+    known = {p.name: p for other in info.forms for p in other.parameters}
+    chosen = info.form(form)
+    assert chosen.equation
+    for parameter in chosen.parameters:
+        assert parameter == known[parameter.name]
+        assert parameter.starts
+        assert parameter.lower <= parameter.default <= parameter.upper
+        assert parse_unit(parameter.unit).scale == 1.0
+        assert parameter.meaning
+    sizes = {p.name for p in chosen.parameters if p.role_in(sealed=False) == "size"}
+    assert sizes & {p.name for p in info.parameters} or "share" in sizes
+
+
 def test_the_table_can_be_read_by_a_fit() -> None:
     for effect in EFFECTS.values():
         assert (
@@ -115,9 +150,9 @@ def test_the_table_can_be_read_by_a_fit() -> None:
 
 @pytest.mark.parametrize("effect", sorted(EFFECTS))
 def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
-    for parameter in EFFECTS[effect].parameters:
+    for form, parameter in ((f.name, p) for f in EFFECTS[effect].forms for p in f.parameters):
         for value in (parameter.lower, parameter.upper):
-            rig = rig_for(effect).with_effect(effect, {parameter.name: value})
+            rig = rig_for(effect).with_effect(effect, {parameter.name: value}, form=form)
             if (parameter.name, value) == ("mass_change", parameter.lower):
                 with pytest.raises(ParameterError, match="no more can be taken away"):
                     _core.Rig(rig.to_json())
@@ -134,12 +169,16 @@ def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str) -> None:
     assert EFFECTS[effect].acts_in or ACTS[EFFECTS[effect].block]
-    restricting = {f"{effect}.{p.name}" for p in EFFECTS[effect].parameters if p.restricts}
     for sealed in (True, False):
         starts = starts_of(effect, sealed=sealed)
-        assert starts
+        usual, lasting = EFFECTS[effect].forms[:1], EFFECTS[effect].lasting
+        assert {start.form or usual[0].name for start in starts} == {
+            form.name for form in lasting or usual
+        }
         for start in starts:
-            assert {*start.free, *start.held} == set(EFFECTS[effect].dotted())
+            parameters = EFFECTS[effect].form(start.form).parameters
+            restricting = {f"{effect}.{p.name}" for p in parameters if p.restricts}
+            assert {*start.free, *start.held} == {f"{effect}.{p.name}" for p in parameters}
             assert all(value != 0.0 for name, value in start.free.items() if name in start.sizes)
             half = start.scaled(0.5)
             assert all(

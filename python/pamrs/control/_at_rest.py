@@ -33,7 +33,8 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
         if kink is None:
             continue
         names, why, of_supplies = kink
-        values = {name: effect["parameters"].get(name, 0.0) for name in names}
+        own = effect["parameters"]
+        values = {name: own[name] for name in names if name in own}
         if any(values.values()) and (supplies or not of_supplies):
             said = ", ".join(f"{effect['id']}.{name} = {value:g}" for name, value in values.items())
             raise ParameterError(f"{said} is not allowed: the effect has no linear model, {why}")

@@ -1,15 +1,29 @@
 //! `activation_pressure`: pressure that a muscle needs before its bladder presses on the braid.
 //!
-//! The force is that of the gauge pressure less `p_th`, and that of none below it:
+//! `threshold`: the force is that of the gauge pressure less `p_th`, and that of none below it:
 //! `p_e = p - min(p, p_th)` for `p > 0`, the corner at `p_th` rounded over a tenth of it on either
 //! side. N. G. Tsagarakis & D. G. Caldwell, "Improved modelling and assessment of pneumatic muscle
 //! actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in
 //! miniature pneumatic artificial muscles", Smart Materials and Structures 22, 2013.
+//!
+//! `saturating`: `p_e = p - p p_th/(p + p_th) = p^2/(p + p_th)` for `p > 0`: a bladder that meets
+//! its braid little by little, what is lost growing to `p_th`. Hocking & Wereley (2013).
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Port};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
+
+const THRESHOLD: Form = Form {
+    name: "threshold",
+    parameters: &[EffectParameter::new("threshold", "Pa", 0.0, 1e7, 20000.0)
+        .starts(&[10000.0, 50000.0])
+        .off(0.0)],
+    states: &[],
+    integrates: false,
+    ports: &[Port::Gauge],
+    make: made_by!(make),
+};
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -17,16 +31,7 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "muscle",
     at: "muscle",
     source: "Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
-    forms: &[Form {
-        name: "threshold",
-        parameters: &[EffectParameter::new("threshold", "Pa", 0.0, 1e7, 20000.0)
-            .starts(&[10000.0, 50000.0])
-            .off(0.0)],
-        states: &[],
-        integrates: false,
-        ports: &[Port::Gauge],
-        make: made_by!(make),
-    }],
+    forms: &[THRESHOLD, Form { name: "saturating", make: made_by!(saturating), ..THRESHOLD }],
     ..EffectInfo::USUAL
 };
 
@@ -63,6 +68,25 @@ impl<S: Scalar> Effect<S> for Activation<S> {
     }
 }
 
+/// Pressure of which more and more is lost, up to all that is needed.
+#[derive(Debug, Clone, Copy)]
+struct Saturating<S> {
+    threshold: S,
+}
+
+fn saturating<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Saturating { threshold: values[0] })
+}
+
+impl<S: Scalar> Effect<S> for Saturating<S> {
+    fn gauge(&self, gauge: S) -> S {
+        if gauge.re() <= 0.0 {
+            return gauge;
+        }
+        gauge - gauge * self.threshold / (gauge + self.threshold)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,5 +105,17 @@ mod tests {
             assert!(jump.abs() < 3e-3);
         }
         assert!((effective(2e4, 2e4) - 500.0_f64).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_is_lost_saturates() {
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        let made =
+            |threshold: f64| (INFO.form("saturating").unwrap().make.plain)(&[threshold], &gas);
+        let lost = |p: f64| p - made(2e4).gauge(p);
+        assert_eq!((lost(-3e3), lost(2e4)), (0.0, 1e4));
+        assert!(lost(1e7) > 0.99 * 2e4 && lost(1e7) < 2e4);
+        assert!((made(2e4).gauge(1e5) - 1e10 / 1.2e5).abs() < 1e-9);
+        assert_eq!(made(0.0).gauge(1.234_567e5), 1.234_567e5);
     }
 }

@@ -18,10 +18,8 @@ use crate::made_by;
 use crate::scalar::{constant, Scalar};
 use std::f64::consts::TAU;
 
-const TORQUE: EffectParameter = EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0)
-    .starts(&[-5.0, 5.0])
-    .off(0.0)
-    .tried(1.0);
+const TORQUE: EffectParameter =
+    EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0).starts(&[-5.0, 5.0]).off(0.0).tried(1.0);
 
 const PUSHES: Form = Form {
     name: "pushes",

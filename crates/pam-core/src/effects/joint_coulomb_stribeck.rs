@@ -46,7 +46,8 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "joint",
     at: "joint",
     dry_friction: true,
-    source: "Armstrong-Helouvry, Dupont & Canudas de Wit (1994); Hess & Soom (1990); Hamon, Gautier \
+    source:
+        "Armstrong-Helouvry, Dupont & Canudas de Wit (1994); Hess & Soom (1990); Hamon, Gautier \
         & Garrec (2010)",
     forms: &[
         EXPONENTIAL,
@@ -56,9 +57,7 @@ pub const INFO: EffectInfo = EffectInfo {
             parameters: &[
                 STICTION,
                 SPEED,
-                EffectParameter::new("coulomb", "N m", 0.0, 1e6, 1.0)
-                    .starts(&[0.5, 2.0])
-                    .off(0.0),
+                EffectParameter::new("coulomb", "N m", 0.0, 1e6, 1.0).starts(&[0.5, 2.0]).off(0.0),
             ],
             make: made_by!(with_coulomb),
             ..EXPONENTIAL
@@ -216,7 +215,8 @@ mod tests {
     fn one_direction_rubs_more() {
         let values = [2.0, 0.05, 1.5];
         for rate in [0.01, 0.04] {
-            let (up, down) = (at("per_direction", &values, rate), at("per_direction", &values, -rate));
+            let (up, down) =
+                (at("per_direction", &values, rate), at("per_direction", &values, -rate));
             assert_eq!(up, at("exponential", &values[..2], rate));
             assert!((down / up + 1.5).abs() < 1e-12);
         }

@@ -23,15 +23,14 @@ use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-const TIME_CONSTANT: EffectParameter =
-    EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0).starts(&[1.0, 10.0]).time_constant();
+const TIME_CONSTANT: EffectParameter = EffectParameter::new("time_constant", "s", 0.001, 1e6, 3.0)
+    .starts(&[1.0, 10.0])
+    .time_constant();
 
 const SOLID: Form = Form {
     name: "standard_linear_solid",
     parameters: &[
-        EffectParameter::new("stiffness", "N/m", 0.0, 1e7, 500.0)
-            .starts(&[200.0, 2000.0])
-            .off(0.0),
+        EffectParameter::new("stiffness", "N/m", 0.0, 1e7, 500.0).starts(&[200.0, 2000.0]).off(0.0),
         TIME_CONSTANT,
     ],
     states: &[EffectState { name: "", role: Role::Moves }],

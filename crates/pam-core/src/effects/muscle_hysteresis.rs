@@ -91,12 +91,7 @@ pub const INFO: EffectInfo = EffectInfo {
             make: made_by!(by_force),
             ..MAXWELL
         },
-        Form {
-            name: "dahl",
-            states: &[follows("direction")],
-            make: made_by!(dahl),
-            ..MAXWELL
-        },
+        Form { name: "dahl", states: &[follows("direction")], make: made_by!(dahl), ..MAXWELL },
     ],
     ..EffectInfo::USUAL
 };
@@ -265,8 +260,10 @@ mod tests {
         AtMuscle { gauge, contraction, length, rate, stretched, force }
     }
 
+    type Made = (&'static Form, Box<dyn Effect<f64>>, Vec<f64>, f64);
+
     /// Every form, 2 N wide without pressure or force, with its states and its width [N].
-    fn forms() -> Vec<(&'static Form, Box<dyn Effect<f64>>, Vec<f64>, f64)> {
+    fn forms() -> Vec<Made> {
         let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
         let all = INFO.forms.iter().map(|form| {
             let (slope, width) =

@@ -1,9 +1,12 @@
 //! `valve_hysteresis`: play of the spool by the friction of spool and solenoid.
 //!
-//! `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a distance
+//! `play`: `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a distance
 //! `h`. Between steps the recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M.
 //! Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii model
 //! inversion for hysteresis compensation", IEEE/ASME Trans. Mechatronics 16, 2011 (play operator).
+//!
+//! `play_with_slope`: `x_e = y + g (x - y)`: a spool that gives by a share `g` before it breaks
+//! away, so that no small command is lost. The play operator and a linear part of the same paper.
 
 use super::{
     begun, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role, BEGINNING,
@@ -12,6 +15,18 @@ use super::{
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
+
+const WIDTH: EffectParameter =
+    EffectParameter::new("half_width", "1", 0.0, 0.9, 0.004).starts(&[0.003, 0.02]).off(0.0);
+
+const PLAY: Form = Form {
+    name: "play",
+    parameters: &[WIDTH],
+    states: &[BEGINNING, EffectState { name: "spool", role: Role::Keeps }],
+    integrates: false,
+    ports: &[Port::Command],
+    make: made_by!(make),
+};
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -25,16 +40,18 @@ pub const INFO: EffectInfo = EffectInfo {
         of_supplies: false,
     }),
     source: "Al Janaideh, Rakheja & Su (2011), play operator",
-    forms: &[Form {
-        name: "play",
-        parameters: &[EffectParameter::new("half_width", "1", 0.0, 0.9, 0.004)
-            .starts(&[0.003, 0.02])
-            .off(0.0)],
-        states: &[BEGINNING, EffectState { name: "spool", role: Role::Keeps }],
-        integrates: false,
-        ports: &[Port::Command],
-        make: made_by!(make),
-    }],
+    forms: &[
+        PLAY,
+        Form {
+            name: "play_with_slope",
+            parameters: &[
+                WIDTH,
+                EffectParameter::new("slope", "1", 0.0, 1.0, 0.2).starts(&[0.2, 0.5]),
+            ],
+            make: made_by!(sloping),
+            ..PLAY
+        },
+    ],
     ..EffectInfo::USUAL
 };
 
@@ -77,6 +94,33 @@ impl<S: Scalar> Effect<S> for Play<S> {
     }
 }
 
+/// Play of a spool that gives a little inside it.
+#[derive(Debug, Clone, Copy)]
+struct SlopingPlay<S> {
+    play: Play<S>,
+    slope: S,
+}
+
+fn sloping<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(SlopingPlay { play: Play { half_width: values[0] }, slope: values[1] })
+}
+
+impl<S: Scalar> SlopingPlay<S> {
+    fn given(&self, spool: S, input: S) -> S {
+        spool + self.slope * (input - spool)
+    }
+}
+
+impl<S: Scalar> Effect<S> for SlopingPlay<S> {
+    fn position(&self, own: &[S], input: S, age: f64) -> S {
+        self.given(self.play.position(own, input, age), input)
+    }
+
+    fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
+        self.given(self.play.follow(own, input, step), input)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,5 +133,14 @@ mod tests {
         assert_eq!(followed(up, 0.485, h), up, "a small return does not move it");
         assert!((followed(up, 0.3, h) - 0.31_f64).abs() < 1e-15);
         assert_eq!(followed(0.2, 0.7, 0.0), 0.7);
+    }
+
+    #[test]
+    fn inside_its_play_it_gives_by_a_share() {
+        let play = SlopingPlay { play: Play { half_width: 0.01 }, slope: 0.25 };
+        let at = |x: f64| play.position(&[BEGUN, 0.3], x, 0.0);
+        assert!((at(0.304) - 0.301).abs() < 1e-15 && (at(0.296) - 0.299).abs() < 1e-15);
+        // beyond it by three quarters of the distance
+        assert!((at(0.5) - 0.4925).abs() < 1e-15);
     }
 }

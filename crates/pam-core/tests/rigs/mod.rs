@@ -234,6 +234,50 @@ pub const TYPICAL: &[Typical] = &[
 
 /// The other forms.
 pub const FORMS: &[Typical] = &[
+    formed("supply_leak", "laminar", &[("conductance", 5e-10)], &[("conductance", 0.0)]),
+    formed(
+        "valve_dead_zone",
+        "two_widths",
+        &[("half_width", 0.03), ("half_width_venting", 0.02)],
+        &[("half_width", 0.0), ("half_width_venting", 0.0)],
+    ),
+    formed(
+        "valve_hysteresis",
+        "play_with_slope",
+        &[("half_width", 0.01), ("slope", 0.3)],
+        &[("half_width", 0.0)],
+    ),
+    formed(
+        "valve_centre_leakage",
+        "hyperbolic",
+        &[("conductance", 1e-9), ("opening", 0.05)],
+        &[("conductance", 0.0)],
+    ),
+    formed(
+        "leak_muscle",
+        "power",
+        &[("conductance", 2e-10), ("exponent", 1.3)],
+        &[("conductance", 0.0)],
+    ),
+    formed("activation_pressure", "saturating", &[("threshold", 2e4)], &[("threshold", 0.0)]),
+    formed(
+        "input_path_lag",
+        "second_order",
+        &[("time_constant", 0.02), ("damping_ratio", 0.6)],
+        &[("time_constant", 0.0)],
+    ),
+    formed(
+        "input_path_lag",
+        "slew_limit",
+        &[("time_constant", 0.012), ("stroke_time", 1.5)],
+        &[("time_constant", 0.0), ("stroke_time", 0.0)],
+    ),
+    formed(
+        "input_path_lag",
+        "up_and_down",
+        &[("time_constant", 0.012), ("time_constant_down", 0.025)],
+        &[("time_constant", 0.0), ("time_constant_down", 0.0)],
+    ),
     formed(
         "muscle_hysteresis",
         "pressure_stops",

@@ -1,11 +1,17 @@
 //! `input_path_lag`: command delay, spool and line, lumped into one lag and one delay between
 //! command and opening.
 //!
-//! `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three equal lags
+//! `lag_and_delay`: `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three equal lags
 //! `z_i' = (z_(i-1) - z_i)/(D/3)`, `z_0 = w`: a delay that can be differentiated. Commands are
 //! held, so that the chain moves in closed form over any time, by the phi functions of exponential
 //! integrators (M. Hochbruck & A. Ostermann, *Acta Numerica* 19, 2010), and no step is too long for
 //! it. E. Richer & Y. Hurmuzlu (2000); J. F. Carneiro & F. G. de Almeida (2006).
+//!
+//! The forms `second_order`, `slew_limit` and `up_and_down` stand in files of their own.
+
+mod second_order;
+mod slew_limit;
+mod up_and_down;
 
 use super::{
     begun, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, BEGINNING, BEGUN,
@@ -14,32 +20,40 @@ use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
+/// Lag of a slow command, in every form.
+const TIME_CONSTANT: EffectParameter =
+    EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.015]).off(0.0);
+
+const LAG_AND_DELAY: Form = Form {
+    name: "lag_and_delay",
+    parameters: &[
+        TIME_CONSTANT,
+        EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0),
+    ],
+    states: &[
+        BEGINNING,
+        opens("lag"),
+        opens("delay_1"),
+        opens("delay_2"),
+        opens("delay_3"),
+    ],
+    integrates: false,
+    ports: &[Port::Command],
+    make: made_by!(make),
+};
+
+const fn opens(name: &'static str) -> EffectState {
+    EffectState { name, role: Role::Opens }
+}
+
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
     id: "input_path_lag",
     block: "valve",
     at: "valve",
     source: "Richer & Hurmuzlu (2000); Carneiro & de Almeida (2006); Hochbruck & Ostermann (2010) \
-        for its closed form",
-    forms: &[Form {
-        name: "lag_and_delay",
-        parameters: &[
-            EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005)
-                .starts(&[0.003, 0.015])
-                .off(0.0),
-            EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0),
-        ],
-        states: &[
-            BEGINNING,
-            EffectState { name: "lag", role: Role::Opens },
-            EffectState { name: "delay_1", role: Role::Opens },
-            EffectState { name: "delay_2", role: Role::Opens },
-            EffectState { name: "delay_3", role: Role::Opens },
-        ],
-        integrates: false,
-        ports: &[Port::Command],
-        make: made_by!(make),
-    }],
+        for its closed form; Hildebrandt, Sawodny, Neumann & Hartmann (2005)",
+    forms: &[LAG_AND_DELAY, second_order::FORM, slew_limit::FORM, up_and_down::FORM],
     ..EffectInfo::USUAL
 };
 
@@ -47,6 +61,16 @@ pub const INFO: EffectInfo = EffectInfo {
 const STAGES: f64 = 3.0;
 /// A shorter lag [s] counts as none.
 pub const SHORTEST: f64 = 2e-5;
+
+/// A position on the way to an input after a time [s], with a lag.
+#[inline]
+fn lagging<S: Scalar>(from: S, input: S, time_constant: S, time: f64) -> S {
+    if time_constant.re() > SHORTEST {
+        input + (from - input) * (-constant::<S>(time) / time_constant).exp()
+    } else {
+        input
+    }
+}
 
 /// Positions along the chain: behind the lag, and behind each part of the delay. The last one opens
 /// the valve.
