@@ -55,7 +55,8 @@ def test_an_effect_below_the_noise_is_named() -> None:
         shoulder_case(pamrs.rigs.shoulder().with_effect("valve_dead_zone", {"half_width": 8e-4}))
     )
     assert found.effects[0]["id"] == "valve_dead_zone"
-    assert 0.8 < found.probabilities["valve_dead_zone"] < 0.95
+    # the leakage past the closed spool, in its hyperbolic form, nearly does the same
+    assert 0.55 < found.probabilities["valve_dead_zone"] < 0.95
     baseline = next(t for t in found.tried if not t["effects"] and t["suspects"])
     assert all(baseline["fitted"][b] < 1.45 for b in baseline["suspects"])
     told = found.effects[0]["parameters"]["half_width"]

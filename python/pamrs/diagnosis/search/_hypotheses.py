@@ -277,6 +277,7 @@ def _hypotheses(
     ):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
+        singles = _one_of_each(singles)
     if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
         return [start, *singles, *mistaken]
     pairs = _pairs(trial, screened, start, singles, tell)
@@ -285,6 +286,14 @@ def _hypotheses(
         found = trial.transient(effect, beside)
         pairs += [] if found is None else [found]
     return [start, *singles, *pairs, *_grown(trial, screened, pairs, tell), *mistaken]
+
+
+def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
+    """Of hypotheses of one name, one that lasts and one of events, the one that leaves least."""
+    best: dict[str, Candidate] = {}
+    for candidate in sorted(candidates, key=_left_everywhere):
+        best.setdefault(candidate.key, candidate)
+    return [c for c in candidates if c is best[c.key]]
 
 
 def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say) -> list[Candidate]:
