@@ -15,9 +15,7 @@ pub(super) const FORM: Form = Form {
     name: "slew_limit",
     parameters: &[
         TIME_CONSTANT,
-        EffectParameter::new("stroke_time", "s", 0.0, 100.0, 0.01)
-            .starts(&[0.01, 0.05])
-            .off(0.0),
+        EffectParameter::new("stroke_time", "s", 0.0, 100.0, 0.01).starts(&[0.01, 0.05]).off(0.0),
     ],
     states: &[BEGINNING, opens("position")],
     make: made_by!(make),

@@ -12,10 +12,7 @@ use crate::scalar::{constant, Scalar};
 
 pub(super) const FORM: Form = Form {
     name: "up_and_down",
-    parameters: &[
-        TIME_CONSTANT,
-        EffectParameter { name: "time_constant_down", ..TIME_CONSTANT },
-    ],
+    parameters: &[TIME_CONSTANT, EffectParameter { name: "time_constant_down", ..TIME_CONSTANT }],
     states: &[BEGINNING, opens("position")],
     make: made_by!(make),
     ..LAG_AND_DELAY
