@@ -442,6 +442,22 @@ def make_case(
     return case.digest()
 
 
+def stored_key(
+    folder: Path, name: str, recordings: Sequence[str], digests: dict[str, str]
+) -> dict[str, Any] | None:
+    """The key of a case whose files are all there and whose digest is the published one."""
+    key = folder / "keys" / f"{name}.json"
+    files = ("case.toml", "rig.toml", *(f"{recording}.csv" for recording in recordings))
+    there = all((folder / "cases" / name / file).is_file() for file in files)
+    if name not in digests or not key.is_file() or not there:
+        return None
+    content = key.read_bytes()
+    if hashlib.sha256(content).hexdigest() != digests[name]:
+        return None
+    told: dict[str, Any] = json.loads(content)
+    return told
+
+
 def store(case: Case, out: Path) -> None:
     """Write the files of a case below `out`; its list of recordings comes last and says that it is
     complete.
@@ -450,4 +466,14 @@ def store(case: Case, out: Path) -> None:
         write(out / case.name / file, content)
 
 
-__all__ = ["RECORDINGS", "WRONG", "Case", "Spec", "generate", "make_case", "store", "write"]
+__all__ = [
+    "RECORDINGS",
+    "WRONG",
+    "Case",
+    "Spec",
+    "generate",
+    "make_case",
+    "store",
+    "stored_key",
+    "write",
+]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import multiprocessing
 from collections.abc import Callable, Sequence
@@ -12,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from .concealed import WRONG, Case, Spec, generate, store, write
+from .concealed import WRONG, Case, Spec, generate, store, stored_key, write
 from .effects import LISTED, TYPES, UNLISTED
 from .effects.base import log_uniform
 from .rigfile import default_rig, read_rig
@@ -228,17 +227,9 @@ def specs(
 
 def _complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     """Whether a case, its key and its digest are there and belong together."""
-    key = folder / "keys" / f"{spec.name}.json"
-    files = [
-        folder / "cases" / spec.name / f
-        for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))
-    ]
-    if spec.name not in digests or not key.is_file() or not all(f.is_file() for f in files):
+    told = stored_key(folder, spec.name, [name for name, _ in spec.recordings], digests)
+    if told is None:
         return False
-    content = key.read_bytes()
-    if hashlib.sha256(content).hexdigest() != digests[spec.name]:
-        return False
-    told: dict[str, Any] = json.loads(content)
     same = all(
         told.get(name) == getattr(spec, name)
         for name in ("kind", "seed", "duration", "measure", "strength")

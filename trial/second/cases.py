@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..concealed import Case
+from ..concealed import Case, stored_key
 from ..effects import Effect, Setting
 from ..recording import CHANNELS, Noise
 from ..rigfile import draw_parameters
@@ -257,14 +256,5 @@ def _tables(
 
 def complete(folder: Path, spec: Spec, digests: dict[str, str]) -> bool:
     """Whether a case, its key and its digest are there and belong to a spec."""
-    key = folder / "keys" / f"{spec.name}.json"
-    files = [
-        folder / "cases" / spec.name / f
-        for f in ("case.toml", "rig.toml", *(f"{n}.csv" for n, _ in spec.recordings))
-    ]
-    if spec.name not in digests or not key.is_file() or not all(f.is_file() for f in files):
-        return False
-    content = key.read_bytes()
-    if hashlib.sha256(content).hexdigest() != digests[spec.name]:
-        return False
-    return bool(json.loads(content).get("spec") == json.loads(json.dumps(spec.to_dict())))
+    told = stored_key(folder, spec.name, [name for name, _ in spec.recordings], digests)
+    return told is not None and told.get("spec") == json.loads(json.dumps(spec.to_dict()))

@@ -60,24 +60,14 @@ def _own(kind: type[Effect]) -> Draw:
     return lambda rng, setting: kind.draw(rng, setting)
 
 
-def _leak(form: str) -> Draw:
-    """A leak of the muscles of one form, about as large as those of the first plans."""
+def _of_form(effect: str, form: str) -> Draw:
+    """An effect of the first plans in one of its forms, about as large as there."""
 
     def draw(rng: np.random.Generator, setting: Setting) -> Effect:
         while True:
-            leak: Any = TYPES["leak_muscle"].draw(rng, setting)
-            if leak.form == form:
-                return leak  # type: ignore[no-any-return]
-
-    return draw
-
-
-def _hysteresis(form: str) -> Draw:
-    def draw(rng: np.random.Generator, setting: Setting) -> Effect:
-        while True:
-            loop: Any = TYPES["muscle_hysteresis"].draw(rng, setting)
-            if loop.form == form:
-                return loop  # type: ignore[no-any-return]
+            drawn: Any = TYPES[effect].draw(rng, setting)
+            if drawn.form == form:
+                return drawn  # type: ignore[no-any-return]
 
     return draw
 
@@ -141,14 +131,15 @@ _KNOWN: tuple[Form, ...] = (
          lambda e, p: {"delay": e.pure}),
     Form("input_path_lag", "delay_slew", KNOWN, _plain("input_path_lag")),
     Form("tube_flow_restriction", "pipe", KNOWN, _plain("tube_flow_restriction")),
-    Form("leak_muscle", "orifice", KNOWN, _leak("orifice"), True,
+    Form("leak_muscle", "orifice", KNOWN, _of_form("leak_muscle", "orifice"), True,
          lambda e, p: {"conductance": e.coefficient}),
-    Form("leak_muscle", "laminar", KNOWN, _leak("laminar"), True),
-    Form("leak_muscle", "growing_area", KNOWN, _leak("crack")),
+    Form("leak_muscle", "laminar", KNOWN, _of_form("leak_muscle", "laminar"), True),
+    Form("leak_muscle", "growing_area", KNOWN, _of_form("leak_muscle", "crack")),
     Form("leak_muscle", "free_exponent", KNOWN, _own(more.CrackLeak)),
     Form("heat_transfer", "by_pressure", KNOWN, _plain("heat_transfer", jet=0.0), True,
          lambda e, p: {"heat_transfer_coefficient": e.coefficient, "share": e.share}),
-    Form("muscle_hysteresis", "spread_slip", KNOWN, _hysteresis("dahl_bank"), True),
+    Form("muscle_hysteresis", "spread_slip", KNOWN,
+         _of_form("muscle_hysteresis", "dahl_bank"), True),
     Form("muscle_creep", "one_branch", KNOWN, _creep(1), True,
          lambda e, p: {"stiffness": e.stiffness / p.count, "time_constant": e.time_constant[0]}),
     Form("muscle_creep", "two_branches", KNOWN, _creep(2)),
@@ -189,7 +180,7 @@ _OTHER: tuple[Form, ...] = (
     Form("tube_flow_restriction", "elastic_hose", OTHER, _own(more.ElasticHose)),
     Form("leak_muscle", "seal", OTHER, _own(more.SealLeak)),
     Form("heat_transfer", "jet", OTHER, _jet),
-    Form("muscle_hysteresis", "bouc_wen", OTHER, _hysteresis("bouc_wen")),
+    Form("muscle_hysteresis", "bouc_wen", OTHER, _of_form("muscle_hysteresis", "bouc_wen")),
     Form("muscle_hysteresis", "lugre", OTHER, _own(more.LuGre)),
     Form("muscle_hysteresis", "one_way", OTHER, _own(more.OneWay)),
     Form("muscle_creep", "power_law", OTHER, _plain("muscle_creep")),

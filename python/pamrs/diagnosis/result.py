@@ -184,8 +184,7 @@ class Diagnosis(Findings):
                 )
         for effect in self.effects:
             lines.append("")
-            form = f", form: {words.label(effect.form)}" if effect.form else ""
-            lines.append((effect.name or words.label(effect.id)) + form)
+            lines.append(words.effect_title(effect))
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)
@@ -219,8 +218,7 @@ class Diagnosis(Findings):
     def _summary_budget(self) -> list[str]:
         """What takes the mismatch of each block."""
         lines = []
-        for block in dict.fromkeys(term.block for term in self.budget):
-            own = [term for term in self.budget if term.block == block]
+        for block, own in words.budgets(self).items():
             told = f"Budget of {block}: {words.budget_sentence(own)}"
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []

@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from pamrs.findings import BudgetTerm, ConditionMap, Curves, Findings, Trace
 from pamrs.report.text import (
+    budgets,
     display_unit,
     format_number,
     format_probability,
@@ -393,17 +394,15 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
     """Waterfall of each block's budget: from the nominal model's excess down to what stays
     unexplained; None where no block exceeds the noise.
     """
-    blocks = list(dict.fromkeys(term.block for term in diagnosis.budget))
+    blocks = budgets(diagnosis)
     if not blocks:
         return None
-    terms = [[t for t in diagnosis.budget if t.block == block] for block in blocks]
-    rows = sum(len(own) + 1 for own in terms)
+    heights = [len(own) + 1 for own in blocks.values()]
+    rows = sum(heights)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 0.5 + 0.3 * rows + 0.45 * len(blocks)), layout="constrained")
-        panels = figure.subplots(
-            len(blocks), 1, squeeze=False, height_ratios=[len(own) + 1 for own in terms]
-        )[:, 0]
-        for axes, block, own in zip(panels, blocks, terms, strict=True):
+        panels = figure.subplots(len(blocks), 1, squeeze=False, height_ratios=heights)[:, 0]
+        for axes, (block, own) in zip(panels, blocks.items(), strict=True):
             _draw_budget(axes, block, own)
         panels[-1].set_xlabel("share of the nominal model's excess over the noise [%]")
         return svg_text(figure, prefix)

@@ -67,8 +67,7 @@ def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
         rows.append(
             {
                 "id": effect.id,
-                "name": (effect.name or words.label(effect.id))
-                + (f", form: {words.label(effect.form)}" if effect.form else ""),
+                "name": words.effect_title(effect),
                 "probability": words.format_probability(effect.probability),
                 "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
                 "parameters": parameters,
@@ -115,16 +114,6 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
             }
         )
     return rows
-
-
-def _budgets(diagnosis: Findings) -> list[str]:
-    """The budget of each block in a sentence."""
-    blocks = dict.fromkeys(term.block for term in diagnosis.budget)
-    return [
-        f"{words.label(block)}: "
-        + words.budget_sentence([term for term in diagnosis.budget if term.block == block])
-        for block in blocks
-    ]
 
 
 def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
@@ -385,7 +374,10 @@ def render(diagnosis: Findings) -> str:
         effects=_effects(diagnosis),
         verdicts=_blocks(diagnosis),
         budget=_markup(figures.budget_svg(diagnosis)),
-        budgets=_budgets(diagnosis),
+        budgets=[
+            f"{words.label(block)}: {words.budget_sentence(own)}"
+            for block, own in words.budgets(diagnosis).items()
+        ],
         wrong=_wrong(diagnosis),
         kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
         ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],

@@ -10,6 +10,7 @@ from pamrs.effects import EFFECTS
 from pamrs.findings import (
     BlockVerdict,
     BudgetTerm,
+    EffectFound,
     EffectParameterFound,
     Findings,
     Unexplained,
@@ -18,7 +19,9 @@ from pamrs.findings import (
 
 __all__ = [
     "budget_sentence",
+    "budgets",
     "display_unit",
+    "effect_title",
     "format_number",
     "format_probability",
     "format_uncertain",
@@ -365,6 +368,20 @@ def term_label(term: BudgetTerm) -> str:
     if term.kind in fixed:
         return fixed[term.kind]
     return set_label(term.id.split("+")) + (f" ({label(term.form)})" if term.form else "")
+
+
+def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:
+    """The terms of each block's budget, by its name."""
+    found: dict[str, list[BudgetTerm]] = {}
+    for term in diagnosis.budget:
+        found.setdefault(term.block, []).append(term)
+    return found
+
+
+def effect_title(effect: EffectFound) -> str:
+    """Name of an effect, with its form where it is not the usual one."""
+    form = f", form: {label(effect.form)}" if effect.form else ""
+    return (effect.name or label(effect.id)) + form
 
 
 def budget_sentence(terms: Sequence[BudgetTerm]) -> str:

@@ -16,8 +16,10 @@ from pamrs.diagnosis.fit import (
     acts_in,
     fit,
     fit_events,
+    form_in,
     look_for_events,
     residuals,
+    with_effects_of,
 )
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
@@ -206,9 +208,7 @@ class Attempts:
 
     def _transient(self, effect: str, beside: Candidate) -> Candidate | None:
         white = self.white
-        model = self.nominal
-        for entry in beside.fit.rig.effects:
-            model = model.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
+        model = with_effects_of(self.nominal, beside.fit.rig)
         found = fit_events(effect, self.inner, model, beside.fit, white)
         if found is None:
             return None
@@ -513,7 +513,7 @@ def start_of(found: Fit, effect: str, least: float) -> Start:
         for n, v in entry["parameters"].items()
         if f"{effect}.{n}" not in found.values
     }
-    return Start(effect, own, held, (), False, entry.get("form", ""))
+    return Start(effect, own, held, (), False, form_in(found.rig, effect))
 
 
 def _off_zero(name: str, value: float, share: float) -> float:

@@ -285,9 +285,9 @@ def _pliable(candidate: Candidate) -> bool:
     """Whether it takes up a good part of anything: values of the baseline, and what happens
     differently in every recording.
     """
-    happening = () if candidate.fit.events is None else (candidate.fit.events.effect,)
-    return bool(candidate.wrong) or any(
-        not EFFECTS[effect].leading.same_everywhere for effect in happening
+    events = candidate.fit.events
+    return bool(candidate.wrong) or (
+        events is not None and not EFFECTS[events.effect].leading.same_everywhere
     )
 
 

@@ -30,7 +30,17 @@ from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.fit import CHOSEN, Events, Key, Problem, events_of, fit, residuals
+from pamrs.diagnosis.fit import (
+    CHOSEN,
+    Events,
+    Key,
+    Problem,
+    events_of,
+    fit,
+    form_in,
+    residuals,
+    with_effects_of,
+)
 from pamrs.diagnosis.next_experiment import propose
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
@@ -397,9 +407,7 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     """
     rig = nominal
     for candidate in candidates:
-        for effect in candidate.fit.rig.effects:
-            form = effect.get("form", "")
-            rig = rig.with_effect(effect["id"], effect["parameters"], form=form)
+        rig = with_effects_of(rig, candidate.fit.rig)
     return rig.with_parameters(
         {name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()}
     )
@@ -567,11 +575,6 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
                     {"recording": recording, **own, **{n: values[n] for n in rises if n in values}}
                 )
     return found
-
-
-def form_in(rig: Rig, effect: str) -> str:
-    """Form of an effect in a rig; empty for the first, and where the rig does not have it."""
-    return next((e.get("form", "") for e in rig.effects if e["id"] == effect), "")
 
 
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:

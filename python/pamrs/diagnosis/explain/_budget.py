@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, is_parameter, significant
-from pamrs.diagnosis.fit import Key, Problem, residuals
+from pamrs.diagnosis.fit import Key, Problem, form_in, residuals
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -21,6 +22,7 @@ from pamrs.rig import Rig
 
 __all__ = ["budget"]
 
+Array = NDArray[np.float64]
 Stages = dict[str, dict[Key, Residual]]
 Stage = tuple[str, str, Excess]
 """Kind of a term, its id, and what the block keeps with it and with all terms before it."""
@@ -123,16 +125,18 @@ def _terms(
     settings: DiagnosisSettings,
 ) -> Iterator[BudgetTerm]:
     """The terms of one block, and what is left."""
+    counts = np.array([n for _, n in before.pieces], dtype=np.float64)
+    rng = np.random.default_rng(settings.seed)
+    draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
     was = before
     for kind, name, now in stages:
-        share, interval = _share(before, was, now, settings)
-        form = next((e.get("form", "") for e in final.effects if e["id"] == name), "")
+        share, interval = _share(before, was, now, counts, draws)
         chance = judged.probabilities.get(name, judged.probability(name)) if name else None
         yield BudgetTerm(
             block=block.name,
             kind=kind,
             id=name,
-            form=form,
+            form=form_in(final, name),
             share=share,
             interval=interval,
             probability=chance,
@@ -141,7 +145,7 @@ def _terms(
             unit=unit_of(block.channel),
         )
         was = now
-    share, interval = _share(before, was, None, settings)
+    share, interval = _share(before, was, None, counts, draws)
     yield BudgetTerm(
         block=block.name,
         kind="unexplained",
@@ -157,20 +161,18 @@ def _terms(
 
 
 def _share(
-    before: Excess, was: Excess, now: Excess | None, settings: DiagnosisSettings
+    before: Excess, was: Excess, now: Excess | None, counts: Array, draws: Array
 ) -> tuple[float, list[float]]:
     """Share of the nominal model's excess variance that a step takes (the rest, where there is no
-    next one), and its interval of 95 % by a Bayesian bootstrap over the pieces of the recordings.
+    next one), and its interval of 95 % by a Bayesian bootstrap over the pieces of the recordings:
+    ``counts`` are the bins in each, ``draws`` as many weighted anew.
     """
-    counts = np.array([n for _, n in before.pieces], dtype=np.float64)
     first, upper, lower = (
         np.array([r for r, _ in e.pieces]) if e is not None else np.ones(counts.size)
         for e in (before, was, now)
     )
-    rng = np.random.default_rng(settings.seed)
-    draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
     excess_of = np.maximum(draws @ (first - 1.0), 1e-12)
-    shares = np.sort(draws @ (upper - lower) / excess_of)
+    shares = draws @ (upper - lower) / excess_of
     whole = max(float(counts @ (first - 1.0)), 1e-12)
     low, high = np.quantile(shares, [0.025, 0.975])
     return float(counts @ (upper - lower)) / whole, [float(low), float(high)]

@@ -3,8 +3,9 @@ from several starts.
 
 Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
 `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where
-the fit of an effect begins); `Events`, `events_of`, `fit_events`, `look_for_events` (transient
-effects); `ACTS`, `acts_in`, `depends`, `fits` (where effects act).
+the fit of an effect begins); `form_in`, `with_effects_of` (effects of a rig and their forms);
+`Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
+`depends`, `fits` (where effects act).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from pamrs.diagnosis.fit._fitting import (
     with_priors,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
-from pamrs.diagnosis.fit._starts import CHOSEN, Start, starts_of
+from pamrs.diagnosis.fit._starts import CHOSEN, Start, form_in, starts_of, with_effects_of
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
@@ -45,11 +46,13 @@ __all__ = [
     "fit",
     "fit_events",
     "fits",
+    "form_in",
     "free_baseline",
     "levenberg_marquardt",
     "look_for_events",
     "residuals",
     "stacked",
     "starts_of",
+    "with_effects_of",
     "with_priors",
 ]

@@ -199,22 +199,21 @@ def _everywhere(
 
     The longest come first, so that no processor is left alone with one of them at the end.
     """
-    keys = [(b.name, p.recording.name) for p in problem.recordings for b in problem.blocks]
-    tasks = [(block, prepared) for prepared in problem.recordings for block in problem.blocks]
+    tasks = {(b.name, p.recording.name): (b, p) for p in problem.recordings for b in problem.blocks}
 
-    def steps(task: tuple[Block, Prepared]) -> float:
-        block, prepared = task
+    def steps(key: Key) -> float:
+        block, prepared = tasks[key]
         return prepared.n * prepared.dt / default_step(prepared.dt, longest=block.step)
 
-    def run(task: tuple[Block, Prepared]) -> Residual:
+    def run(key: Key) -> Residual:
         if problem.stopped.is_set():
             raise Stopped
-        return one(*task)
+        return one(*tasks[key])
 
-    order = sorted(range(len(tasks)), key=lambda k: -steps(tasks[k]))
+    longest_first = sorted(tasks, key=steps, reverse=True)
     with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
-        found = dict(zip(order, pool.map(run, [tasks[k] for k in order]), strict=True))
-    return {key: found[k] for k, key in enumerate(keys)}
+        found = dict(zip(longest_first, pool.map(run, longest_first), strict=True))
+    return {key: found[key] for key in tasks}
 
 
 @contextmanager

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pamrs.effects import EFFECTS, Form
 from pamrs.rig import Rig
 
-__all__ = ["CHOSEN", "Start", "starts_of"]
+__all__ = ["CHOSEN", "Start", "form_in", "starts_of", "with_effects_of"]
 
 CHOSEN = ("choice", "side")
 """Roles of parameters that are tried at both ends of their range and not fitted."""
@@ -71,6 +71,18 @@ class Start:
             for name, value in self.free.items()
         }
         return replace(self, free=free)
+
+
+def form_in(rig: Rig, effect: str) -> str:
+    """Form of an effect in a rig; empty for the first, and where the rig does not have it."""
+    return next((e.get("form", "") for e in rig.effects if e["id"] == effect), "")
+
+
+def with_effects_of(rig: Rig, other: Rig) -> Rig:
+    """A rig with the effects of another one as well, in their forms."""
+    for entry in other.effects:
+        rig = rig.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
+    return rig
 
 
 def starts_of(effect: str, *, sealed: bool) -> list[Start]:

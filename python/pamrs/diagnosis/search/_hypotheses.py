@@ -312,9 +312,7 @@ def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say)
         tried = []
         for score in likely[: settings.most_partners]:
             tell(f"trying {' + '.join([*best.effects, score.effect])}")
-            begun = [trial.start_of(best.fit, effect) for effect in best.effects]
-            more = [*begun, score.start.scaled(score.size)]
-            candidate = trial.fitted(more, best.fit, trial.white)
+            candidate = _with_partner(trial, best, score)
             tried += [] if candidate is None else [candidate]
         further = min(tried, key=_left_everywhere, default=None)
         if further is None or not _predicts_better(further, best, trial):
@@ -322,6 +320,12 @@ def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say)
         found.append(further)
         best = further
     return found
+
+
+def _with_partner(trial: Attempts, candidate: Candidate, score: Score) -> Candidate | None:
+    """The effects of a candidate fitted together with a further one, from where both stand."""
+    begun = [trial.start_of(candidate.fit, effect) for effect in candidate.effects]
+    return trial.fitted([*begun, score.start.scaled(score.size)], candidate.fit, trial.white)
 
 
 def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
@@ -722,11 +726,7 @@ def _pairs(
                 continue
             tried.add(both)
             tell(f"trying {' + '.join(sorted(both))}")
-            candidate = trial.fitted(
-                [trial.start_of(single.fit, single.effects[0]), score.start.scaled(score.size)],
-                single.fit,
-                white,
-            )
+            candidate = _with_partner(trial, single, score)
             if candidate is not None:
                 found.append(candidate)
     return found

@@ -119,8 +119,8 @@ def freed(
         : settings.most_pairs
     ]
     found = []
-    for names, short in _tried(trial, [n for n in ranked if len(n) == 1 or n in pairs], say):
-        candidate = trial.freed(names, baseline) if short is None else short
+    sets = [names for names in ranked if len(names) == 1 or names in pairs]
+    for names, candidate in _tried(trial, sets, baseline, say).items():
         if candidate is not None and all(
             abs(candidate.fit.moved[name]) > walls for name in names
         ):  # else it is not wrong
@@ -129,18 +129,18 @@ def freed(
 
 
 def _tried(
-    trial: Attempts, sets: list[tuple[str, ...]], say: Callable[[str], None]
-) -> list[tuple[tuple[str, ...], Candidate | None]]:
-    """The sets that are tried: those that leave least after a few steps are to be fitted to their
+    trial: Attempts, sets: list[tuple[str, ...]], baseline: Fit, say: Callable[[str], None]
+) -> dict[tuple[str, ...], Candidate | None]:
+    """Each set of parameters freed: those that leave least after a few steps are fitted to their
     end, the others come as they are.
     """
     most = trial.settings.wrong_parameters.most_finished
     if len(sets) <= most:
-        return [(names, None) for names in sets]
+        return {names: trial.freed(names, baseline) for names in sets}
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
     short = {names: c for names in sets if (c := trial.freed_shortly(names)) is not None}
     best = sorted(short, key=lambda names: short[names].misfit)[:most]
-    return [(names, None if names in best else short[names]) for names in short]
+    return {n: trial.freed(n, baseline) if n in best else c for n, c in short.items()}
 
 
 def _predicted_gain(
