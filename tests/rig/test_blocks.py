@@ -117,7 +117,7 @@ def test_packaged_joints_stay_within_what_their_muscles_can_do() -> None:
 def test_a_chain_keeps_its_shape_and_its_names() -> None:
     rig = rigs.shoulder()
     model = rig.model
-    assert list(model) == ["name", *BLOCKS, "ports", "effects"]
+    assert list(model) == ["name", *BLOCKS, "ports", "effects", "model_error"]
     assert model["valve"] == {
         "discharge_area_max": 8.4e-6,
         "null_voltage": 5.0,

@@ -15,7 +15,7 @@ from ..recording import CHANNELS, Noise
 from ..rigfile import draw_parameters
 from .bench import Bench, put
 from .design import Spec
-from .errors import ModelError, model_errors
+from .errors import ModelError, model_errors, stated_lines
 from .families import BY_LABEL, UNLISTED, Form
 from .labs import Hole, holes, noise_of, table
 from .rigs import RIGS, nominal
@@ -167,7 +167,8 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
         "lost": lost,
     }
     files = {
-        "rig.toml": kind.path.read_text(encoding="utf-8"),
+        "rig.toml": kind.path.read_text(encoding="utf-8")
+        + (stated_lines(kind, errors, spec.percent) if spec.stated else ""),
         **files,
         "case.toml": case_toml(spec.recordings),
     }

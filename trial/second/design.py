@@ -63,7 +63,7 @@ class Spec:
     """What a case of the second plan is made from; `forms` are labels of :mod:`.families`,
     `strength` the noises that each of them leaves alone; of the parameters in `wrong`, with by how
     many tolerances they are off, the first is taken that leaves enough to be seen. `stated`: the
-    rig file may state the model error, once its reader knows that key.
+    rig file states the model error.
     """
 
     name: str

@@ -202,3 +202,22 @@ def model_errors(
         missing |= {ValveError, TankError}
     made = [kind(Curve.draw(rng, rms, scale), rms) for kind, rms, scale in table]
     return [e for e in made if type(e) not in missing and e.rms > 0.0]
+
+
+def stated_lines(rig: RigKind, errors: list[ModelError], percent: float) -> str:
+    """The model error as a rig file states it; empty where there is none."""
+    lifts = rig.name == "hanging_mass"
+    lines = []
+    for error in errors:
+        name = error.id.split(".")[1]
+        if isinstance(error, Cogging):
+            lines.append(f'{"load" if lifts else "arm"} = "{0.5 * percent:g} %"')
+        elif isinstance(error, EncoderError):
+            size = f"{1e3 * error.rms:g} mm" if lifts else f"{math.degrees(error.rms):g} deg"
+            lines.append(f'{"length" if lifts else "joint_angle"} = "{size}"')
+        elif error.unit == "1":
+            block = "joint" if isinstance(error, ArmError) else name
+            lines.append(f'{block} = "{100.0 * error.rms:g} %"')
+        else:
+            lines.append(f'{name} = "{error.rms:g} {error.unit}"')
+    return "\n\n[model_error]\n" + "\n".join(lines) + "\n" if lines else ""

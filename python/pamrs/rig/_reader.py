@@ -12,6 +12,7 @@ from typing import Any
 
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
+from pamrs.rig._model_error import read_model_error
 from pamrs.rig._ports import bare, connect, near_name
 from pamrs.rig.muscle_models import own_geometry
 from pamrs.rig.schema import (
@@ -31,7 +32,7 @@ from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
 
-_TOP = ("schema", "name", "description", "effects")
+_TOP = ("schema", "name", "description", "effects", "model_error")
 _QUANTITY = ("value", "unit", "tol", "unknown")
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -125,6 +126,7 @@ class Reader:
         self.sensors(model, document.get("sensors"))
         model["ports"] = self.ports
         model["effects"] = self.effects(document.get("effects", []))
+        model["model_error"] = read_model_error(self, document.get("model_error"), model)
         if self.whole:
             self.problems += connect(model)[1]
         self.problems += block_problems(model)

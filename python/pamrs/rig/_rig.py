@@ -179,6 +179,14 @@ class Rig:
         return effects
 
     @property
+    def model_error(self) -> dict[str, dict[str, float]]:
+        """How well the model is known, from ``[model_error]``: name of a kind of block or of a
+        channel -> ``{"share": number}`` or ``{"size": SI value}``, one standard deviation each.
+        """
+        stated: dict[str, dict[str, float]] = copy.deepcopy(self._model.get("model_error") or {})
+        return stated
+
+    @property
     def effect_std(self) -> dict[str, dict[str, float]]:
         """Standard deviations of the effects' parameters, where the file gives them: id -> name ->
         SI.

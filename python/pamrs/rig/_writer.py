@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
+from pamrs.rig._model_error import error_lines
 from pamrs.rig._ports import Ports
 from pamrs.rig._reader import Content
 from pamrs.rig.schema import BLOCKS, PORTS, SCHEMA, Key, keys_of, kind_of, qualified, tables_of
@@ -37,6 +38,7 @@ def toml_text(content: Content) -> str:
     for block in BLOCKS:
         for name, table in tables_of(content.model, block).items():
             lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
+    lines += error_lines(content.model)
     for effect in content.model["effects"]:
         place = effect.get("at", "")
         lines += [

@@ -6,15 +6,16 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t
+from scipy.stats import chi2, t
 
 from pamrs import _core
+from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Key, Problem, bin_width
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import NoiseSettings
@@ -23,6 +24,7 @@ from pamrs.errors import SimulationError
 __all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
 
 Array = NDArray[np.float64]
+Stated = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -34,15 +36,18 @@ class NoiseLevel:
     sample : float
         Standard deviation of single samples: the output's own noise and that of the drives.
     binned : float
-        Standard deviation of bin means.
+        Standard deviation of bin means, with the error that the rig file says the model has.
     scatter : float
         Standard deviation, from one realisation of the noise to another, of the logarithm of the
         mean square of the bin means.
+    stated : float
+        Share of the variance of bin means that is the stated error of the model.
     """
 
     sample: float
     binned: float
     scatter: float = 0.0
+    stated: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -85,8 +90,10 @@ def bins_of(prepared: Prepared) -> int:
     return max(settings.least_bin_samples, bin_width(prepared, settings.bin_time))
 
 
-def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
-    """Floors of all blocks and recordings, the drives' noise carried through the model by
+def noise_levels(
+    problem: Problem, core: _core.Rig, stated: Stated | None = None
+) -> dict[Key, NoiseLevel]:
+    """Noise levels of all blocks and recordings, the drives' noise carried through the model by
     simulation.
 
     Parameters
@@ -95,6 +102,9 @@ def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
         Blocks and recordings.
     core : _core.Rig
         A model close to the data.
+    stated : dict, optional
+        The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`): excess inside
+        it is none.
     """
     found = {}
     settings = problem.settings
@@ -130,12 +140,98 @@ def noise_levels(problem: Problem, core: _core.Rig) -> dict[Key, NoiseLevel]:
             scatter = (
                 float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
             )
+            noise = base.noise**2 * white + drives
+            error = _stated_variance(block, base, prepared, stated or {})
+            error += _carried_variance(block, core, base, prepared, stated or {}, rng)
             found[block.name, prepared.recording.name] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
-                math.sqrt(base.noise**2 * white + drives),
+                math.sqrt(noise + error),
                 scatter,
+                error / (noise + error),
             )
     return found
+
+
+_FLOWS = {"supply": ("supply", "valve", "line"), "chamber": ("valve", "line", "chamber")}
+"""Blocks of a rig file whose share of error is one of the flow into a block."""
+_PULLS = ("muscle", "transmission", "joint", "arm", "link", "load")
+"""Blocks whose share of error is one of what moves: as if the pressure were off by it."""
+
+
+def _stated_variance(block: Block, base: Residual, prepared: Prepared, stated: Stated) -> float:
+    """Variance of a block's bin means by the error that the rig file states: sizes as they are,
+    shares of what the block's output does after the start of each window.
+    """
+    channel, own = block.channel, block.channel.partition(".")[2]
+    kinds = {channel_of(channel), *_FLOWS.get(block.kind, ())}
+    acting = [
+        error
+        for name, error in stated.items()
+        if channel_of(name) in kinds and name.partition(".")[2] in ("", own)
+    ]
+    if not acting:
+        return 0.0
+    starts = prepared.starts(block.window, block.drives)
+    moved = np.zeros(prepared.n)
+    for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
+        moved[a:b] = base.prediction[a:b] - base.prediction[a]
+    signal = float(np.mean(moved[base.rows] ** 2)) if base.rows.any() else 0.0
+    return sum(e["share"] ** 2 * signal if "share" in e else e["size"] ** 2 for e in acting)
+
+
+def _drive_errors(block: Block, prepared: Prepared, stated: Stated) -> dict[str, float]:
+    """Stated error of what drives a block [SI]: of the measured signal itself, and of the force
+    that a pressure stands for.
+    """
+    pulls = [e["share"] for name, e in stated.items() if channel_of(name) in _PULLS]
+    found = {}
+    for name in block.drives:
+        if name not in prepared.signals:
+            continue
+        largest = float(np.abs(prepared.signals[name][0]).max())
+        error = stated.get(name, stated.get(channel_of(name), {}))
+        sizes = [error.get("size", 0.0), error.get("share", 0.0) * largest]
+        if block.kind == "arm" and channel_of(name) == "muscle_pressure":
+            sizes += [share * largest for share in pulls]
+        if any(sizes):
+            found[name] = math.hypot(*sizes)
+    return found
+
+
+def _carried_variance(
+    block: Block,
+    core: _core.Rig,
+    base: Residual,
+    prepared: Prepared,
+    stated: Stated,
+    rng: np.random.Generator,
+) -> float:
+    """Variance of a block's bin means by the stated error of what drives it: curves over the
+    measured value, carried through the model by simulation.
+    """
+    drives = _drive_errors(block, prepared, stated)
+    powers = []
+    for _ in range(prepared.settings.noise.replicates if drives else 0):
+        signals = {}
+        for name, size in drives.items():
+            value, slope = prepared.signals[name]
+            more, steeper = _curve(value, size, rng)
+            signals[name] = (value + more, slope * (1.0 + steeper))
+        with contextlib.suppress(SimulationError):  # it leaves the model's range
+            moved = change(block, core, prepared.shaken(signals), base) - base.value
+            means, counts = binned(moved, base.rows, bins_of(prepared))
+            powers.append(float(np.mean(means[counts > 0] ** 2)) if counts.any() else 0.0)
+    return float(np.mean(powers)) if powers else 0.0
+
+
+def _curve(value: Array, size: float, rng: np.random.Generator) -> tuple[Array, Array]:
+    """An error of a stated size that is a smooth curve over the value, and its derivative."""
+    low, range_of = float(value.min()), max(float(np.ptp(value)), 1e-12)
+    waves = np.pi * np.arange(3)  # a shift, a slope, a bend
+    phases = rng.uniform(0.0, 2.0 * np.pi, 3)
+    sizes = rng.normal(0.0, size * math.sqrt(2.0 / 3.0), 3)
+    angles = waves * ((value - low) / range_of)[:, None] + phases
+    return np.cos(angles) @ sizes, -np.sin(angles) @ (sizes * waves) / range_of
 
 
 def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
@@ -186,17 +282,24 @@ def excess(
     )
     shares = np.array(weights) / sum(weights)
     # noise levels are means of as many realisations, and their scatter is known from no more
-    pooled = math.sqrt(float(np.sum((shares * [noise_level[key].scatter for key in keys]) ** 2)))
+    random = [(1.0 - noise_level[key].stated) * noise_level[key].scatter for key in keys]
+    pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.replicates))
     chance = t(len(keys) * (settings.replicates - 1))
     beyond = min(settings.most_log_limit, float(chance.isf(settings.chance)) * scatter)
+    # the model has one error, the same in all recordings, and its square is that of a few numbers
+    stated = float(np.sum(shares * [noise_level[key].stated for key in keys]))
+    few = settings.stated_freedom
+    larger = 1.0 + stated * (float(chi2.isf(settings.chance, few)) / few - 1.0)
+    scatter = math.hypot(scatter, stated * math.sqrt(2.0 / few))
+    margin = settings.margin * larger
     return Excess(
         ratio,
         math.sqrt(max(0.0, (ratio - 1.0) * share)),
-        float(chance.sf(math.log(max(ratio, 1e-300) / settings.margin) / scatter)),
+        float(chance.sf(math.log(max(ratio, 1e-300) / margin) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         math.sqrt(float(np.average(noises, weights=weights))),
-        min(settings.most_limit, settings.margin * math.exp(beyond)),
+        min(settings.most_limit * larger, margin * math.exp(beyond)),
         scatter,
         tuple(pieces),
     )

@@ -205,20 +205,14 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
     for chamber, supplies in fed_by(rig).items():
         name = dotted("muscle_pressure", chamber)
         for supply in supplies:
-            full = dotted("supply_pressure", supply)
             if name not in recording.channels:
                 continue
-            if full in recording.channels:
-                rows = recording.valid(name, full)
-                source, limit = full, recording.channels[full][rows]
-            else:
-                rows = recording.mask[name]
-                source, limit = (
-                    f"{full} of the rig file",
-                    np.full(
-                        int(rows.sum()), float(rig.tables("supply")[supply]["initial_pressure"])
-                    ),
-                )
+            highest = _highest(recording, rig, supply)
+            if highest is None:
+                continue
+            source, rows, limit = highest
+            rows = rows & recording.mask[name]
+            limit = limit[rows]
             if rows.sum() < 16:
                 continue
             allowed = limit + settings.order_margin * np.abs(limit) + settings.order_offset
@@ -232,6 +226,28 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
                     f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns "
                     "swapped, or one of their units wrong?"
                 )
+
+
+def _highest(
+    recording: Recording, rig: Rig, supply: str
+) -> tuple[str, NDArray[np.bool_], Array] | None:
+    """What a supply's pressure is told by, where that is known, and the highest that it can be.
+
+    That is its gauge; of a regulator without one the largest set pressure, since what it feeds
+    follows a falling one late; else the pressure of the rig file. None where nothing tells it.
+    """
+    full, table = dotted("supply_pressure", supply), rig.tables("supply")[supply]
+    if full in recording.channels:
+        return full, recording.mask[full], recording.channels[full]
+    everywhere = np.ones(len(recording), dtype=np.bool_)
+    if table["kind"] != "regulator":
+        rated = np.full(everywhere.size, float(table["initial_pressure"]))
+        return f"{full} of the rig file", everywhere, rated
+    command = dotted("supply_command", supply)
+    known = _values(recording, command)
+    if known.size == 0:
+        return None
+    return f"the largest {command}", everywhere, np.full(everywhere.size, float(known.max()))
 
 
 @dataclass(frozen=True)

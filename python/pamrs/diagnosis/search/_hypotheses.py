@@ -131,9 +131,10 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
     first = refitted(inner, nominal, without_autocorrelation(blocks))
-    noise_level = noise_levels(inner, core_rig(first.rig, inner.core))
+    stated = nominal.model_error
+    noise_level = noise_levels(inner, core_rig(first.rig, inner.core), stated)
     if not same:
-        noise_level |= noise_levels(outer, core_rig(first.rig, outer.core))
+        noise_level |= noise_levels(outer, core_rig(first.rig, outer.core), stated)
     baseline, autocorrelation = with_autocorrelation(inner, nominal, first)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:

@@ -432,6 +432,14 @@ class NoiseSettings(SettingsGroup):
         ),
         origin="docs/decisions/0022",
     )
+    stated_freedom: float = setting(
+        4.0,
+        unit="1",
+        above=0.0,
+        reason="independent numbers that a stated error of the model consists of: its square "
+        "scatters as that of as many",
+        origin="judgement: bumps of a force curve or of an encoder over a stroke",
+    )
     most_log_limit: float = setting(
         1.0,
         unit="1",
