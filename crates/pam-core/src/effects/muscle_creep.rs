@@ -42,7 +42,7 @@ const SOLID: Form = Form {
 const RELAXATION: Form = Form {
     name: "force_relaxation",
     parameters: &[
-        EffectParameter::new("share", "1", -0.9, 0.9, 0.05).starts(&[0.03, 0.1]).off(0.0),
+        EffectParameter::new("share", "1", 0.0, 0.9, 0.05).starts(&[0.03, 0.1]).off(0.0),
         TIME_CONSTANT,
     ],
     make: made_by!(of_force),

@@ -406,6 +406,31 @@ class Attempts:
                 break
         return best
 
+    def beside_wrong(
+        self, starts: list[Start], warm: Fit, names: tuple[str, ...]
+    ) -> Candidate | None:
+        """Effects beside other values of some parameters, which are freed from their tolerance;
+        None where that cannot be run.
+        """
+        effects = tuple(start.effect for start in starts)
+        free, held, forms = parts_of(starts)
+        try:
+            found = fit(
+                self.inner,
+                self.nominal,
+                effects,
+                free,
+                self.autocorrelation(warm),
+                fixed=held,
+                warm=warm,
+                freed=names,
+                evaluations=self.settings.fit.effect_evaluations,
+                forms=forms,
+            )
+            return replace(self.judged(effects, found), wrong=names)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
     def united(self, candidates: list[Candidate]) -> Fit | None:
         """One fit with everything that some hypotheses name, each for a block of its own; None
         where it cannot be run.
@@ -461,11 +486,13 @@ class Attempts:
                 autocorrelation,
                 fixed=held,
                 warm=found,
+                freed=candidate.wrong,
                 evaluations=self.settings.fit.polish_evaluations,
                 share=self.settings.fit.final_step_share,
                 forms=forms,
             )
-            return replace(self.judged(candidate.effects, best), gain=candidate.gain)
+            judged = self.judged(candidate.effects, best)
+            return replace(judged, gain=candidate.gain, wrong=candidate.wrong)
         except SimulationError:
             return candidate
 

@@ -63,7 +63,7 @@ class Judged:
     @property
     def wrong(self) -> tuple[str, ...]:
         """Parameters that are named as wrong."""
-        return self.chosen.wrong if self.verdict == "parameters" else ()
+        return self.chosen.wrong if self.verdict in ("effects", "parameters") else ()
 
     def probability(self, name: str) -> float:
         """Probability of an effect or of a wrong parameter, whatever else acts in these blocks."""

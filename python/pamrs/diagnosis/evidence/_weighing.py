@@ -160,6 +160,7 @@ def weigh(
         scores = {
             c: _score(c, start, suspects, granted, settings)
             - evidence.standing_price * stands(c, seconds)
+            - evidence.unseen_price * _unseen(c, seconds, evidence)
             - unlikely(c, ranging or {}, evidence)
             for c in named
         }
@@ -286,7 +287,7 @@ def _pliable(candidate: Candidate) -> bool:
     differently in every recording.
     """
     events = candidate.fit.events
-    return bool(candidate.wrong) or (
+    return bool(candidate.wrong and not candidate.effects) or (
         events is not None and not EFFECTS[events.effect].leading.same_everywhere
     )
 
@@ -300,12 +301,20 @@ def penalty(candidate: Candidate, seconds: float, settings: EvidenceSettings) ->
     """What a set's values take from the logarithm of its odds: a size that scatters between
     recordings, a time that was not seen.
     """
-    times = (
-        value for name, value in _effect_values(candidate) if find_parameter(name).time_constant
-    )
-    unseen = any(value > settings.unseen_lengths * seconds for value in times)
     scatter = max(0.0, candidate.scatter - settings.scatter) / settings.scatter_width
-    return scatter + (settings.unseen_price if unseen else 0.0)
+    return scatter + settings.unseen_price * _unseen(candidate, seconds, settings)
+
+
+def _unseen(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> bool:
+    """Whether a time constant of a set was not seen: it is much longer than the recordings, or
+    below its own standard deviation. What relaxes at once is another stiffness.
+    """
+    std = candidate.fit.std
+    return any(
+        value > settings.unseen_lengths * seconds or value < std.get(name, 0.0)
+        for name, value in _effect_values(candidate)
+        if find_parameter(name).time_constant
+    )
 
 
 def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:

@@ -31,7 +31,7 @@ from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
+from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed, strained_parameters
 from pamrs.diagnosis.settings import SearchSettings
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
@@ -280,13 +280,38 @@ def _hypotheses(
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)
     if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
-        return [start, *singles, *mistaken]
+        return [
+            start,
+            *singles,
+            *_beside_wrong(trial, singles, tell),
+            *mistaken,
+        ]
     pairs = _pairs(trial, screened, start, singles, tell)
     for effect, beside in _beside(trial, screened, start, singles, transient):
         tell(f"looking for {effect} beside {beside.effects[0]}")
         found = trial.transient(effect, beside)
         pairs += [] if found is None else [found]
-    return [start, *singles, *pairs, *_grown(trial, screened, pairs, tell), *mistaken]
+    sets = [*singles, *pairs, *_grown(trial, screened, pairs, tell)]
+    return [start, *sets, *_beside_wrong(trial, sets, tell), *mistaken]
+
+
+def _beside_wrong(trial: Attempts, sets: list[Candidate], tell: Say) -> list[Candidate]:
+    """The single effect and the set that leave least, each beside a file that is wrong: parameters
+    that they move far, freed one at a time.
+    """
+    lasting = [c for c in sets if c.fit.events is None]
+    singles = [c for c in lasting if len(c.effects) == 1]
+    best = [min(part, key=_left_everywhere) for part in (singles, lasting) if part]
+    walls = trial.settings.fit.most_tolerances
+    found = []
+    for candidate in dict.fromkeys(best):
+        starts = [trial.start_of(candidate.fit, e) for e in candidate.effects]
+        for name in strained_parameters(trial, candidate.fit):
+            tell(f"trying {' + '.join(candidate.effects)} beside another {name}")
+            beside = trial.beside_wrong(starts, candidate.fit, (name,))
+            if beside is not None and abs(beside.fit.moved[name]) > walls:
+                found.append(beside)
+    return found
 
 
 def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:

@@ -22,7 +22,7 @@ from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import WrongParameterSettings
 from pamrs.rig import Rig
 
-__all__ = ["beside_quiet", "freed", "suspected"]
+__all__ = ["beside_quiet", "freed", "strained_parameters", "suspected"]
 
 Array = NDArray[np.float64]
 
@@ -126,6 +126,26 @@ def freed(
         ):  # else it is not wrong
             found.append(replace(candidate, gain=gains[names]))
     return found
+
+
+def strained_parameters(trial: Attempts, found: Fit) -> list[str]:
+    """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
+    model; the most promising first.
+
+    Parameters
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels.
+    found : Fit
+        A fit with effects.
+    """
+    settings = trial.settings.wrong_parameters
+    far: list[tuple[str, ...]] = [
+        (name,) for name, moved in found.moved.items() if abs(moved) >= settings.far_tolerances
+    ]
+    gains = _predicted_gain(trial.inner, trial.nominal, found, far, trial.autocorrelation(found))
+    likely = [names for names in far if gains.get(names, 0.0) > settings.least_predicted_gain]
+    return [n for (n,) in sorted(likely, key=lambda names: -gains[names])][: settings.most_beside]
 
 
 def _tried(

@@ -192,7 +192,8 @@ class EvidenceSettings(SettingsGroup):
         6.5,
         unit="log odds",
         least=0.0,
-        reason="price of an effect with such a time constant",
+        reason="price of an effect with such a time constant, or with one below its own standard "
+        "deviation",
         origin="judgement",
     )
     scatter: float = setting(

@@ -333,6 +333,21 @@ class WrongParameterSettings(SettingsGroup):
         reason="freed parameters, and pairs of them, that are fitted to their end",
         origin="judgement; docs/decisions/0031",
     )
+    far_tolerances: float = setting(
+        2.0,
+        unit="tolerances",
+        above=0.0,
+        reason="movement from which a parameter beside effects is a suspect: the effects take a "
+        "part of what it would have to do",
+        origin="judgement",
+    )
+    most_beside: int = setting(
+        2,
+        unit="count",
+        least=0,
+        reason="parameters at their wall that are freed beside the effects that leave least",
+        origin="judgement",
+    )
     most_pairs: int = setting(
         2,
         unit="count",
