@@ -152,6 +152,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
 
     class Loaded:
         name = "a case"
+        path = tmp_path
 
     monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())

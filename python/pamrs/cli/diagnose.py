@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pamrs.cli._shared import check_writable, exact, progress, rig_named, write
+
+if TYPE_CHECKING:
+    from pamrs.diagnosis import Diagnosis
+    from pamrs.recordings import Case
 
 __all__ = ["diagnose_command"]
 
 
 def diagnose_command(
     case: Annotated[
-        Path | None, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")
+        Path | None,
+        typer.Argument(
+            help=(
+                "Folder with case.toml, rig.toml and the recordings; or a model that --model "
+                "wrote, to go on from it."
+            )
+        ),
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "A rig file in the place of the case's own: effects that it has are held, and what "
+                "is missing beside them is looked for."
+            )
+        ),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     json: Annotated[
@@ -49,8 +68,8 @@ def diagnose_command(
     """
     check_writable(report, json, png, model)
     if plan is not None:
-        if case is not None:
-            raise typer.BadParameter("give a case or --plan, not both")
+        if case is not None or rig is not None:
+            raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
         if report is not None or png is not None or model is not None:
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, json)
@@ -64,6 +83,10 @@ def diagnose_command(
     from pamrs.recordings import load_case
 
     loaded = load_case(case)
+    if rig is not None:
+        from pamrs.rig import load_rig
+
+        loaded = loaded.with_rig(load_rig(rig))
     from pamrs.diagnosis import diagnose
 
     with progress(f"diagnosing {loaded.name}"):
@@ -73,7 +96,7 @@ def diagnose_command(
     if model is not None:
         from pamrs._writing import write_atomically
 
-        write_atomically(model, result.model)
+        write_atomically(model, _model_text(result, loaded, model))
     if report is not None:
         result.report(report)
     if png is not None:
@@ -82,6 +105,22 @@ def diagnose_command(
     for path in (report, json, png, model):
         if path is not None:
             typer.echo(f"written: {path}", err=True)
+
+
+def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
+    """The model as TOML, with a note of the case that it is from, as seen from the file."""
+    import os
+
+    from pamrs.rig import Rig
+
+    if not isinstance(result.rig, Rig):
+        return result.model
+    home = case.path.resolve()
+    try:
+        folder = os.path.relpath(home, file.resolve().parent)
+    except ValueError:  # on another drive
+        folder = str(home)
+    return result.rig.with_case(Path(folder).as_posix()).to_toml_text()
 
 
 def _plan(

@@ -31,7 +31,7 @@ from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
 
-_TOP = ("schema", "name", "description", "effects")
+_TOP = ("schema", "name", "description", "case", "effects")
 _QUANTITY = ("value", "unit", "tol", "unknown")
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -118,8 +118,12 @@ class Reader:
         if not isinstance(name, str) or not name.strip():
             self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
             name = "rig"
+        case = document.get("case", "")
+        if not isinstance(case, str):
+            self.problem(f"case = {_shown(case)} is not allowed: the path of a case is needed")
+            case = ""
         self.whole = set(document) <= {*_TOP, *BLOCKS}
-        model: dict[str, Any] = {"name": name}
+        model: dict[str, Any] = {"name": name, **({"case": case} if case else {})}
         for block in BLOCKS:
             model[block] = self.blocks(block, document.get(block))
         self.sensors(model, document.get("sensors"))

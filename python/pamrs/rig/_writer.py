@@ -34,6 +34,7 @@ def toml_text(content: Content) -> str:
         A rig file; reading it gives the same numbers, names and ports.
     """
     lines = [f"schema = {_text(SCHEMA)}", f"name = {_text(content.name)}"]
+    lines += [f"case = {_text(content.model['case'])}"] if content.model.get("case") else []
     for block in BLOCKS:
         for name, table in tables_of(content.model, block).items():
             lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
