@@ -132,6 +132,7 @@ class FakeDiagnosis:
     """Stands in for a diagnosis, which takes many seconds; the real one has its own tests."""
 
     model = 'name = "x"\n'
+    rig = None
 
     def summary(self):
         return "verdict: none"

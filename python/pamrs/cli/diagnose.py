@@ -43,6 +43,12 @@ def diagnose_command(
     model: Annotated[
         Path | None, typer.Option(help="Write the rig with the named effect in it.")
     ] = None,
+    experiment: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the commands of the proposed next experiment (CSV: time and commands)."
+        ),
+    ] = None,
     plan: Annotated[
         Path | None,
         typer.Option(
@@ -66,11 +72,11 @@ def diagnose_command(
     """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
     could be found at all.
     """
-    check_writable(report, json, png, model)
+    check_writable(report, json, png, model, experiment)
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
-        if report is not None or png is not None or model is not None:
+        if any(path is not None for path in (report, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return
@@ -97,14 +103,30 @@ def diagnose_command(
         from pamrs._writing import write_atomically
 
         write_atomically(model, _model_text(result, loaded, model))
+    if experiment is not None:
+        experiment = _written_experiment(result, experiment)
     if report is not None:
         result.report(report)
     if png is not None:
         result.figure(png)
     typer.echo(result.summary())
-    for path in (report, json, png, model):
+    for path in (report, json, png, model, experiment):
         if path is not None:
             typer.echo(f"written: {path}", err=True)
+
+
+def _written_experiment(result: Diagnosis, file: Path) -> Path | None:
+    """The commands of the next experiment as a file; None, and why, where there are none."""
+    protocol = result.next_experiment.protocol
+    if protocol is None:
+        typer.echo(
+            f"not written: {file}: the next experiment has no commands to play "
+            "(it is none, or done by hand)",
+            err=True,
+        )
+        return None
+    protocol.to_csv(file)
+    return file
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:

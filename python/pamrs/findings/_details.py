@@ -4,6 +4,7 @@ tried.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,6 +12,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from pamrs._writing import write_atomically
+from pamrs.channels import unit_of
 from pamrs.findings._entry import Entry, told
 
 __all__ = [
@@ -18,6 +21,8 @@ __all__ = [
     "ConditionMap",
     "Curves",
     "NextExperiment",
+    "PairExperiment",
+    "Protocol",
     "RankedExperiment",
     "Tested",
     "Tried",
@@ -90,6 +95,71 @@ class Curves(Entry):
 
 
 @dataclass(frozen=True, eq=False)
+class PairExperiment(Entry):
+    """What tells two hypotheses that are both left open from each other.
+
+    Attributes
+    ----------
+    between : list of str
+        The two, names joined by ``+``; ``unlisted`` for something without a name.
+    text : str
+        What to record or to measure, and what it shows.
+    experiment : str
+        Kind of the experiment; empty where there is none that a program could play.
+    noises : float or None
+        What the one misses of what the other predicts there, the smaller of both ways, in noise
+        levels; where the one is a case of the other, and of a name against ``unlisted``, what the
+        model without the name misses. None where it was not simulated.
+    """
+
+    between: list[str]
+    text: str
+    experiment: str = ""
+    noises: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Protocol(Entry):
+    """Commands of an experiment, as a rig can play them.
+
+    Attributes
+    ----------
+    name : str
+        Kind of the experiment.
+    time : (n,) array
+        [s].
+    commands : dict of str to (n,) array
+        By channel: ``valve_command`` [V], ``supply_command`` [Pa, gauge].
+    """
+
+    name: str
+    time: FloatArray
+    commands: Mapping[str, FloatArray]
+
+    def to_csv(self, path: str | os.PathLike[str] | None = None) -> str:
+        """The commands as CSV, one row per sample, headings with units; a recording of inputs that
+        ``pamrs simulate RIG --input`` plays.
+
+        Parameters
+        ----------
+        path : path-like, optional
+            File to write too.
+
+        Returns
+        -------
+        str
+            The text.
+        """
+        headings = ["time [s]", *(f"{name} [{unit_of(name)}]" for name in self.commands)]
+        columns = np.column_stack([self.time, *self.commands.values()])
+        rows = [",".join(f"{value:.9g}" for value in row) for row in columns]
+        text = "\n".join([",".join(headings), *rows]) + "\n"
+        if path is not None:
+            write_atomically(path, text)
+        return text
+
+
+@dataclass(frozen=True, eq=False)
 class NextExperiment(Entry):
     """What to record next.
 
@@ -105,6 +175,10 @@ class NextExperiment(Entry):
         The experiments that were compared, the most telling first.
     curves : Curves or None
         The channel that separates most.
+    pairs : list of PairExperiment
+        What tells each two hypotheses that are left open from each other.
+    protocol : Protocol or None
+        The commands; None where nothing is sent, or no experiment is proposed.
     """
 
     text: str = ""
@@ -112,6 +186,8 @@ class NextExperiment(Entry):
     expected_information_bits: float | None = None
     ranking: list[RankedExperiment] = field(default_factory=list, metadata=told(json=False))
     curves: Curves | None = field(default=None, metadata=told(json=False))
+    pairs: list[PairExperiment] = field(default_factory=list)
+    protocol: Protocol | None = field(default=None, metadata=told(json=False))
 
 
 @dataclass(frozen=True, eq=False)

@@ -186,6 +186,13 @@ class Rig:
         return str(self._model.get("case", ""))
 
     @property
+    def limits(self) -> dict[str, Any]:
+        """What the stand allows, where the file says it (a copy): ``max_pressure`` [Pa, gauge] and
+        ``payloads`` [kg], for experiments that are proposed.
+        """
+        return copy.deepcopy(self._model.get("limits", {}))
+
+    @property
     def effect_std(self) -> dict[str, dict[str, float]]:
         """Standard deviations of the effects' parameters, where the file gives them: id -> name ->
         SI.

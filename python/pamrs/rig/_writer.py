@@ -11,7 +11,17 @@ from typing import Any, Final
 
 from pamrs.rig._ports import Ports
 from pamrs.rig._reader import Content
-from pamrs.rig.schema import BLOCKS, PORTS, SCHEMA, Key, keys_of, kind_of, qualified, tables_of
+from pamrs.rig.schema import (
+    BLOCKS,
+    LIMITS,
+    PORTS,
+    SCHEMA,
+    Key,
+    keys_of,
+    kind_of,
+    qualified,
+    tables_of,
+)
 
 __all__ = ["core_json", "toml_text"]
 
@@ -38,6 +48,11 @@ def toml_text(content: Content) -> str:
     for block in BLOCKS:
         for name, table in tables_of(content.model, block).items():
             lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
+    limits = content.model.get("limits", {})
+    lines += ["", "[limits]"] if limits else []
+    lines += [
+        f"{key.name} = {_entry(key, limits[key.name], 0.0)}" for key in LIMITS if key.name in limits
+    ]
     for effect in content.model["effects"]:
         place = effect.get("at", "")
         lines += [

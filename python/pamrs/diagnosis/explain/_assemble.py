@@ -11,6 +11,7 @@ import numpy as np
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
+    HEALTHY,
     Candidate,
     Group,
     Judged,
@@ -30,6 +31,7 @@ from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
+from pamrs.diagnosis.explain._next import next_experiment
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Events,
@@ -44,20 +46,18 @@ from pamrs.diagnosis.fit import (
     with_effects_of,
     with_known,
 )
-from pamrs.diagnosis.next_experiment import propose
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.errors import SimulationError
 from pamrs.findings import (
     BlockResidual,
     ChannelError,
     EffectFound,
     EffectParameterFound,
     FitErrors,
-    NextExperiment,
     ParameterFound,
     StageError,
     Tested,
@@ -118,7 +118,15 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         probabilities=probabilities,
         parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
-        next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
+        next_experiment=next_experiment(
+            verdict,
+            ambiguity,
+            _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from),
+            nominal,
+            judged,
+            fitted,
+            held,
+        ),
         warnings=_warnings(case, models, table, settings, same=held is fitted),
         rig=models.final if verdict == "none" else _with_std(models.final, nominal, models.chosen),
         traces=_traces(fitted, held, fit_found, out_found),
@@ -282,46 +290,19 @@ def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
     )
 
 
-def _next(
-    verdict: str,
-    probabilities: dict[str, float],
-    ambiguity: list[list[str]],
-    nominal: Rig,
-    judged: list[Judged],
-    fitted: Problem,
-    held: Problem,
-) -> NextExperiment:
-    """What to record next: simulated with every hypothesis that has a model, where two or more are
-    left; else in words.
-    """
-    settings = fitted.settings
-    left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
-    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
-    if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
-        common = set.intersection(*(set(p.noise) for p in recordings))
-        noise = {
-            channel: float(np.median([p.noise[channel] for p in recordings]))
-            for channel in sorted(common)
-        }
-        with contextlib.suppress(
-            DiagnosisError, ParameterError, SimulationError
-        ):  # a rig that no experiment of the library suits
-            return propose(nominal, left, noise, recordings, settings=settings)
-    missing = [
-        j.group.mismatch.name
-        for j in judged
-        if j.verdict == "unlisted" and j.group.mismatch is not None
-    ]
-    return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
-
-
 def _hypotheses(
     judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
 ) -> list[tuple[str, Rig, float]]:
-    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own
-    can predict no other recording.
+    """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
+    name; those of an effect with times of its own can predict no other recording.
     """
     found = []
+    healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
+    likeliest = max(healthy, key=lambda key: healthy[key], default="")
+    if sum(healthy.values()) >= least:
+        chosen = [j.group.candidates[0] for j in judged]
+        rig = _with_std(_merged(nominal, chosen), nominal, chosen)
+        found.append((likeliest, rig, sum(healthy.values())))
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
         if p < least or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
