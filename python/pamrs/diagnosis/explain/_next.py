@@ -217,6 +217,8 @@ def next_experiment(
             simulated = propose(
                 nominal, hypotheses, asked.noise, recordings, settings=fitted.settings
             )
+    if simulated is not None and not simulated.excitation:
+        simulated = None  # of what is open one has a model
     known = simulated.pairs if simulated is not None else []
     pairs = _pairs(asked, ambiguity, hypotheses, known)
     if simulated is not None:
@@ -259,9 +261,15 @@ def _pairs(
     hypotheses: Sequence[Hypothesis],
     known: Sequence[PairExperiment],
 ) -> list[PairExperiment]:
-    """What tells each two of the sets that are left open from each other."""
+    """What tells each two of the sets that are left open from each other; that something else is
+    missing beside a name is a question by itself.
+    """
+    sets = [[n for n in names if n != "unlisted" or len(names) == 1] for names in ambiguity]
+    if any("unlisted" in names for names in ambiguity):
+        sets.append(["unlisted"])
+    unique = list({frozenset(names): names for names in sets}.values())
     found = []
-    for one, other in itertools.combinations(ambiguity, 2):
+    for one, other in itertools.combinations(unique, 2):
         labels = ["+".join(one), "+".join(other)]
         simulated = next((p for p in known if _same(p.between, labels)), None)
         found.append(
@@ -311,6 +319,7 @@ def _pair(
         "has to predict that to the noise without being fitted again; what it misses is something "
         "that is not listed"
     )
+    values = [n for n in names if is_parameter(n)]
     told = _weight(asked, set(names), hypotheses, experiment)
     if told is not None:
         channel, size = told
@@ -318,7 +327,8 @@ def _pair(
             f" (without {spoken(listed)} the model would miss the {channel.replace('_', ' ')} by "
             f"{size:.2g} times the noise level)"
         )
-    return PairExperiment(labels, text + ".", kind, None if told is None else told[1])
+    text += f". {_measured(values)}." if values else "."
+    return PairExperiment(labels, text, kind, None if told is None else told[1])
 
 
 def _weight(
