@@ -136,7 +136,12 @@ class FakeDiagnosis:
     rig = None
 
     class next_experiment:
-        protocol = Protocol("staircase", np.arange(3) * 0.1, {"valve_command": np.full(3, 5.0)})
+        protocol = Protocol(
+            "staircase",
+            np.arange(3) * 0.1,
+            {"valve_command": np.full(3, 5.0)},
+            {"valve_command": "V"},
+        )
 
     def summary(self):
         return "verdict: none"

@@ -107,6 +107,7 @@ def test_the_report_draws_them_and_json_does_not_hold_them(speeds) -> None:
     page = render_html(found)
     assert "cannot explain" in page
     assert "experiments compared" in page
+    assert "the other way round" in page
     written = json.loads(found.to_json())
     jsonschema.validate(written, schema())
     keys = {"text", "excitation", "expected_information_bits", "pairs"}

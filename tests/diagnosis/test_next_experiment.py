@@ -123,7 +123,7 @@ def test_the_commands_are_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path, ca
     assert found.protocol is not None
     assert found.curves is not None
     file = tmp_path / "next.csv"
-    found.protocol.to_csv(file)
+    file.write_text(found.protocol.to_csv(), encoding="utf-8")
     assert file.read_text(encoding="utf-8").startswith(f"time [s],{pool[0].channel} [")
     played = replay(hypotheses[0][1], load_recording(file))
     assert np.allclose(played["joint_angle"], found.curves.predicted[effects[0]], atol=1e-6)

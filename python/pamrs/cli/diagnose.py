@@ -125,8 +125,9 @@ def _written_experiment(result: Diagnosis, file: Path) -> Path | None:
             err=True,
         )
         return None
-    protocol.to_csv(file)
-    return file
+    from pamrs._writing import write_atomically
+
+    return write_atomically(file, protocol.to_csv())
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:

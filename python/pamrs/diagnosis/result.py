@@ -73,7 +73,7 @@ class Diagnosis(Findings):
     next_experiment : NextExperiment
         ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``), and
-        ``ranking``, ``curves`` and ``protocol`` (its commands, ``protocol.to_csv(path)``) of what
+        ``ranking``, ``curves`` and ``protocol`` (its commands, ``protocol.to_csv()``) of what
         was simulated.
     warnings : list of str
         What the user should know before trusting the rest.

@@ -4,7 +4,6 @@ tried.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pamrs._writing import write_atomically
-from pamrs.channels import unit_of
 from pamrs.findings._entry import Entry, told
 
 __all__ = [
@@ -130,33 +127,23 @@ class Protocol(Entry):
         [s].
     commands : dict of str to (n,) array
         By channel: ``valve_command`` [V], ``supply_command`` [Pa, gauge].
+    units : dict of str to str
+        SI unit of each channel.
     """
 
     name: str
     time: FloatArray
     commands: Mapping[str, FloatArray]
+    units: Mapping[str, str]
 
-    def to_csv(self, path: str | os.PathLike[str] | None = None) -> str:
-        """The commands as CSV, one row per sample, headings with units; a recording of inputs that
-        ``pamrs simulate RIG --input`` plays.
-
-        Parameters
-        ----------
-        path : path-like, optional
-            File to write too.
-
-        Returns
-        -------
-        str
-            The text.
+    def to_csv(self) -> str:
+        """The commands as CSV text, one row per sample, headings with units; as a file it is a
+        recording of inputs that ``pamrs simulate RIG --input`` plays.
         """
-        headings = ["time [s]", *(f"{name} [{unit_of(name)}]" for name in self.commands)]
+        headings = ["time [s]", *(f"{name} [{self.units[name]}]" for name in self.commands)]
         columns = np.column_stack([self.time, *self.commands.values()])
         rows = [",".join(f"{value:.9g}" for value in row) for row in columns]
-        text = "\n".join([",".join(headings), *rows]) + "\n"
-        if path is not None:
-            write_atomically(path, text)
-        return text
+        return "\n".join([",".join(headings), *rows]) + "\n"
 
 
 @dataclass(frozen=True, eq=False)

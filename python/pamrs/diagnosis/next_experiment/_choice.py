@@ -237,7 +237,8 @@ def propose(
     Parameters
     ----------
     nominal : Rig
-        The nominal model, without effects; what it can do decides which experiments there are.
+        The nominal model; what it can do and what its file allows decide which experiments there
+        are.
     hypotheses : sequence of (label, rig, probability)
         What is left: rigs as fitted, with their effects (``Rig.effect_std`` says how well their
         parameters are known, half of the value where it does not). What has no model, ``unlisted``,
@@ -259,9 +260,9 @@ def propose(
     NextExperiment
         ``text`` (what to do and why), ``excitation`` (kind and numbers),
         ``expected_information_bits`` (at most the entropy of the hypotheses), ``ranking`` (the best
-        few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``) and ``curves`` (what
+        few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``), ``curves`` (what
         :func:`pamrs.report.figures.separating_curves` draws; None when there is nothing to tell
-        apart).
+        apart), ``pairs`` (what tells each two hypotheses apart) and ``protocol`` (the commands).
 
     Raises
     ------
@@ -337,7 +338,8 @@ def protocol_of(experiment: Experiment) -> Protocol | None:
     if not experiment.commands:
         return None
     time = np.arange(experiment.rows, dtype=np.float64) * experiment.sample_time
-    return Protocol(experiment.name, time, experiment.commands)
+    units = {channel: unit_of(channel) for channel in experiment.commands}
+    return Protocol(experiment.name, time, experiment.commands, units)
 
 
 def apart(outcome: Outcome, i: int, j: int, *, nested: bool = False) -> tuple[str, float]:
