@@ -224,13 +224,13 @@ class Diagnosis(Findings):
         return ["", *lines] if lines else []
 
     def _summary_next(self) -> list[str]:
-        """What to record next, and what tells each open pair apart."""
+        """What to record next, and what tells the leading hypothesis from each other one."""
         own = self.next_experiment
         if not own.text:
             return []
         lines = ["", *textwrap.wrap(f"Next experiment: {own.text}", 96, subsequent_indent="  ")]
         for pair in own.pairs:
-            if pair.text != own.text:
+            if pair.text != own.text and own.pairs[0].between[0] in pair.between:
                 between = " or ".join(words.hypothesis_label(name) for name in pair.between)
                 told = f"{between}? {pair.text}"
                 lines += textwrap.wrap(told, 96, initial_indent="  ", subsequent_indent="    ")
