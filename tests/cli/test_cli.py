@@ -10,6 +10,7 @@ import pytest
 
 import pamrs
 from pamrs import cli
+from pamrs.findings import Protocol
 
 RIG = Path(pamrs.__file__).parent / "rigs" / "shoulder.toml"
 
@@ -132,6 +133,15 @@ class FakeDiagnosis:
     """Stands in for a diagnosis, which takes many seconds; the real one has its own tests."""
 
     model = 'name = "x"\n'
+    rig = None
+
+    class next_experiment:
+        protocol = Protocol(
+            "staircase",
+            np.arange(3) * 0.1,
+            {"valve_command": np.full(3, 5.0)},
+            {"valve_command": "V"},
+        )
 
     def summary(self):
         return "verdict: none"
@@ -152,10 +162,12 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
 
     class Loaded:
         name = "a case"
+        path = tmp_path
 
     monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())
-    paths = {word: tmp_path / f"out.{word}" for word in ("report", "json", "png", "model")}
+    options = ("report", "json", "png", "model", "experiment")
+    paths = {word: tmp_path / f"out.{word}" for word in options}
     options = [part for word, path in paths.items() for part in (f"--{word}", path)]
     code, out, err = run(capsys, "diagnose", tmp_path, *options)
     assert code == 0, err
@@ -164,6 +176,15 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
     for path in paths.values():
         assert path.stat().st_size > 0
         assert str(path) in err
+    commands = paths["experiment"].read_text(encoding="utf-8").splitlines()
+    assert commands == ["time [s],valve_command [V]", "0,5", "0.1,5", "0.2,5"]
+    # where there is nothing to play, that is said in the place of a file
+    monkeypatch.setattr(FakeDiagnosis.next_experiment, "protocol", None)
+    absent = tmp_path / "absent.csv"
+    code, _, err = run(capsys, "diagnose", tmp_path, "--experiment", absent)
+    assert code == 0
+    assert not absent.exists()
+    assert f"not written: {absent}" in err
 
 
 def test_runs_as_a_module():

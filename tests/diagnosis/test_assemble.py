@@ -111,7 +111,7 @@ def test_a_rig_without_tolerances_can_be_diagnosed() -> None:
     "name", ["antagonistic_joint", "two_joint_arm", "recruitment", "regulated_joint"]
 )
 def test_experiments_are_refused_for_rigs_that_nobody_could_command(name: str) -> None:
-    with pytest.raises(DiagnosisError, match=r"named blocks|no valve"):
+    with pytest.raises(DiagnosisError, match=r"named blocks|max_pressure"):
         library(pamrs.rigs.named(name), SETTINGS.next_experiment)
 
 

@@ -123,12 +123,6 @@ def test_a_missing_channel_is_named() -> None:
         pamrs.diagnose(case.with_rig(pamrs.rigs.shoulder()))
 
 
-def test_a_rig_with_effects_is_refused() -> None:
-    case = sealed_case(0.0)
-    with pytest.raises(pamrs.DiagnosisError, match="leak_muscle"):
-        pamrs.diagnose(case.with_rig(case.rig.with_effect("leak_muscle", {"conductance": 1e-12})))
-
-
 def test_a_third_of_the_samples_missing_changes_nothing() -> None:
     case = sealed_case(3e-11)
     (recording,) = case.recordings

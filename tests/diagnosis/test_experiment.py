@@ -107,9 +107,11 @@ def test_the_report_draws_them_and_json_does_not_hold_them(speeds) -> None:
     page = render_html(found)
     assert "cannot explain" in page
     assert "experiments compared" in page
+    assert "the other way round" in page
     written = json.loads(found.to_json())
     jsonschema.validate(written, schema())
-    assert set(written["next_experiment"]) == {"text", "excitation", "expected_information_bits"}
+    keys = {"text", "excitation", "expected_information_bits", "pairs"}
+    assert set(written["next_experiment"]) == keys
 
 
 def test_an_effect_is_known_from_itself(pool) -> None:
@@ -141,7 +143,7 @@ def test_a_missing_sensor_is_proposed(pool) -> None:
         ("muscle_hysteresis", rig.with_effect("muscle_hysteresis"), 0.5),
         ("leak_muscle", rig.with_effect("leak_muscle", {"conductance": 1e-10}), 0.5),
     ]
-    some = [c for c in MEASURABLE if c not in ("joint_angle", "length")]
+    some = [c for c in MEASURABLE if c not in ("joint_angle", "length", "supply_command")]
     found = propose(rig, hypotheses, channels=tuple(some), experiments=[pool["null_ramp"]])
     assert found["excitation"]["sensor"] == "joint_angle"
     assert "one more channel: joint angle" in found["text"]

@@ -27,7 +27,6 @@ CONSTANTS = {
     "explain/_conditions.py": {"_MAP_CELLS"},  # of a picture
     "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358
     "explain/_closure_words.py": {"_UNITS"},  # of sizes that are told
-    "explain/_words.py": {"_SCALED_EXCITATION"},  # advice
     "prove.py": {"TIMEOUT", "_POLL"},  # of processes
 }
 """Numbers of modules that steer no verdict, and what they are."""

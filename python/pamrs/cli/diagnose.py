@@ -3,18 +3,37 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pamrs.cli._shared import check_writable, exact, progress, rig_named, write
+
+if TYPE_CHECKING:
+    from pamrs.diagnosis import Diagnosis
+    from pamrs.recordings import Case
 
 __all__ = ["diagnose_command"]
 
 
 def diagnose_command(
     case: Annotated[
-        Path | None, typer.Argument(help="Folder with case.toml, rig.toml and the recordings.")
+        Path | None,
+        typer.Argument(
+            help=(
+                "Folder with case.toml, rig.toml and the recordings; or a model that --model "
+                "wrote, to go on from it."
+            )
+        ),
+    ] = None,
+    rig: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "A rig file in the place of the case's own: effects that it has are held, and what "
+                "is missing beside them is looked for."
+            )
+        ),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     json: Annotated[
@@ -23,6 +42,12 @@ def diagnose_command(
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[
         Path | None, typer.Option(help="Write the rig with the named effect in it.")
+    ] = None,
+    experiment: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the commands of the proposed next experiment (CSV: time and commands)."
+        ),
     ] = None,
     plan: Annotated[
         Path | None,
@@ -47,11 +72,11 @@ def diagnose_command(
     """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
     could be found at all.
     """
-    check_writable(report, json, png, model)
+    check_writable(report, json, png, model, experiment)
     if plan is not None:
-        if case is not None:
-            raise typer.BadParameter("give a case or --plan, not both")
-        if report is not None or png is not None or model is not None:
+        if case is not None or rig is not None:
+            raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
+        if any(path is not None for path in (report, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return
@@ -64,6 +89,10 @@ def diagnose_command(
     from pamrs.recordings import load_case
 
     loaded = load_case(case)
+    if rig is not None:
+        from pamrs.rig import load_rig
+
+        loaded = loaded.with_rig(load_rig(rig))
     from pamrs.diagnosis import diagnose
 
     with progress(f"diagnosing {loaded.name}"):
@@ -73,15 +102,48 @@ def diagnose_command(
     if model is not None:
         from pamrs._writing import write_atomically
 
-        write_atomically(model, result.model)
+        write_atomically(model, _model_text(result, loaded, model))
+    if experiment is not None:
+        experiment = _written_experiment(result, experiment)
     if report is not None:
         result.report(report)
     if png is not None:
         result.figure(png)
     typer.echo(result.summary())
-    for path in (report, json, png, model):
+    for path in (report, json, png, model, experiment):
         if path is not None:
             typer.echo(f"written: {path}", err=True)
+
+
+def _written_experiment(result: Diagnosis, file: Path) -> Path | None:
+    """The commands of the next experiment as a file; None, and why, where there are none."""
+    protocol = result.next_experiment.protocol
+    if protocol is None:
+        typer.echo(
+            f"not written: {file}: the next experiment has no commands to play "
+            "(it is none, or done by hand)",
+            err=True,
+        )
+        return None
+    from pamrs._writing import write_atomically
+
+    return write_atomically(file, protocol.to_csv())
+
+
+def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
+    """The model as TOML, with a note of the case that it is from, as seen from the file."""
+    import os
+
+    from pamrs.rig import Rig
+
+    if not isinstance(result.rig, Rig):
+        return result.model
+    home = case.path.resolve()
+    try:
+        folder = os.path.relpath(home, file.resolve().parent)
+    except ValueError:  # on another drive
+        folder = str(home)
+    return result.rig.with_case(Path(folder).as_posix()).to_toml_text()
 
 
 def _plan(

@@ -21,13 +21,14 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
+from typing import Any
 
 from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.explain import assemble
-from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.fit import Problem, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -40,9 +41,10 @@ from pamrs.diagnosis.prepare import (
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.recordings import Case, load_case
-from pamrs.rig import Rig
+from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
@@ -137,6 +139,7 @@ def _quiet(message: str) -> None:
 def diagnose(
     case: Case | str | os.PathLike[str],
     *,
+    rig: Rig | str | os.PathLike[str] | None = None,
     settings: DiagnosisSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -145,7 +148,12 @@ def diagnose(
     Parameters
     ----------
     case : Case or path-like
-        A case, or its folder.
+        A case, its folder, or a model file that an earlier diagnosis wrote and that says from which
+        case. Effects that the rig holds already are part of the nominal model: their parameters are
+        refitted with the others, and they are not named again.
+    rig : Rig or path-like, optional
+        A model to begin from in the place of the case's own, for example one with the effects that
+        an earlier diagnosis found.
     settings : DiagnosisSettings, optional
         The numbers that the verdict rests on; those of the published trials by default.
     progress : callable, optional
@@ -165,6 +173,8 @@ def diagnose(
         allowed.
     CaseError
         If the folder is not a case.
+    RigError
+        If the rig file is wrong.
 
     Examples
     --------
@@ -176,7 +186,11 @@ def diagnose(
     say = progress or _quiet
     if not isinstance(case, Case):
         case = load_case(case)
+    if rig is not None:
+        case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
+    held = _said_of_held(case.rig)
+    case = case.with_rig(without_passing(case.rig))
     chosen = DiagnosisSettings() if settings is None else settings
     check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
@@ -191,7 +205,7 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*diagnosis.warnings, *left_out]
+    warnings = [*held, *diagnosis.warnings, *left_out]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.append(
@@ -225,17 +239,35 @@ def _examined(
 def _check_rig(case: Case) -> None:
     """Refuse rigs that cannot be diagnosed."""
     rig = case.rig
-    if rig.effects:
-        raise DiagnosisError(
-            f"the nominal rig of case {case.name!r} already has the effect "
-            f"{rig.effects[0]['id']!r}; diagnose a rig without effects"
-        )
     if (rig.model["load"] or {}).get("kind") == "frame":
         raise DiagnosisError(
             f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, "
             "and its force is for pamrs fit; 'mass', or a rig with [joint] and [arm], or without a "
             "muscle, can be diagnosed"
         )
+
+
+def _said_of_held(rig: Rig) -> list[str]:
+    """What the model holds already, and what of it cannot be held, in words."""
+
+    def told(entry: dict[str, Any]) -> str:
+        place = f" at {entry['at']}" if "at" in entry else ""
+        return f"{EFFECTS[entry['id']].name} ({entry['id']}{place})"
+
+    held = [told(entry) for entry in rig.effects if holdable(entry)]
+    passing = [told(entry) for entry in rig.effects if not holdable(entry)]
+    said = []
+    if held:
+        said.append(
+            f"the model holds already: {', '.join(held)}; the parameters of each were refitted "
+            "with those of the rig, and it is not named again"
+        )
+    if passing:
+        said.append(
+            f"taken out of the model before the diagnosis: {', '.join(passing)}; what happens at "
+            "times of its own in each recording, or is a form without a name, is looked for anew"
+        )
+    return said
 
 
 def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem, list[str]]:

@@ -71,8 +71,10 @@ class Diagnosis(Findings):
         ``channels`` and ``held_out``: {channel: {noise, before, refit, after}} in SI, and
         ``gap_closed``.
     next_experiment : NextExperiment
-        ``text``, ``excitation``, ``expected_information_bits``, and ``ranking`` and ``curves`` of
-        what was simulated.
+        ``text``, ``excitation``, ``expected_information_bits``, ``pairs`` (what tells each two
+        hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``), and
+        ``ranking``, ``curves`` and ``protocol`` (its commands, ``protocol.to_csv()``) of what
+        was simulated.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -202,9 +204,7 @@ class Diagnosis(Findings):
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
-        if self.next_experiment.text:
-            told = f"Next experiment: {self.next_experiment.text}"
-            lines += ["", *textwrap.wrap(told, 96, subsequent_indent="  ")]
+        lines += self._summary_next()
         for warning in self.warnings[:3]:
             lines += textwrap.wrap(f"Warning: {warning}", 96, subsequent_indent="  ")
         if len(self.warnings) > 3:
@@ -222,6 +222,19 @@ class Diagnosis(Findings):
             told = f"Budget of {block}: {words.budget_sentence(own)}"
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []
+
+    def _summary_next(self) -> list[str]:
+        """What to record next, and what tells the leading hypothesis from each other one."""
+        own = self.next_experiment
+        if not own.text:
+            return []
+        lines = ["", *textwrap.wrap(f"Next experiment: {own.text}", 96, subsequent_indent="  ")]
+        for pair in own.pairs:
+            if pair.text != own.text and own.pairs[0].between[0] in pair.between:
+                between = " or ".join(words.hypothesis_label(name) for name in pair.between)
+                told = f"{between}? {pair.text}"
+                lines += textwrap.wrap(told, 96, initial_indent="  ", subsequent_indent="    ")
+        return lines
 
     def _summary_fit(self) -> list[str]:
         """Error table of the held-out recordings, else of the fitted ones."""

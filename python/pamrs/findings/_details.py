@@ -18,6 +18,8 @@ __all__ = [
     "ConditionMap",
     "Curves",
     "NextExperiment",
+    "PairExperiment",
+    "Protocol",
     "RankedExperiment",
     "Tested",
     "Tried",
@@ -90,6 +92,61 @@ class Curves(Entry):
 
 
 @dataclass(frozen=True, eq=False)
+class PairExperiment(Entry):
+    """What tells two hypotheses that are both left open from each other.
+
+    Attributes
+    ----------
+    between : list of str
+        The two, names joined by ``+``; ``unlisted`` for something without a name.
+    text : str
+        What to record or to measure, and what it shows.
+    experiment : str
+        Kind of the experiment; empty where there is none that a program could play.
+    noises : float or None
+        What the one misses of what the other predicts there, the smaller of both ways, in noise
+        levels; where the one is a case of the other, and of a name against ``unlisted``, what the
+        model without the name misses. None where it was not simulated.
+    """
+
+    between: list[str]
+    text: str
+    experiment: str = ""
+    noises: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Protocol(Entry):
+    """Commands of an experiment, as a rig can play them.
+
+    Attributes
+    ----------
+    name : str
+        Kind of the experiment.
+    time : (n,) array
+        [s].
+    commands : dict of str to (n,) array
+        By channel: ``valve_command`` [V], ``supply_command`` [Pa, gauge].
+    units : dict of str to str
+        SI unit of each channel.
+    """
+
+    name: str
+    time: FloatArray
+    commands: Mapping[str, FloatArray]
+    units: Mapping[str, str]
+
+    def to_csv(self) -> str:
+        """The commands as CSV text, one row per sample, headings with units; as a file it is a
+        recording of inputs that ``pamrs simulate RIG --input`` plays.
+        """
+        headings = ["time [s]", *(f"{name} [{self.units[name]}]" for name in self.commands)]
+        columns = np.column_stack([self.time, *self.commands.values()])
+        rows = [",".join(f"{value:.9g}" for value in row) for row in columns]
+        return "\n".join([",".join(headings), *rows]) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
 class NextExperiment(Entry):
     """What to record next.
 
@@ -105,6 +162,10 @@ class NextExperiment(Entry):
         The experiments that were compared, the most telling first.
     curves : Curves or None
         The channel that separates most.
+    pairs : list of PairExperiment
+        What tells each two hypotheses that are left open from each other.
+    protocol : Protocol or None
+        The commands; None where nothing is sent, or no experiment is proposed.
     """
 
     text: str = ""
@@ -112,6 +173,8 @@ class NextExperiment(Entry):
     expected_information_bits: float | None = None
     ranking: list[RankedExperiment] = field(default_factory=list, metadata=told(json=False))
     curves: Curves | None = field(default=None, metadata=told(json=False))
+    pairs: list[PairExperiment] = field(default_factory=list)
+    protocol: Protocol | None = field(default=None, metadata=told(json=False))
 
 
 @dataclass(frozen=True, eq=False)

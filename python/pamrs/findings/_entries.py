@@ -264,7 +264,7 @@ class Unexplained(Entry):
     verdict: str = field(metadata=told("of its group of blocks", enum=VERDICTS[1:]))
 
 
-TERMS = ("parameters", "wrong_parameter", "effect", "form", "unexplained")
+TERMS = ("held", "parameters", "wrong_parameter", "effect", "form", "unexplained")
 """Kinds of the terms of a budget."""
 
 
@@ -277,15 +277,16 @@ class BudgetTerm(Entry):
     block : str
         The block.
     kind : str
-        ``parameters`` (inside their tolerances), ``wrong_parameter``, ``effect``, ``form`` (without
-        a name) or ``unexplained``.
+        ``held`` (an effect that the nominal model holds already), ``parameters`` (inside their
+        tolerances), ``wrong_parameter``, ``effect``, ``form`` (without a name) or ``unexplained``.
     id : str
         Id of the effect, or dotted names of the parameters joined by ``+``; else empty.
     form : str
         Form of the effect where it is not the usual one.
     share : float
-        Share of the nominal model's excess variance over the noise that the term takes, after all
-        terms before it; negative where it makes the prediction worse.
+        Share of the excess variance over the noise (of the nominal model, without the effects that
+        it holds) that the term takes, after all terms before it; negative where it makes the
+        prediction worse.
     interval : list of two floats
         95 % interval of the share.
     probability : float or None

@@ -86,8 +86,9 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     Parameters
     ----------
     folder : path-like
-        A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself. File
-        names in it are relative to the folder and may point out of it.
+        A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself; or a rig
+        file that a diagnosis wrote and that says from which case, which then is that case with this
+        rig. File names in it are relative to the folder and may point out of it.
 
     Returns
     -------
@@ -101,6 +102,8 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
         listed.
     """
     given = Path(folder)
+    if given.is_file() and given.name != "case.toml":
+        return _case_of(given)
     file = given if given.name == "case.toml" else given / "case.toml"
     home = file.parent
     document = _document(file, given)
@@ -116,6 +119,23 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
     return Case(name, rig, recordings, home, description)
+
+
+def _case_of(file: Path) -> Case:
+    """The case from which a rig file was diagnosed, with that rig."""
+    try:
+        rig = load_rig(file)
+    except RigError as error:
+        raise CaseError(str(error)) from error
+    if not rig.case:
+        raise CaseError(
+            f"{file}: a rig file that does not say from which case it is; give the folder of the "
+            "case, and this file as its rig (pamrs diagnose CASE --rig FILE)"
+        )
+    home = file.parent / rig.case
+    if not home.is_dir():
+        raise CaseError(f"{file}: case = {rig.case!r}: there is no such case folder")
+    return load_case(home).with_rig(rig)
 
 
 def _document(file: Path, given: Path) -> dict[str, Any]:

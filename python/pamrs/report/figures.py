@@ -409,8 +409,13 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
 
 
 def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
-    colours = {"parameters": COLOURS["quiet"], "unexplained": COLOURS["before"]}
-    names = ["nominal model"]
+    colours = {
+        "held": COLOURS["refit"],
+        "parameters": COLOURS["quiet"],
+        "unexplained": COLOURS["before"],
+    }
+    held = any(term.kind == "held" for term in terms)
+    names = ["model without what it holds" if held else "nominal model"]
     axes.barh(0, 100.0, color="#d1d5db", height=0.62)
     left = 1.0
     for row, term in enumerate(terms, 1):

@@ -326,6 +326,15 @@ def _separating(diagnosis: Findings) -> str | None:
     return figures.separating_curves(curves) if curves else None
 
 
+def _pairs(diagnosis: Findings) -> list[tuple[str, str]]:
+    """What tells each two hypotheses that are left open apart."""
+    return [
+        (" or ".join(words.hypothesis_label(name) for name in pair.between), pair.text)
+        for pair in diagnosis.next_experiment.pairs
+        if pair.text != diagnosis.next_experiment.text
+    ]
+
+
 def _ranking(diagnosis: Findings) -> list[dict[str, str]]:
     """The experiments that were compared, the most telling first."""
     return [
@@ -387,6 +396,7 @@ def render(diagnosis: Findings) -> str:
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
         separating=_markup(_separating(diagnosis)),
         ranking=_ranking(diagnosis),
+        pairs=_pairs(diagnosis),
         fits=[
             (title, rows)
             for title, rows in (

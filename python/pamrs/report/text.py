@@ -367,7 +367,9 @@ def term_label(term: BudgetTerm) -> str:
     }
     if term.kind in fixed:
         return fixed[term.kind]
-    return set_label(term.id.split("+")) + (f" ({label(term.form)})" if term.form else "")
+    held = ", in the model already" if term.kind == "held" else ""
+    form = f" ({label(term.form)})" if term.form else ""
+    return set_label(term.id.split("+")) + form + held
 
 
 def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:

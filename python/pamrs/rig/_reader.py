@@ -17,6 +17,7 @@ from pamrs.rig._ports import bare, connect, near_name
 from pamrs.rig.muscle_models import own_geometry
 from pamrs.rig.schema import (
     BLOCKS,
+    LIMITS,
     PORTS,
     REQUIRED_BLOCKS,
     SCHEMA,
@@ -32,7 +33,7 @@ from pamrs.units import to_si
 
 __all__ = ["Content", "Reader", "read_model"]
 
-_TOP = ("schema", "name", "description", "effects", "model_error")
+_TOP = ("schema", "name", "description", "case", "limits", "effects", "model_error")
 _QUANTITY = ("value", "unit", "tol", "unknown")
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -119,8 +120,13 @@ class Reader:
         if not isinstance(name, str) or not name.strip():
             self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
             name = "rig"
+        case = document.get("case", "")
+        if not isinstance(case, str):
+            self.problem(f"case = {_shown(case)} is not allowed: the path of a case is needed")
+            case = ""
         self.whole = set(document) <= {*_TOP, *BLOCKS}
-        model: dict[str, Any] = {"name": name}
+        model: dict[str, Any] = {"name": name, **({"case": case} if case else {})}
+        model |= self.limits(document.get("limits"))
         for block in BLOCKS:
             model[block] = self.blocks(block, document.get(block))
         self.sensors(model, document.get("sensors"))
@@ -131,6 +137,19 @@ class Reader:
             self.problems += connect(model)[1]
         self.problems += block_problems(model)
         return Content(name, model, self.tolerances, self.effect_std)
+
+    def limits(self, raw: Any) -> dict[str, Any]:
+        """What the stand allows, under ``limits``; nothing where the file says nothing."""
+        if raw is None:
+            return {}
+        if not isinstance(raw, Mapping):
+            self.problem(f"limits = {_shown(raw)} is not allowed: a table is needed")
+            return {}
+        self.unknown_keys("limits.", raw, (key.name for key in LIMITS))
+        found = {
+            key.name: self.value("limits", key, raw[key.name]) for key in LIMITS if key.name in raw
+        }
+        return {"limits": found}
 
     def blocks(self, block: str, raw: Any) -> dict[str, Any] | None:
         """A block without a name, or all blocks of a kind by their names; None where there is

@@ -187,6 +187,20 @@ class Rig:
         return stated
 
     @property
+    def case(self) -> str:
+        """Folder of the case that the model was diagnosed from, relative to that of the file, as it
+        says; empty where it says none.
+        """
+        return str(self._model.get("case", ""))
+
+    @property
+    def limits(self) -> dict[str, Any]:
+        """What the stand allows, where the file says it (a copy): ``max_pressure`` [Pa, gauge] and
+        ``payloads`` [kg], for experiments that are proposed.
+        """
+        return copy.deepcopy(self._model.get("limits", {}))
+
+    @property
     def effect_std(self) -> dict[str, dict[str, float]]:
         """Standard deviations of the effects' parameters, where the file gives them: id -> name ->
         SI.
@@ -360,6 +374,23 @@ class Rig:
             return found
         same = [_kind(old) for old in before] == [_kind(new) for new in entries]
         return found._with_origin(self, own) if same else found
+
+    def with_case(self, folder: str) -> Rig:
+        """The same rig with a note of the case that it was diagnosed from.
+
+        Parameters
+        ----------
+        folder : str
+            The folder of the case, relative to that of the rig file; empty for no note.
+
+        Returns
+        -------
+        Rig
+            A new rig.
+        """
+        model = {name: value for name, value in self._model.items() if name != "case"}
+        model |= {"case": folder} if folder else {}
+        return Rig(self.name, model, self._tolerances, self._effect_std, self.source)
 
     def _grown_by(self, entry: Entry) -> tuple[Rig, dict[str, float]]:
         """The rig that this one differs from by numbers with an effect more, and these numbers."""

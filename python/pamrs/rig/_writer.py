@@ -12,7 +12,17 @@ from typing import Any, Final
 from pamrs.rig._model_error import error_lines
 from pamrs.rig._ports import Ports
 from pamrs.rig._reader import Content
-from pamrs.rig.schema import BLOCKS, PORTS, SCHEMA, Key, keys_of, kind_of, qualified, tables_of
+from pamrs.rig.schema import (
+    BLOCKS,
+    LIMITS,
+    PORTS,
+    SCHEMA,
+    Key,
+    keys_of,
+    kind_of,
+    qualified,
+    tables_of,
+)
 
 __all__ = ["core_json", "toml_text"]
 
@@ -35,10 +45,16 @@ def toml_text(content: Content) -> str:
         A rig file; reading it gives the same numbers, names and ports.
     """
     lines = [f"schema = {_text(SCHEMA)}", f"name = {_text(content.name)}"]
+    lines += [f"case = {_text(content.model['case'])}"] if content.model.get("case") else []
     for block in BLOCKS:
         for name, table in tables_of(content.model, block).items():
             lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
     lines += error_lines(content.model)
+    limits = content.model.get("limits", {})
+    lines += ["", "[limits]"] if limits else []
+    lines += [
+        f"{key.name} = {_entry(key, limits[key.name], 0.0)}" for key in LIMITS if key.name in limits
+    ]
     for effect in content.model["effects"]:
         place = effect.get("at", "")
         lines += [

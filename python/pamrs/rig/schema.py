@@ -131,6 +131,12 @@ _GEOMETRY: Final = (
     Key("rest_angle", "rad", -_TURN, _TURN, note="where the muscle is at rest length"),
 )
 
+#: What the stand allows, for experiments that are proposed: the core knows nothing of it.
+LIMITS: Final = (
+    Key("max_pressure", "Pa", 0.0, 1e8, note="gauge, of muscle and chamber"),
+    Key("payloads", "kg", 0.0, 1e5, kind="vector", note="masses that can be hung"),
+)
+
 #: block -> its keys, in the order in which they are written.
 BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
     "gas": (

@@ -180,6 +180,11 @@ class Attempts:
         return self.inner.settings
 
     @property
+    def held(self) -> set[str]:
+        """Ids of the effects that the nominal model holds already."""
+        return {entry["id"] for entry in self.nominal.effects}
+
+    @property
     def white(self) -> dict[str, float]:
         """Weights of noise without autocorrelation."""
         return without_autocorrelation(self.inner.blocks)
@@ -208,7 +213,7 @@ class Attempts:
 
     def _transient(self, effect: str, beside: Candidate) -> Candidate | None:
         white = self.white
-        model = with_effects_of(self.nominal, beside.fit.rig)
+        model = with_effects_of(self.nominal, beside.fit.rig, self.held)
         found = fit_events(effect, self.inner, model, beside.fit, white)
         if found is None:
             return None
@@ -310,6 +315,8 @@ class Attempts:
         step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
+        if not self.held.isdisjoint(effects):
+            return None  # it would replace what the model holds
         free, held, forms = parts_of(starts)
         settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
         limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
@@ -330,9 +337,7 @@ class Attempts:
             autocorrelation = self.autocorrelation(best)
             if max(autocorrelation.values()) > self.settings.noise.correlated_variance:
                 again = {
-                    n: _off_zero(n, v, settings.least_start)
-                    for n, v in best.values.items()
-                    if n.partition(".")[0] in EFFECTS
+                    n: _off_zero(n, v, settings.least_start) for n, v in best.effect_values.items()
                 }
                 best = fit(
                     self.inner,

@@ -319,7 +319,7 @@ def _unseen(candidate: Candidate, seconds: float, settings: EvidenceSettings) ->
 
 def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
     """Fitted parameters of its effects, by dotted name."""
-    return [(n, v) for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS]
+    return list(candidate.fit.effect_values.items())
 
 
 def stands(candidate: Candidate, seconds: float) -> bool:
@@ -349,7 +349,7 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
         prior = find_parameter(name).prior
         if prior is not None:
             lost += 0.5 * ((value - prior[0]) / prior[1]) ** 2
-    for effect in candidate.fit.rig.effects:
+    for effect in (e for e in candidate.fit.rig.effects if e["id"] in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
     for name, value in _effect_values(candidate):
         expected = find_parameter(name).expected

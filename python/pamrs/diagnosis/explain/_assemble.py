@@ -11,6 +11,7 @@ import numpy as np
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
+    HEALTHY,
     Candidate,
     Group,
     Judged,
@@ -30,31 +31,33 @@ from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
+from pamrs.diagnosis.explain._next import next_experiment
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Events,
     Key,
     Problem,
+    depends,
     events_of,
     fit,
     form_in,
+    known_parameters,
     residuals,
     with_effects_of,
+    with_known,
 )
-from pamrs.diagnosis.next_experiment import propose
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
+from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.errors import SimulationError
 from pamrs.findings import (
     BlockResidual,
     ChannelError,
     EffectFound,
     EffectParameterFound,
     FitErrors,
-    NextExperiment,
     ParameterFound,
     StageError,
     Tested,
@@ -102,7 +105,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     named = any(j.named or j.wrong for j in judged)
     gap = (
         _gap(table, settings.verdict.least_gap)
-        if models.final.effects or any(j.wrong for j in judged)
+        if models.added or any(j.wrong for j in judged)
         else None
     )
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
@@ -113,16 +116,22 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(
-            nominal, models.chosen if named else models.starts, settings.fit.known_share
-        ),
+        parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
-        next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
+        next_experiment=next_experiment(
+            verdict,
+            ambiguity,
+            _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from),
+            nominal,
+            judged,
+            fitted,
+            held,
+        ),
         warnings=_warnings(case, models, table, settings, same=held is fitted),
-        rig=_with_std(models.final, models.chosen) if models.final.effects else models.final,
+        rig=models.final if verdict == "none" else _with_std(models.final, nominal, models.chosen),
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
-        budget=budget(judged, held, out_found, noise_level, models.final),
+        budget=budget(judged, held, out_found, noise_level, nominal, models.final),
         unexplained=unexplained(judged, blocks),
         wrong_parameters=_wrong(nominal, judged, fitted, table),
         residuals=_block_table(groups),
@@ -164,10 +173,15 @@ class _Models:
     baseline: Rig
     final: Rig
 
+    @property
+    def added(self) -> bool:
+        """Whether the model has effects that the nominal one does not hold."""
+        return len(self.final.effects) > len(self.nominal.effects)
+
     def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
         """Residuals of some recordings at every stage."""
         happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
-        events = next(happened, None) if self.final.effects else None
+        events = next(happened, None) if self.added else None
         return {
             "before": _run(problem, self.nominal, None),
             "refit": _run(problem, self.baseline, None),
@@ -209,7 +223,7 @@ def _warnings(
             if named
             else []
         ),
-        *(words.worse(table, settings.warnings) if models.final.effects else []),
+        *(words.worse(table, settings.warnings) if models.added else []),
         *words.warnings(case, models.judged, same, settings),
     ]
 
@@ -243,10 +257,12 @@ def _tried(groups: list[Group]) -> list[Tried]:
             held_out={b: e.ratio for b, e in candidate.held_out.items()},
             gap_closed=candidate.gap_closed,
             scatter=candidate.scatter,
-            fitted_values={
-                n: v for n, v in candidate.fit.values.items() if n.partition(".")[0] in EFFECTS
+            fitted_values=candidate.fit.effect_values,
+            std={
+                n: s
+                for n, s in candidate.fit.std.items()
+                if n not in candidate.fit.moved and n.partition(".")[0] in EFFECTS
             },
-            std={n: v for n, v in candidate.fit.std.items() if n.partition(".")[0] in EFFECTS},
             prior=sum(v * v for v in candidate.fit.moved.values()),
             suspects=[b.name for b in group.suspects],
             gain=candidate.gain,
@@ -274,46 +290,19 @@ def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
     )
 
 
-def _next(
-    verdict: str,
-    probabilities: dict[str, float],
-    ambiguity: list[list[str]],
-    nominal: Rig,
-    judged: list[Judged],
-    fitted: Problem,
-    held: Problem,
-) -> NextExperiment:
-    """What to record next: simulated with every hypothesis that has a model, where two or more are
-    left; else in words.
-    """
-    settings = fitted.settings
-    left = _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from)
-    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
-    if ambiguity and len(left) > 1 and not words.same_data(ambiguity):
-        common = set.intersection(*(set(p.noise) for p in recordings))
-        noise = {
-            channel: float(np.median([p.noise[channel] for p in recordings]))
-            for channel in sorted(common)
-        }
-        with contextlib.suppress(
-            DiagnosisError, ParameterError, SimulationError
-        ):  # a rig that no experiment of the library suits
-            return propose(nominal, left, noise, recordings, settings=settings)
-    missing = [
-        j.group.mismatch.name
-        for j in judged
-        if j.verdict == "unlisted" and j.group.mismatch is not None
-    ]
-    return words.next_experiment(verdict, probabilities, ambiguity, nominal, missing)
-
-
 def _hypotheses(
     judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
 ) -> list[tuple[str, Rig, float]]:
-    """The likely hypotheses that have a model, as fitted; those of an effect with times of its own
-    can predict no other recording.
+    """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
+    name; those of an effect with times of its own can predict no other recording.
     """
     found = []
+    healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
+    likeliest = max(healthy, key=lambda key: healthy[key], default="")
+    if sum(healthy.values()) >= least:
+        chosen = [j.group.candidates[0] for j in judged]
+        rig = _with_std(_merged(nominal, chosen), nominal, chosen)
+        found.append((likeliest, rig, sum(healthy.values())))
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
         if p < least or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
@@ -322,7 +311,7 @@ def _hypotheses(
         if any(c.fit.events is not None for c in chosen):
             continue
         if {name for c in chosen for name in c.names} == wanted:
-            found.append((key, _with_std(_merged(nominal, chosen), chosen), p))
+            found.append((key, _with_std(_merged(nominal, chosen), nominal, chosen), p))
     return found
 
 
@@ -407,15 +396,27 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     """
     rig = nominal
     for candidate in candidates:
-        rig = with_effects_of(rig, candidate.fit.rig)
-    return rig.with_parameters(
-        {name: candidates[k].fit.values[name] for name, k in _owners(candidates).items()}
-    )
+        rig = with_effects_of(rig, candidate.fit.rig, _ids(nominal))
+    owners = _owners(candidates).items()
+    return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
 
-def _with_std(rig: Rig, candidates: list[Candidate]) -> Rig:
+def _ids(rig: Rig) -> set[str]:
+    """Ids of the effects that a rig holds."""
+    return {entry["id"] for entry in rig.effects}
+
+
+def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate]) -> Rig:
+    """A model with the standard deviations of its effects; of one that the nominal model held, as
+    the group has it that knows it best.
+    """
+    owners = _owners(candidates).items()
+    spread = {name: candidates[k].fit.std[name] for name, k in owners}
+    rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
     for candidate in candidates:
         for effect in candidate.fit.rig.effects:
+            if effect["id"] in _ids(nominal):
+                continue
             own = effect["id"] + "."
             std = {
                 n.removeprefix(own): s
@@ -445,7 +446,7 @@ def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
         moved = symptoms_of(j.group, settings)
         worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
         for block in reversed(j.group.blocks):
-            if worst and worst[0] in block.parameters:
+            if worst and depends(block, worst[0]):
                 return block.name
     return None
 
@@ -530,14 +531,14 @@ def _wrong(
         # of a zero that two groups name, the value is that of the group that knows it best
         j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
         known, value, std = (
-            nominal.parameter(name),
+            known_parameters(nominal, problem.settings.fit)[name],
             j.chosen.fit.values[name],
             j.chosen.fit.std[name],
         )
         told = [
             b
             for b in problem.blocks
-            if name in b.parameters and any(b in j.group.blocks for j in naming)
+            if depends(b, name) and any(b in j.group.blocks for j in naming)
         ]
         errors = {b.channel: table[b.channel] for b in told}
         found.append(
@@ -645,19 +646,20 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 
 
 def _parameters(
-    nominal: Rig, candidates: list[Candidate], known: float
+    nominal: Rig, candidates: list[Candidate], settings: FitSettings
 ) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each as the group has it that knows it best."""
     out: dict[str, ParameterFound] = {}
+    known = known_parameters(nominal, settings)
     for name, k in _owners(candidates).items():
-        p, own = nominal.parameter(name), candidates[k].fit
+        p, own = known[name], candidates[k].fit
         out[name] = ParameterFound(
             nominal=p.value,
             value=own.values[name],
             std=own.std[name],
             unit=p.unit,
             moved_sigmas=own.moved[name],
-            identifiable=own.std[name] < known * p.tol,
+            identifiable=own.std[name] < settings.known_share * p.tol,
         )
     return out
 

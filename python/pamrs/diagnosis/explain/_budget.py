@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, is_parameter, significant
-from pamrs.diagnosis.fit import Key, Problem, form_in, residuals
+from pamrs.diagnosis.fit import Key, Problem, acts_in, form_in, residuals
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -33,6 +33,7 @@ def budget(
     problem: Problem,
     found: Stages,
     noise_level: dict[Key, NoiseLevel],
+    nominal: Rig,
     final: Rig,
 ) -> list[BudgetTerm]:
     """The budget of every block whose nominal model leaves more than noise.
@@ -47,16 +48,18 @@ def budget(
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
         Noise by block and recording.
-    final : Rig
-        The model with everything that was found.
+    nominal, final : Rig
+        The nominal model, and that with everything that was found.
 
     Returns
     -------
     list of BudgetTerm
-        Block by block: parameters inside their tolerances, then what is named, the largest first,
-        then what no name explains. The shares of a block add up to 1.
+        Block by block: effects that the nominal model holds already, parameters inside their
+        tolerances, then what is named, the largest first, then what no name explains. The shares
+        of a block add up to 1.
     """
     terms: list[BudgetTerm] = []
+    bare = _without_held(problem, nominal, found["before"])
     for one in judged:
         # what is left out again, term by term, where several are named
         partial = _without(one, problem, final)
@@ -67,10 +70,12 @@ def budget(
                     block, problem.recordings, residual, noise_level, problem.settings.noise
                 )
 
-            before = kept(found["before"])
+            acting = [(name, r) for name, r in bare if not name or acts_in(name, block)]
+            before = kept(acting[0][1])
             if not significant(before):
                 continue
-            stages: list[Stage] = [("parameters", "", kept(found["refit"]))]
+            stages: list[Stage] = [("held", name, kept(r)) for name, r in acting[1:]]
+            stages += [("parameters", "", kept(found["refit"]))]
             stages += [(_kind(name), name, kept(residual)) for name, residual in partial[:-1]]
             last = partial[-1][0] if partial else ""
             form = one.verdict == "unlisted" and one.group.closure is not None
@@ -79,6 +84,25 @@ def budget(
                 stages.append((kind, last, kept(found["after"])))
             terms += _terms(block, before, stages, one, final, problem.settings)
     return terms
+
+
+def _without_held(
+    problem: Problem, nominal: Rig, before: dict[Key, Residual]
+) -> list[tuple[str, dict[Key, Residual]]]:
+    """The residuals of the nominal model without the effects that it holds (under an empty name),
+    then with one id of them after the other.
+    """
+    ids = list(dict.fromkeys(entry["id"] for entry in nominal.effects))
+    out: list[tuple[str, dict[Key, Residual]]] = []
+    rig, now = nominal, before
+    try:
+        for later in reversed(ids):
+            out.insert(0, (later, now))
+            rig = rig.without_effect(later)
+            now = residuals(problem, rig)
+    except SimulationError:  # without it the model leaves its range: nothing to compare with
+        return [("", before)]
+    return [("", now), *out]
 
 
 def _kind(name: str) -> str:
@@ -131,7 +155,8 @@ def _terms(
     was = before
     for kind, name, now in stages:
         share, interval = _share(before, was, now, counts, draws)
-        chance = judged.probabilities.get(name, judged.probability(name)) if name else None
+        named = name and kind != "held"
+        chance = judged.probabilities.get(name, judged.probability(name)) if named else None
         yield BudgetTerm(
             block=block.name,
             kind=kind,

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
-from typing import Any
-
 import numpy as np
 
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, is_parameter, symptoms_of
+from pamrs.diagnosis.evidence import Candidate, Judged, symptoms_of
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
-from pamrs.effects import CATALOGUE, EFFECTS
-from pamrs.findings import BlockVerdict, ChannelError, Findings, NextExperiment, Where
+from pamrs.effects import CATALOGUE
+from pamrs.findings import BlockVerdict, ChannelError, Findings, Where
 from pamrs.recordings import Case
 from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
 from pamrs.rig import Rig
@@ -22,9 +18,7 @@ from pamrs.rig.schema import qualified
 
 __all__ = [
     "absolute",
-    "next_experiment",
     "reservations",
-    "same_data",
     "unknown_volumes",
     "verdict",
     "warnings",
@@ -262,93 +256,8 @@ def _unsettled(diagnosis: Findings) -> str:
     return f" It is not settled: these data do not separate {sets}." if sets else ""
 
 
-_SCALED = (
-    "Repeat the excitation under which the excess is largest at two speeds and at two payloads: "
-    "what scales with speed, with load or with neither shows the class of the missing effect."
-)
-_SCALED_EXCITATION: dict[str, Any] = {"kind": "repeat_scaled", "speed_ratio": 10.0, "payloads": 2}
-"""What to record of a mismatch without a name."""
-
-
-def _separating(names: Sequence[str]) -> tuple[str, dict[str, Any]]:
-    """What to record for the first of some hypotheses that says it; for what has no name where none
-    does.
-    """
-    told = (EFFECTS[name] for name in names if name in EFFECTS and EFFECTS[name].experiment)
-    info = next(told, None)
-    if info is None or ("unlisted" in names and names.index("unlisted") < names.index(info.id)):
-        return _SCALED, _SCALED_EXCITATION
-    return info.experiment, {
-        key: list(value) if isinstance(value, tuple) else value for key, value in info.excitation
-    }
-
-
 def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
-
-
-def _sentence(text: str) -> str:
-    return _capital(text) + "."
-
-
-def same_data(ambiguity: list[list[str]]) -> str:
-    """What tells the two most probable sets apart where they are the same data; empty where they
-    are not.
-    """
-    for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
-        for effect in one:
-            same = EFFECTS[effect].same_data if effect in EFFECTS else None
-            if same is not None and other == one - {effect} | {same.effect}:
-                return same.told_by
-    return ""
-
-
-def next_experiment(
-    kind: str,
-    probabilities: dict[str, float],
-    ambiguity: list[list[str]],
-    rig: Rig,
-    missing: Sequence[str] = (),
-) -> NextExperiment:
-    """What to record next: the experiment that separates the leading hypotheses, or describes
-    blocks with a mismatch that has no name.
-
-    It is not simulated, so that nothing is said of how much it would tell.
-    """
-    leading = max(probabilities, key=lambda k: probabilities[k])
-    if not ambiguity and kind != "unlisted" and missing:
-        text, excitation = _SCALED, _SCALED_EXCITATION
-        text = (
-            f"The name is settled. For the rest of the residual in the {' and '.join(missing)}: "
-            f"{text[:1].lower()}{text[1:]}"
-        )
-        return NextExperiment(text, excitation)
-    if not ambiguity and kind != "unlisted":
-        text = "The name is settled by these recordings; no further one is needed for it."
-        return NextExperiment(text, {}, 0.0)
-    same = same_data(ambiguity)
-    if same:
-        return NextExperiment(same)
-    untold = [k for s in ambiguity for k in s if k in EFFECTS and not EFFECTS[k].experiment]
-    parameters = [k for s in ambiguity for k in s if k == "parameters" or is_parameter(k)]
-    if parameters and untold:
-        return NextExperiment(_sentence(EFFECTS[untold[0]].separates))
-    measurable = [k for k in parameters if is_parameter(k)]
-    if measurable:
-        text = (
-            f"Measure {' or '.join(measurable)} by itself (scale, ruler, known volume): these "
-            "recordings cannot tell which is wrong."
-        )
-        return NextExperiment(text)
-    text, excitation = _separating([k for s in [leading.split("+"), *ambiguity] for k in s])
-    if not (rig.tables("valve") or rig.tables("muscle")):
-        text = (
-            "Repeat the hold at a third of the pressure and with the chamber removed (transducer "
-            "and fittings alone): a leak of the chamber scales with absolute pressure and goes "
-            "with it; cooling, the bench's own loss and the transducer's drift stay."
-        )
-        excitation = {"kind": "sealed_hold", "levels_bar": [2.5, 7.5], "hold_s": 600.0}
-    return NextExperiment(text, excitation)
 
 
 def warnings(

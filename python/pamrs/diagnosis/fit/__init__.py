@@ -5,7 +5,9 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where
 the fit of an effect begins); `form_in`, `with_effects_of` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
-`depends`, `fits` (where effects act).
+`depends`, `fits` (where effects act); `holdable`, `without_passing`, `named_entries`,
+`known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
+parameters).
 """
 
 from __future__ import annotations
@@ -24,6 +26,13 @@ from pamrs.diagnosis.fit._fitting import (
     residuals,
     stacked,
     with_priors,
+)
+from pamrs.diagnosis.fit._held import (
+    holdable,
+    known_parameters,
+    named_entries,
+    with_known,
+    without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._starts import CHOSEN, Start, form_in, starts_of, with_effects_of
@@ -48,11 +57,16 @@ __all__ = [
     "fits",
     "form_in",
     "free_baseline",
+    "holdable",
+    "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
+    "named_entries",
     "residuals",
     "stacked",
     "starts_of",
     "with_effects_of",
+    "with_known",
     "with_priors",
+    "without_passing",
 ]

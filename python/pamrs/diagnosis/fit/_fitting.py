@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.diagnosis.fit._acting import acts_in, depends
+from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
@@ -145,6 +146,17 @@ class Fit:
         return {name: moved for name, moved in self.moved.items() if name not in self.freed}
 
     @property
+    def effect_values(self) -> dict[str, float]:
+        """Parameters of the effects that were fitted, SI; not those of effects that the nominal
+        model holds.
+        """
+        return {
+            name: value
+            for name, value in self.values.items()
+            if name not in self.moved and name.partition(".")[0] in EFFECTS
+        }
+
+    @property
     def strain(self) -> float:
         """How far it had to leave the nominal values: the sum of squares of its priors."""
         return sum(moved * moved for moved in self.held_by_prior.values())
@@ -242,14 +254,16 @@ def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
 
 
 def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
-    """Baseline parameters with a finite tolerance that some block depends on."""
+    """Baseline parameters with a finite tolerance that some block depends on, those of effects that
+    the model holds included.
+    """
     differentiable = set(core_rig(nominal).parameter_names)
     return [
         name
-        for name, parameter in nominal.parameters.items()
+        for name, parameter in known_parameters(nominal, problem.settings.fit).items()
         if name in differentiable
         and 0.0 < parameter.tol < math.inf
-        and any(name in block.parameters for block in problem.blocks)
+        and any(depends(block, name) for block in problem.blocks)
     ]
 
 
@@ -270,7 +284,7 @@ class Scaling:
         self.names = [*baseline, *starts]
         self.forms = dict(forms or {})
         self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
-        known = nominal.parameters
+        self.known = known = known_parameters(nominal, settings)
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
         walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
@@ -303,7 +317,7 @@ class Scaling:
     def value(self, name: str, x: float) -> float:
         """A parameter [SI] from its scaled number."""
         if name in self.centre:
-            known = self.nominal.parameter(name)
+            known = self.known[name]
             return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
         info = find_parameter(name)
         found = self.starts[name] * math.exp(x) if name in LOGARITHMIC else x * self.scale[name]
@@ -316,7 +330,7 @@ class Scaling:
     def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
         """The model of scaled numbers, with effect parameters that are held."""
         values = {n: self.value(n, float(v)) for n, v in zip(self.names, x, strict=True)}
-        rig = self.nominal.with_parameters({n: values[n] for n in self.baseline})
+        rig = with_known(self.nominal, {n: values[n] for n in self.baseline})
         chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
         for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
             own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
@@ -457,7 +471,7 @@ def fit(
     SimulationError
         If the model leaves the range in which it holds where the fit starts.
     """
-    nominal = nominal.with_parameters(settled or {})
+    nominal = with_known(nominal, settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
     own = problem.settings.fit
     scaling = Scaling(nominal, baseline, starts, own, freed, forms)

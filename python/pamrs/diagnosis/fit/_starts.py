@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from pamrs.effects import EFFECTS, Form
@@ -78,10 +79,11 @@ def form_in(rig: Rig, effect: str) -> str:
     return next((e.get("form", "") for e in rig.effects if e["id"] == effect), "")
 
 
-def with_effects_of(rig: Rig, other: Rig) -> Rig:
-    """A rig with the effects of another one as well, in their forms."""
+def with_effects_of(rig: Rig, other: Rig, but: Collection[str] = ()) -> Rig:
+    """A rig with the effects of another one as well, in their forms, but for some ids."""
     for entry in other.effects:
-        rig = rig.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
+        if entry["id"] not in but:
+            rig = rig.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
     return rig
 
 

@@ -1,10 +1,11 @@
 """What to record next, and what some channels could tell before anything is recorded.
 
-Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `information`, `entropy`
-(experiments compared); `Experiment`, `Range`, `library`, `pressure_range`, `trial_of` (what a
-person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before there are data);
-`MEASURABLE`, `Left`, `Linear`, `checked_channels`, `difference`, `linear`, `misfit`, `problem_of`,
-`taken`, `usual_noise`, `weights_of` (how far two models differ).
+Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `apart`, `information`,
+`entropy`, `experiments_of`, `protocol_of`, `spoken` (experiments compared); `Experiment`, `Range`,
+`library`, `pressure_range`, `trial_of`, `is_sealed` (what a person can record); `Plan`, `Sight`,
+`Addition`, `plan_diagnosis` (before there are data); `MEASURABLE`, `Left`, `Linear`,
+`checked_channels`, `difference`, `linear`, `misfit`, `problem_of`, `taken`, `usual_noise`,
+`weights_of` (how far two models differ).
 """
 
 from __future__ import annotations
@@ -12,11 +13,15 @@ from __future__ import annotations
 from pamrs.diagnosis.next_experiment._choice import (
     Hypothesis,
     Outcome,
+    apart,
     entropy,
+    experiments_of,
     information,
     outcome_of,
     propose,
+    protocol_of,
     ranked,
+    spoken,
 )
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
@@ -36,6 +41,7 @@ from pamrs.diagnosis.next_experiment._planning import plan_diagnosis
 from pamrs.diagnosis.next_experiment._protocols import (
     Experiment,
     Range,
+    is_sealed,
     library,
     pressure_range,
     trial_of,
@@ -52,10 +58,13 @@ __all__ = [
     "Plan",
     "Range",
     "Sight",
+    "apart",
     "checked_channels",
     "difference",
     "entropy",
+    "experiments_of",
     "information",
+    "is_sealed",
     "library",
     "linear",
     "misfit",
@@ -64,7 +73,9 @@ __all__ = [
     "pressure_range",
     "problem_of",
     "propose",
+    "protocol_of",
     "ranked",
+    "spoken",
     "taken",
     "trial_of",
     "usual_noise",

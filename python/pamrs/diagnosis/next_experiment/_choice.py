@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,17 +29,28 @@ from pamrs.diagnosis.next_experiment._differences import (
     usual_noise,
     weights_of,
 )
-from pamrs.diagnosis.next_experiment._protocols import Experiment, library
+from pamrs.diagnosis.next_experiment._protocols import Experiment, is_sealed, library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.findings import Curves, NextExperiment, RankedExperiment
+from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, core_rig
+from pamrs.simulation import Simulation, core_rig, regulators_of
 
-__all__ = ["Outcome", "entropy", "information", "outcome_of", "propose", "ranked"]
+__all__ = [
+    "Outcome",
+    "apart",
+    "entropy",
+    "experiments_of",
+    "information",
+    "outcome_of",
+    "propose",
+    "protocol_of",
+    "ranked",
+    "spoken",
+]
 
 Array = NDArray[np.float64]
 Hypothesis = tuple[str, Rig, float]
@@ -190,7 +201,7 @@ def ranked(
     outcomes: Sequence[Outcome], probabilities: Sequence[float], resolution: float
 ) -> list[Outcome]:
     """Outcomes by what they tell, the most telling first; of those that tell the same, the
-    cheapest.
+    cheapest. What takes something that the rig file does not say to be there comes last.
 
     Parameters
     ----------
@@ -203,7 +214,11 @@ def ranked(
     """
     return sorted(
         outcomes,
-        key=lambda o: (-round(information(probabilities, o.distance) / resolution), o.effort),
+        key=lambda o: (
+            bool(o.experiment.needs),
+            -round(information(probabilities, o.distance) / resolution),
+            o.effort,
+        ),
     )
 
 
@@ -222,7 +237,8 @@ def propose(
     Parameters
     ----------
     nominal : Rig
-        The nominal model, without effects; what it can do decides which experiments there are.
+        The nominal model; what it can do and what its file allows decide which experiments there
+        are.
     hypotheses : sequence of (label, rig, probability)
         What is left: rigs as fitted, with their effects (``Rig.effect_std`` says how well their
         parameters are known, half of the value where it does not). What has no model, ``unlisted``,
@@ -244,9 +260,9 @@ def propose(
     NextExperiment
         ``text`` (what to do and why), ``excitation`` (kind and numbers),
         ``expected_information_bits`` (at most the entropy of the hypotheses), ``ranking`` (the best
-        few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``) and ``curves`` (what
+        few: ``name``, ``text``, ``sensor``, ``bits``, ``effort_s``), ``curves`` (what
         :func:`pamrs.report.figures.separating_curves` draws; None when there is nothing to tell
-        apart).
+        apart), ``pairs`` (what tells each two hypotheses apart) and ``protocol`` (the commands).
 
     Raises
     ------
@@ -275,7 +291,9 @@ def propose(
     if len(chosen) < 2 or uncertainty < own_settings.settled_entropy:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
-    pool = _library(nominal, records, own_settings) if experiments is None else list(experiments)
+    pool = list(experiments or [])
+    if experiments is None:
+        pool = experiments_of(nominal, records, own_settings)
     found: list[Outcome] = []
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
@@ -296,7 +314,8 @@ def propose(
     best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
     best = best_first[0]
     return NextExperiment(
-        text=_text(best, chosen, uncertainty, own_settings.hopeless_share),
+        text=_text(best, chosen, uncertainty, own_settings.hopeless_share)
+        + _with_more(best, best_first, own_settings.resolution),
         excitation={
             **best.experiment.excitation,
             **({"sensor": best.sensor} if best.sensor else {}),
@@ -309,7 +328,80 @@ def propose(
             for o in best_first[: own_settings.most_shown]
         ],
         curves=_curves(best, chosen),
+        pairs=_pairs(best_first, chosen, own_settings.resolution),
+        protocol=protocol_of(best.experiment),
     )
+
+
+def protocol_of(experiment: Experiment) -> Protocol | None:
+    """The commands of an experiment as a rig can play them; None where nothing is sent."""
+    if not experiment.commands:
+        return None
+    time = np.arange(experiment.rows, dtype=np.float64) * experiment.sample_time
+    units = {channel: unit_of(channel) for channel in experiment.commands}
+    return Protocol(experiment.name, time, experiment.commands, units)
+
+
+def apart(outcome: Outcome, i: int, j: int, *, nested: bool = False) -> tuple[str, float]:
+    """How far an experiment tells two hypotheses apart: the channel, and what the one misses of
+    what the other predicts, its parameters fitted again [noise levels].
+
+    That is the smaller of both ways; where the one is a case of the other (``nested``), and can
+    miss nothing, the larger.
+    """
+    both = (outcome.left[pair].largest for pair in ((i, j), (j, i)))
+    key, size = (max if nested else min)(both, key=lambda found: found[1])
+    return next(b.channel for b in outcome.problem.blocks if b.name == key[0]), size
+
+
+def _nested(one: Rig, other: Rig) -> bool:
+    """Whether the one model has every effect of the other."""
+    first, second = ({entry["id"] for entry in rig.effects} for rig in (one, other))
+    return first <= second or second <= first
+
+
+def _pairs(
+    outcomes: Sequence[Outcome], hypotheses: Sequence[Hypothesis], resolution: float
+) -> list[PairExperiment]:
+    """For every two hypotheses the experiment that tells most of these two, by what is there."""
+    there = [o for o in outcomes if not (o.experiment.needs or o.sensor)] or list(outcomes)
+    found = []
+    for i, j in itertools.combinations(range(len(hypotheses)), 2):
+        alone = [replace(o, distance=o.distance[np.ix_([i, j], [i, j])]) for o in there]
+        outcome = ranked(alone, [0.5, 0.5], resolution)[0]
+        (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
+        _, size = apart(outcome, i, j, nested=_nested(first, second))
+        sensor = f", with one more channel: {_plain(outcome.sensor)}" if outcome.sensor else ""
+        what = outcome.experiment.text
+        text = (
+            f"{what[:1].upper()}{what[1:]}{sensor}. If it is {spoken(one)}, a model with "
+            f"{spoken(other)} then misses the {_missed(outcome, i, j)}; the other way round it "
+            f"misses the {_missed(outcome, j, i)}."
+        )
+        found.append(PairExperiment([one, other], text, outcome.experiment.name, size))
+    return found
+
+
+def _missed(outcome: Outcome, i: int, j: int) -> str:
+    """What hypothesis j misses of what hypothesis i predicts, in words."""
+    key, size = outcome.left[i, j].largest
+    channel = next(b.channel for b in outcome.problem.blocks if b.name == key[0])
+    return f"{_plain(channel)} by {size:.2g} times the noise level"
+
+
+def _plain(channel: str) -> str:
+    return channel.replace("_", " ")
+
+
+def _with_more(best: Outcome, best_first: Sequence[Outcome], resolution: float) -> str:
+    """What an experiment would tell that takes something which the rig file does not list, where
+    that is more; else nothing.
+    """
+    others = [o for o in best_first if o.experiment.needs and o.bits > best.bits + resolution]
+    if best.experiment.needs or not others:
+        return ""
+    most = max(others, key=lambda o: o.bits)
+    return f" With {most.experiment.needs}, {most.bits:.2f} bit: {most.experiment.text}."
 
 
 def _checked(
@@ -355,37 +447,54 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
     return [name for name in sensors if name in has and name not in own]
 
 
-def _library(
-    rig: Rig, records: Sequence[Recording], settings: NextExperimentSettings
+def experiments_of(
+    rig: Rig,
+    records: Sequence[Recording],
+    settings: NextExperimentSettings,
+    only: Collection[str] | None = None,
 ) -> list[Experiment]:
-    """The experiments of the rig, at the sample time and up to the pressures of what was
-    recorded.
+    """The experiments of the rig (those of some kinds, if they are given), at the sample time and
+    up to the pressures of what was recorded.
+
+    Raises
+    ------
+    DiagnosisError
+        If there are none for such a rig.
     """
     if not records:
-        return library(rig, settings)
+        return library(rig, settings, only=only)
     usual, least, most = settings.sample_time, settings.least_sample_time, settings.most_sample_time
-    if rig.model["valve"] is None:
+    if is_sealed(rig):
         usual = settings.sealed_sample_time
         least, most = settings.least_sealed_sample_time, settings.most_sealed_sample_time
     step = min(max(min((r.sample_time for r in records), default=usual), least), most)
+    # a regulator was set to pressures that its chamber may not have reached
+    seen = ("muscle_pressure", "supply_command") if regulators_of(rig) else ("muscle_pressure",)
     peaks = [
-        float(np.nanmax(r.channels["muscle_pressure"]))
+        float(np.nanmax(r.channels[name]))
         for r in records
-        if "muscle_pressure" in r.channels and np.isfinite(r.channels["muscle_pressure"]).any()
+        for name in seen
+        if name in r.channels and np.isfinite(r.channels[name]).any()
     ]
     highest = max(peaks, default=0.0)
-    return library(
-        rig, settings, sample_time=step, highest=1.05 * highest if highest > 2e4 else None
-    )
+    limit = 1.05 * highest if highest > 2e4 else None
+    return library(rig, settings, sample_time=step, highest=limit, only=only)
 
 
-def _spoken(label: str) -> str:
-    """A hypothesis in words."""
-    names = [
-        EFFECTS[part].name if part in EFFECTS else f"another value of {part}"
-        for part in label.split("+")
-    ]
-    return " with ".join(names)
+_HEALTHY = {"none": "nothing missing", "parameters": "parameters inside their tolerances"}
+"""Hypotheses without a name, in words."""
+
+
+def spoken(label: str) -> str:
+    """A hypothesis in words: names joined by ``+``, ``parameters``, ``none`` or ``unlisted``."""
+
+    def told(part: str) -> str:
+        if part in EFFECTS:
+            return EFFECTS[part].name
+        words = {**_HEALTHY, "unlisted": "something that is not listed"}
+        return words.get(part, f"another value of {part}")
+
+    return " with ".join(told(part) for part in label.split("+"))
 
 
 def _text(
@@ -396,11 +505,9 @@ def _text(
         said += f", with one more channel: {best.sensor.replace('_', ' ')}"
     # of the leading pair: what the second one cannot explain of what the first one does
     j = min(range(1, len(hypotheses)), key=lambda k: (-round(hypotheses[k][2], 2), k))
-    key, size = best.left[0, j].largest
-    channel = next(b.channel for b in best.problem.blocks if b.name == key[0]).replace("_", " ")
     said += (
-        f". If it is {_spoken(hypotheses[0][0])}, a model with {_spoken(hypotheses[j][0])} then "
-        f"misses the {channel} by {size:.2g} times the noise level, whatever its parameters. The "
+        f". If it is {spoken(hypotheses[0][0])}, a model with {spoken(hypotheses[j][0])} then "
+        f"misses the {_missed(best, 0, j)}, whatever its parameters. The "
         f"expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of uncertainty."
     )
     if best.bits < hopeless * uncertainty:

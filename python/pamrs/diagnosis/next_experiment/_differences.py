@@ -43,7 +43,9 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-MEASURABLE = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle", "length")
+COMMANDS = ("valve_command", "supply_command")
+"""Channels that a person sends."""
+MEASURABLE = (*COMMANDS, "supply_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels that the cut chain uses."""
 
 
@@ -105,7 +107,7 @@ def taken(
     rng : numpy.random.Generator, optional
         Adds that noise; none by default.
     """
-    names = [c for c in MEASURABLE if c in run and (c == "valve_command" or c in noise)]
+    names = [c for c in MEASURABLE if c in run and (c in COMMANDS or c in noise)]
     channels = {c: np.asarray(run[c], dtype=np.float64) for c in names}
     if rng is not None:
         channels = {

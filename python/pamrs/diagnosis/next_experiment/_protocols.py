@@ -21,9 +21,9 @@ from pamrs.control import OrificeInverse
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, Simulator, simulate
+from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
 
-__all__ = ["Experiment", "Range", "library", "pressure_range", "trial_of"]
+__all__ = ["Experiment", "Range", "is_sealed", "library", "pressure_range", "trial_of"]
 
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
@@ -64,7 +64,8 @@ class Experiment:
     excitation : dict
         The same for a program: ``kind`` and numbers with their unit in the name.
     command : (n,) array or None
-        Valve command [V]; None for a chamber without a valve.
+        Valve command [V], or set pressure of a regulator [Pa, gauge]; None for a chamber without
+        either.
     rows : int
         Number of samples.
     sample_time : float
@@ -75,6 +76,10 @@ class Experiment:
         Parameters of the rig that the person changes (another payload), SI.
     effort : float
         What it costs, as time [s]: its length and what must be changed by hand.
+    channel : str
+        Channel of the command.
+    needs : str
+        What it takes that the rig file does not say to be there, in words; empty for nothing.
     """
 
     name: str
@@ -86,6 +91,13 @@ class Experiment:
     initial: dict[str, float] = field(default_factory=dict)
     changes: dict[str, float] = field(default_factory=dict)
     effort: float = 0.0
+    channel: str = "valve_command"
+    needs: str = ""
+
+    @property
+    def commands(self) -> dict[str, Array]:
+        """What is sent, by channel [SI]; empty where everything is done by hand."""
+        return {} if self.command is None else {self.channel: self.command}
 
     @property
     def duration(self) -> float:
@@ -104,13 +116,9 @@ class Experiment:
         SimulationError
             If the state leaves the range in which the model holds.
         """
-        length = {"duration": self.duration} if self.command is None else {}
+        driven: dict[str, Any] = dict(self.commands) or {"duration": self.duration}
         return simulate(
-            self.changed(rig),
-            self.command,
-            sample_time=self.sample_time,
-            initial=self.initial,
-            **length,
+            self.changed(rig), sample_time=self.sample_time, initial=self.initial, **driven
         )
 
 
@@ -193,19 +201,36 @@ def pressure_range(
     -------
     Range
         With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of
-        it; without one, from a tenth to six tenths of the supply's pressure.
+        it; without one, from a tenth to six tenths of the supply's pressure. Never above what the
+        rig file says that the stand allows.
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing says how high the set pressure of a regulator may go.
     """
     model = rig.model
-    if model["valve"] is None:
-        top = 7.0e5 if highest is None else highest
+    said = [p for p in (highest, rig.limits.get("max_pressure")) if p is not None]
+    most = min(said, default=math.inf)
+    if is_sealed(rig):
+        top = min(7.0e5, most) if highest is None else most
         return Range(0.35 * top, top)
-    top = min(0.8 * model["supply"]["initial_pressure"], math.inf if highest is None else highest)
+    regulated = bool(regulators_of(rig))
+    if regulated and not said:
+        raise DiagnosisError(
+            f"rig {rig.name!r} is fed by a regulator, and nothing says how high its pressure may "
+            "go: [limits] max_pressure of the rig file, or a recording of the pressure, is needed"
+        )
+    top = most if regulated else min(0.8 * model["supply"]["initial_pressure"], most)
     joint, load = model["joint"], model["load"]
     if model["arm"] is None and load is None:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
     ramp = np.linspace(0.0, top, 1501)
-    command = trial_of(rig, ramp, sample_time=0.01, bandwidth=settings.bandwidth)
-    found = simulate(rig, command, sample_time=0.01)
+    if regulated:
+        found = simulate(rig, supply_command=ramp, sample_time=0.01)
+    else:
+        command = trial_of(rig, ramp, sample_time=0.01, bandwidth=settings.bandwidth)
+        found = simulate(rig, command, sample_time=0.01)
     if load is None:
         share = (found["joint_angle"] - joint["rest_angle"]) / (
             joint["max_angle"] - joint["rest_angle"]
@@ -215,7 +240,13 @@ def pressure_range(
     pressure = np.maximum.accumulate(found["muscle_pressure"])
     low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
     high = float(pressure[np.argmax(share > 0.85)]) if (share > 0.85).any() else top
-    return Range(low, max(high, 1.2 * low)) if high > low else Range(0.3 * top, top)
+    high = min(max(high, 1.2 * low), top)
+    return Range(low, high) if high > low else Range(0.3 * top, top)
+
+
+def is_sealed(rig: Rig) -> bool:
+    """Whether nobody sends a command to a rig: a chamber without a valve and without a supply."""
+    return not (rig.tables("valve") or rig.tables("supply"))
 
 
 def _through(points: Points, sample_time: float) -> Array:
@@ -244,20 +275,37 @@ class _Maker:
 
     def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
         self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
+        self.regulated = bool(regulators_of(rig))
+        self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
 
     def driven(
         self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any
     ) -> Experiment:
         changes, initial = options.pop("changes", {}), options.pop("initial", {})
         extra, bandwidth = options.pop("extra", 0.0), options.pop("bandwidth", self.bandwidth)
+        needs = options.pop("needs", "")
         rig = self.rig.with_parameters(changes) if changes else self.rig
-        command = trial_of(
-            rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options
-        )
+        if self.regulated:
+            command = np.clip(reference, 0.0, self.span.high)
+        else:
+            command = trial_of(
+                rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options
+            )
         seconds = (reference.size - 1) * self.dt
         done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
+        channel = "supply_command" if self.regulated else "valve_command"
         return Experiment(
-            name, text, done, command, reference.size, self.dt, initial, changes, seconds + extra
+            name,
+            text,
+            done,
+            command,
+            reference.size,
+            self.dt,
+            initial,
+            changes,
+            seconds + extra,
+            channel,
+            needs,
         )
 
     def levels(self, *shares: float) -> tuple[list[float], str]:
@@ -272,7 +320,7 @@ class _Maker:
         for _ in range(cycles):
             points = _then(points, (0.5 * period, high), (0.5 * period, low))
         text = options.pop("text", "") + (
-            f"drive the muscle pressure as a triangle between {_bar(low):g} and {_bar(high):g} bar "
+            f"drive {self.what} as a triangle between {_bar(low):g} and {_bar(high):g} bar "
             f"with a period of {period:g} s, {cycles} cycles, the first one kept"
         )
         excitation = {
@@ -292,7 +340,7 @@ class _Maker:
             f"fill to {words}, shut the valve at each and hold it for {hold:g} s",
         )
 
-    def both_sides(self, hold: float = 16.0) -> Experiment:
+    def both_sides(self, hold: float = 16.0) -> Experiment | None:
         """Holds above and below the pressure at which equal leaks from the supply and to the
         ambient balance.
         """
@@ -301,6 +349,8 @@ class _Maker:
         supply = max(
             middle / 0.8 - ambient, 1.15 * self.span.at(0.8)
         )  # x = psi(x) of ISO 6358: 0.76 to 0.81
+        if supply > self.rig.model["supply"]["initial_pressure"]:
+            return None  # more than the supply gives
         pressures, words = self.levels(0.1, 0.8)
         text = (
             f"turn the supply down to {_bar(supply):g} bar, so that leaks through the valve's "
@@ -358,7 +408,7 @@ class _Maker:
         )
         low, high = self.span.at(0.1), self.span.at(0.9)
         text = (
-            f"drive the muscle pressure as a multisine of {frequencies[0]:g} to "
+            f"drive {self.what} as a multisine of {frequencies[0]:g} to "
             f"{frequencies[-1]:g} Hz between {_bar(low):g} and {_bar(high):g} bar for 30 s"
         )
         excitation = {"frequencies_hz": frequencies, "levels_bar": [_bar(low), _bar(high)]}
@@ -370,10 +420,7 @@ class _Maker:
         for share in shares:
             points = _then(points, (0.5, self.span.at(share)), (4.5, self.span.at(share)))
         _, words = self.levels(*shares[:4])
-        text = (
-            f"climb to {words} and down again, with the pressure regulated and held for 4.5 s at "
-            "each step"
-        )
+        text = f"climb to {words} and down again, with {self.what} held for 4.5 s at each step"
         excitation = {"levels_bar": [_bar(self.span.at(s)) for s in shares], "hold_s": 4.5}
         return self.driven("staircase", text, excitation, _through(points, self.dt))
 
@@ -388,8 +435,8 @@ class _Maker:
             (25.0, back),
         )
         text = (
-            f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep the pressure "
-            "regulated for 25 s after each"
+            f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep "
+            f"{self.what} there for 25 s after each"
         )
         excitation = {"levels_bar": [_bar(up), _bar(back)], "hold_s": 25.0}
         return self.driven("long_hold", text, excitation, _through(points, self.dt))
@@ -427,9 +474,9 @@ class _Maker:
                     (0.25 * period, middle),
                 )
         text = (
-            f"drive nested triangles around {_bar(middle):g} bar, of ±{_bar(reach):g}, "
-            f"±{_bar(0.6 * reach):g} and ±{_bar(0.3 * reach):g} bar, first with a period of 12 s, "
-            "then of 1.2 s"
+            f"drive {self.what} in nested triangles around {_bar(middle):g} bar, of "
+            f"±{_bar(reach):g}, ±{_bar(0.6 * reach):g} and ±{_bar(0.3 * reach):g} bar, first with "
+            "a period of 12 s, then of 1.2 s"
         )
         excitation = {
             "middle_bar": _bar(middle),
@@ -480,13 +527,45 @@ class _Maker:
         except SimulationError:
             return None
 
-    def other_payload(self) -> Experiment:
+    def set_steps(self) -> Experiment:
+        base, small, large = self.span.at(0.05), self.span.at(0.3), self.span.at(0.8)
+        points: Points = _then([(0.0, 0.0)], (1.5, base), (2.0, base))
+        for goal in (small, base, large, base):
+            points = _then(points, (0.0, goal), (5.0, goal))
+        text = (
+            f"step {self.what} from {_bar(base):g} bar to {_bar(small):g} bar and back, then to "
+            f"{_bar(large):g} bar and back (sizes 1:3), and keep each for 5 s"
+        )
+        excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "hold_s": 5.0}
+        return self.driven("set_steps", text, excitation, _through(points, self.dt))
+
+    def fine_staircase(self) -> Experiment:
+        middle, step = self.span.at(0.5), 0.01 * (self.span.high - self.span.low)
+        points: Points = _then([(0.0, 0.0)], (2.0, middle), (2.0, middle))
+        for k in (*range(1, 7), *range(5, -7, -1), *range(-5, 1)):
+            points = _then(points, (0.0, middle + k * step), (1.5, middle + k * step))
+        text = (
+            f"move {self.what} by single steps of {step * 1e-5:.2g} bar, six up from "
+            f"{_bar(middle):g} bar, twelve down and six up again, 1.5 s each"
+        )
+        excitation = {"middle_bar": _bar(middle), "step_bar": round(step * 1e-5, 4), "hold_s": 1.5}
+        return self.driven("fine_staircase", text, excitation, _through(points, self.dt))
+
+    def other_payload(self) -> Experiment | None:
         name = "load.mass" if self.rig.model["load"] else "arm.payload"
-        other = 0.5 * self.rig.parameters[name].value
+        now = self.rig.parameter(name).value
+        listed = self.rig.limits.get("payloads")
+        least = self.rig.parameter(name).lower
+        others = [m for m in listed or [] if m >= least and not math.isclose(m, now)]
+        if (listed is not None and not others) or (listed is None and now <= 0.0):
+            return None
+        other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
+        needs = "" if others else f"another payload, about {other:.3g} kg"
         text = f"change the payload to {other:.3g} kg and "
         also = {"payload_kg": round(other, 3)}
+        changes = {name: other}
         return self.triangle(
-            "other_payload", 12.0, 2, text=text, also=also, changes={name: other}, extra=90.0
+            "other_payload", 12.0, 2, text=text, also=also, changes=changes, extra=90.0, needs=needs
         )
 
 
@@ -498,9 +577,10 @@ def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experimen
         ("hold_short", span.high, 120.0),
         ("hold_long", span.high, 1800.0),
     ):
+        then = "open its outlet" if rig.tables("line") else "shut it off"
         text = (
-            f"fill the chamber to {_bar(pressure):g} bar, shut it off and record {seconds:g} s "
-            "from that moment"
+            f"fill the chamber to {_bar(pressure):g} bar, {then} and record {seconds:g} s from "
+            "that moment"
         )
         excitation = {"kind": name, "levels_bar": [_bar(pressure)], "duration_s": seconds}
         rows = round(seconds / sample_time) + 1
@@ -533,8 +613,8 @@ def library(
     Parameters
     ----------
     rig : Rig
-        A rig of one chain: with a valve and an arm or a hanging load, with a valve alone, or a
-        sealed chamber.
+        A rig of one chain: with a valve or a regulator, with or without an arm or a hanging load;
+        or a chamber that nobody sends a command to.
     settings : NextExperimentSettings
         Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
@@ -555,13 +635,14 @@ def library(
             f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for "
             "rigs of one chain"
         )
-    if not rig.tables("valve") and (rig.tables("supply") or rig.tables("muscle")):
+    regulated = bool(regulators_of(rig)) and not rig.tables("valve")
+    if not rig.tables("valve") and not regulated and (rig.tables("supply") or rig.tables("muscle")):
         raise DiagnosisError(
-            f"rig {rig.name!r} has no valve that a person could command; experiments need one, or "
-            "a sealed chamber"
+            f"rig {rig.name!r} has no valve that a person could command, and no regulator; "
+            "experiments need one, or a sealed chamber"
         )
     span = pressure_range(rig, settings, highest=highest)
-    if rig.model["valve"] is None:
+    if is_sealed(rig):
         sealed = _sealed_library(
             rig, settings.sealed_sample_time if sample_time is None else sample_time, span
         )
@@ -581,9 +662,13 @@ def library(
         "null_ramp": make.null_ramp,
         "holds_both_sides": make.both_sides,
     }
+    if regulated:
+        hold = ("multisine", "slow_triangle", "staircase", "long_hold", "nested_triangles")
+        makers = {name: makers[name] for name in (*hold, "fast_triangle")}
+        makers |= {"set_steps": make.set_steps, "fine_staircase": make.fine_staircase}
     if rig.model["arm"] is not None or rig.model["load"] is not None:
         makers |= {"other_payload": make.other_payload}
-    if rig.model["arm"] is not None:
+    if rig.model["arm"] is not None and not regulated:
         makers |= {"free_decay": make.free_decay}
     out = []
     for name, maker in makers.items():
@@ -593,6 +678,16 @@ def library(
             found = maker()
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
-        if found is not None:
+        if found is not None and not _exceeds(found, rig):
             out.append(found)
     return out
+
+
+def _exceeds(experiment: Experiment, rig: Rig) -> bool:
+    """Whether an experiment goes beyond the pressure that the rig file says the stand allows: what
+    a command is found for is overshot where the valve is far open.
+    """
+    most = rig.limits.get("max_pressure")
+    if most is None:
+        return False
+    return bool(experiment.simulate(rig)["muscle_pressure"].max() > most)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pamrs.diagnosis.evidence import autocorrelation_of
-from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, fit
+from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, fit, known_parameters
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -45,7 +45,7 @@ def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit
     )
     if 2.0 * first.cost < settings.margin * rows:
         return first
-    known = nominal.parameters
+    known = known_parameters(nominal, problem.settings.fit)
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
     try:
         second = thorough(problem, nominal, inflation, replace(first, values=mirrored))

@@ -21,7 +21,17 @@ from pamrs.diagnosis.evidence import (
     unlikely,
     visited,
 )
-from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fit, residuals, stacked
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    fit,
+    known_parameters,
+    residuals,
+    stacked,
+)
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.screen import Screen, by_effect, inclusion, screen
 from pamrs.errors import SimulationError
@@ -240,6 +250,7 @@ def _instead(
 ) -> dict[str, Begun]:
     """Effects that do what a parameter was moved far for."""
     settings = trial.settings.below_noise
+    known = known_parameters(trial.nominal, trial.settings.fit)
     _, jacobian = stacked(trial.inner, found.residuals, autocorrelation)
     best: dict[str, tuple[float, Begun]] = {}
     for name, moved in found.moved.items():
@@ -256,7 +267,7 @@ def _instead(
                 size = math.copysign(sizes[1] / sizes[0], cosine)
                 best[effect] = (
                     match,
-                    Begun(start.scaled(size), {name: trial.nominal.parameter(name).value}),
+                    Begun(start.scaled(size), {name: known[name].value}),
                 )
     nearest = sorted(best, key=lambda e: -best[e][0])[: settings.most_fitted]
     return {effect: best[effect][1] for effect in nearest}

@@ -24,7 +24,7 @@ from pamrs.diagnosis.evidence import (
     weigh,
     without_autocorrelation,
 )
-from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, fits, residuals
+from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, depends, fits, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen, stand_of
@@ -172,8 +172,11 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
 
 
 def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
-    """Effects of the catalogue that the rig can have and that act in some blocks."""
-    return [e for e in CATALOGUE if fits(trial.nominal, e) and any(acts_in(e, b) for b in blocks)]
+    """Effects of the catalogue that the rig can have, that it does not hold already and that act in
+    some blocks.
+    """
+    lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
+    return [e for e in lacking if any(acts_in(e, b) for b in blocks)]
 
 
 def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
@@ -513,7 +516,7 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
 def _acts(candidate: Candidate, block: Block) -> bool:
     """Whether what a hypothesis names acts in a block."""
     return any(acts_in(e, block) for e in candidate.effects) or any(
-        name in block.parameters for name in candidate.wrong
+        depends(block, name) for name in candidate.wrong
     )
 
 

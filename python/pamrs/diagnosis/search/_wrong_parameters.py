@@ -17,7 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.evidence import Attempts, Candidate, Group, significant
-from pamrs.diagnosis.fit import Fit, Problem, levenberg_marquardt, stacked, with_priors
+from pamrs.diagnosis.fit import (
+    Fit,
+    Problem,
+    known_parameters,
+    levenberg_marquardt,
+    stacked,
+    with_priors,
+)
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import WrongParameterSettings
 from pamrs.rig import Rig
@@ -187,7 +194,7 @@ def _predicted_gain(
     triangle: Array = np.asarray(np.linalg.qr(np.column_stack([scaled, rows]), mode="r"))
     slopes, left = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
-    known = nominal.parameters
+    known = known_parameters(nominal, settings)
     low, high = (
         np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names])
         for end in ("lower", "upper")

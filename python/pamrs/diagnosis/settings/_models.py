@@ -31,6 +31,16 @@ class FitSettings(SettingsGroup):
         "that is freed from its prior may move",
         origin="docs/decisions/0025",
     )
+    held_share: float = setting(
+        0.3,
+        unit="1",
+        least=0.0,
+        reason=(
+            "tolerance of a parameter of an effect that the nominal model holds, as a share of its "
+            "value, at the least: its standard deviation came of a model that lacked something"
+        ),
+        origin="docs/decisions/0034",
+    )
     least_scale: float = setting(
         0.01,
         unit="1",

@@ -1,0 +1,377 @@
+"""What to record next: simulated with every hypothesis that has a model, where two or more are
+left; else by the block in which the mismatch is, as commands that the rig can play.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from pamrs.diagnosis.evidence import HEALTHY, Judged, is_parameter
+from pamrs.diagnosis.fit import Problem, depends
+from pamrs.diagnosis.next_experiment import (
+    Experiment,
+    Hypothesis,
+    apart,
+    experiments_of,
+    is_sealed,
+    outcome_of,
+    propose,
+    protocol_of,
+    spoken,
+    usual_noise,
+)
+from pamrs.diagnosis.prepare import Block, Prepared
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.findings import NextExperiment, PairExperiment
+from pamrs.rig import Rig
+from pamrs.simulation import regulators_of
+
+__all__ = ["next_experiment"]
+
+
+@dataclass(frozen=True)
+class _Telling:
+    """What tells most about a block whatever is missing there.
+
+    Attributes
+    ----------
+    kind : str
+        Kind of an experiment of the library.
+    text : str
+        The same in words, for a rig of which the library makes none.
+    shows : str
+        What it shows.
+    """
+
+    kind: str
+    text: str
+    shows: str
+
+
+_LOOPS = _Telling(
+    "nested_triangles",
+    "move slowly through nested loops of three widths, then ten times as fast, inside the "
+    "pressures that are already recorded",
+    "what grows with the speed, with the width of the loop or with neither shows the class of "
+    "what is missing",
+)
+_SHUT = _Telling(
+    "step_and_shut",
+    "step the pressure by two sizes, 1:3, inside the pressures that are already recorded, shut the "
+    "valve after each step and watch for 4 s",
+    "what goes on while the valve is shut is the chamber's own, what fades within seconds is heat "
+    "or a lag, what is there only during the step goes with the flow",
+)
+_HOLDS = _Telling(
+    "sealed_hold",
+    "fill to three pressures, shut the valve at each and hold it for 16 s",
+    "what the supply pressure does while the valve is shut is the supply's own, what it does only "
+    "while air is drawn goes with the flow",
+)
+_SET = _Telling(
+    "set_steps",
+    "step the set pressure by two sizes, 1:3, up and down, inside the pressures that are already "
+    "recorded, and keep each for 5 s",
+    "what comes late is a lag, what is less the more air flows is a droop or a restriction, what "
+    "stays away from the set pressure at rest is an offset or a dead band",
+)
+_ONCE_MORE = _Telling(
+    "hold_low",
+    "repeat the hold at a third of the pressure",
+    "repeated with the chamber removed (transducer and fittings alone), a leak of the chamber "
+    "scales with absolute pressure and goes with it; cooling, the bench's own loss and the "
+    "transducer's drift stay",
+)
+_BLOWN = replace(
+    _ONCE_MORE,
+    text="let it blow down from a third of the pressure",
+    shows="an opening lets through the same share of the pressure at every pressure, and a hold "
+    "with the outlet shut shows what else the chamber loses",
+)
+
+
+def _telling(block: Block, rig: Rig) -> _Telling:
+    """What tells most about a block of a rig whatever is missing there."""
+    if block.kind == "arm":
+        return _LOOPS
+    if is_sealed(rig):
+        lines = rig.tables("line") or rig.tables("muscle") or len(rig.tables("chamber")) > 1
+        return _BLOWN if lines else _ONCE_MORE
+    if regulators_of(rig) and not rig.tables("valve"):
+        return _SET
+    return _HOLDS if block.kind == "supply" else _SHUT
+
+
+@dataclass(frozen=True, eq=False)
+class _Question:
+    """What is asked of a next experiment.
+
+    Attributes
+    ----------
+    nominal : Rig
+        The nominal model.
+    judged : list of Judged
+        The groups of blocks with their verdicts.
+    blocks : list of Block
+        All blocks.
+    recordings : list of Prepared
+        What there is already.
+    problem : Problem
+        Any of them, for its settings.
+    """
+
+    nominal: Rig
+    judged: list[Judged]
+    blocks: list[Block]
+    recordings: list[Prepared]
+    problem: Problem
+
+    @property
+    def noise(self) -> dict[str, float]:
+        """Sample noise of the channels that all recordings have [SI]."""
+        common = set.intersection(*(set(p.noise) for p in self.recordings))
+        return {
+            channel: float(np.median([p.noise[channel] for p in self.recordings]))
+            for channel in sorted(common)
+        }
+
+    def place(self, names: Iterable[str]) -> Block:
+        """The block that a question about some names is about: where the group that has one of them
+        keeps its mismatch, or else the group that is most likely to lack what has no name.
+        """
+        own = {n for n in names if n in EFFECTS or is_parameter(n)}
+
+        def merit(judged: Judged) -> tuple[bool, bool, float]:
+            there = {n for s in judged.ambiguity for n in s} | {*judged.named, *judged.wrong}
+            kept = judged.group.mismatch is not None
+            return bool(own & there), kept, judged.probabilities.get("unlisted", 0.0)
+
+        group = max(self.judged, key=merit).group
+        acting = [b for b in group.blocks if any(depends(b, n) for n in own)]
+        found = group.mismatch
+        if found is not None and (found in acting or not acting):
+            return found
+        return acting[0] if acting else group.blocks[-1]
+
+    def experiment(self, block: Block) -> tuple[str, str, Experiment | None]:
+        """What to do about a block, what it shows, and the experiment where the library makes it
+        for this rig.
+        """
+        telling = _telling(block, self.nominal)
+        records = [p.recording for p in self.recordings]
+        settings = self.problem.settings.next_experiment
+        pool: list[Experiment] = []
+        with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
+            pool = experiments_of(self.nominal, records, settings, {telling.kind})
+        if pool:
+            return pool[0].text, telling.shows, pool[0]
+        return telling.text, telling.shows, None
+
+
+def next_experiment(
+    verdict: str,
+    ambiguity: list[list[str]],
+    hypotheses: Sequence[Hypothesis],
+    nominal: Rig,
+    judged: list[Judged],
+    fitted: Problem,
+    held: Problem,
+) -> NextExperiment:
+    """What to record next.
+
+    Parameters
+    ----------
+    verdict : str
+        Of the case.
+    ambiguity : list of list of str
+        Sets of names that are left open.
+    hypotheses : sequence of (label, rig, probability)
+        Those that have a model, as fitted.
+    nominal : Rig
+        The nominal model.
+    judged : list of Judged
+        The groups with their verdicts.
+    fitted, held : Problem
+        Recordings to fit and held-out ones (the same object when there are no others).
+
+    Returns
+    -------
+    NextExperiment
+        With what tells each open pair apart, and commands that the rig can play.
+    """
+    recordings = [*fitted.recordings, *(held.recordings if held is not fitted else [])]
+    asked = _Question(nominal, judged, fitted.blocks, recordings, fitted)
+    same = same_data(ambiguity)
+    simulated: NextExperiment | None = None
+    if ambiguity and len(hypotheses) > 1 and not same:
+        with contextlib.suppress(
+            DiagnosisError, ParameterError, SimulationError
+        ):  # a rig that no experiment of the library suits
+            simulated = propose(
+                nominal, hypotheses, asked.noise, recordings, settings=fitted.settings
+            )
+    if simulated is not None and not simulated.excitation:
+        simulated = None  # of what is open one has a model
+    known = simulated.pairs if simulated is not None else []
+    pairs = _pairs(asked, ambiguity, hypotheses, known)
+    if simulated is not None:
+        return replace(simulated, pairs=pairs)
+    if same:
+        return NextExperiment(same, pairs=pairs)
+    return replace(_told(asked, verdict, ambiguity), pairs=pairs)
+
+
+def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExperiment:
+    """What to record where no two hypotheses could be simulated."""
+    missing = [
+        j.group.mismatch
+        for j in asked.judged
+        if j.verdict == "unlisted" and j.group.mismatch is not None
+    ]
+    if not ambiguity and verdict != "unlisted" and not missing:
+        text = "The name is settled by these recordings; no further one is needed for it."
+        return NextExperiment(text, {}, 0.0)
+    names = [name for names in ambiguity for name in names]
+    measurable = [n for n in names if is_parameter(n)]
+    if measurable and all(is_parameter(n) for n in names):
+        return NextExperiment(_measured(measurable) + ".")
+    settled = not ambiguity and verdict != "unlisted"
+    block = missing[0] if missing and not ambiguity else asked.place(names or [verdict])
+    what, shows, experiment = asked.experiment(block)
+    begin = "The name is settled. For the rest of the residual in the" if settled else "For the"
+    rest = " and ".join(dict.fromkeys(b.name for b in missing)) if settled else block.name
+    text = f"{begin} {rest}: {what}; {shows}."
+    excitation: dict[str, Any] = {"kind": _telling(block, asked.nominal).kind, "block": block.name}
+    if experiment is None:
+        return NextExperiment(text, excitation)
+    excitation |= experiment.excitation
+    return NextExperiment(text, excitation, protocol=protocol_of(experiment))
+
+
+def _pairs(
+    asked: _Question,
+    ambiguity: list[list[str]],
+    hypotheses: Sequence[Hypothesis],
+    known: Sequence[PairExperiment],
+) -> list[PairExperiment]:
+    """What tells each two of the sets that are left open from each other; that something else is
+    missing beside a name is a question by itself.
+    """
+    sets = [[n for n in names if n != "unlisted" or len(names) == 1] for names in ambiguity]
+    if any("unlisted" in names for names in ambiguity):
+        sets.append(["unlisted"])
+    unique = list({frozenset(names): names for names in sets}.values())
+    found = []
+    for one, other in itertools.combinations(unique, 2):
+        labels = ["+".join(one), "+".join(other)]
+        simulated = next((p for p in known if _same(p.between, labels)), None)
+        found.append(
+            replace(simulated, between=labels)
+            if simulated is not None
+            else _pair(asked, one, other, hypotheses)
+        )
+    return found
+
+
+def _same(one: Sequence[str], other: Sequence[str]) -> bool:
+    """Whether two pairs of labels are of the same names."""
+
+    def names(labels: Sequence[str]) -> set[frozenset[str]]:
+        # whether parameters moved inside their tolerances is no other answer
+        plain = ("none" if label in HEALTHY else label for label in labels)
+        return {frozenset(label.split("+")) for label in plain}
+
+    return names(one) == names(other)
+
+
+def _pair(
+    asked: _Question, one: list[str], other: list[str], hypotheses: Sequence[Hypothesis]
+) -> PairExperiment:
+    """What tells two sets apart that were not both simulated."""
+    labels = ["+".join(one), "+".join(other)]
+    same = same_data([one, other])
+    if same:
+        return PairExperiment(labels, same)
+    differing = sorted(set(one) ^ set(other))
+    block = asked.place([*one, *other])
+    what, shows, experiment = asked.experiment(block)
+    kind = "" if experiment is None else experiment.name
+    if "unlisted" not in differing:
+        values = [n for n in differing if is_parameter(n)]
+        if values:
+            return PairExperiment(
+                labels, f"{_measured(values)}; or, for the {block.name}: {what}; {shows}.", kind
+            )
+        effects = [n for n in differing if n in EFFECTS]
+        why = f" {spoken(effects[0])}: {EFFECTS[effects[0]].separates}." if effects else ""
+        return PairExperiment(labels, f"For the {block.name}: {what}; {shows}.{why}", kind)
+    names = next(names for names in (one, other) if "unlisted" not in names)
+    listed = "+".join(names)
+    text = (
+        f"For the {block.name}: {what}. A model with {spoken(listed)}, fitted to what there is, "
+        "has to predict that to the noise without being fitted again; what it misses is something "
+        "that is not listed"
+    )
+    values = [n for n in names if is_parameter(n)]
+    told = _weight(asked, set(names), hypotheses, experiment)
+    if told is not None:
+        channel, size = told
+        text += (
+            f" (without {spoken(listed)} the model would miss the {channel.replace('_', ' ')} by "
+            f"{size:.2g} times the noise level)"
+        )
+    text += f". {_measured(values)}." if values else "."
+    return PairExperiment(labels, text, kind, None if told is None else told[1])
+
+
+def _weight(
+    asked: _Question,
+    names: set[str],
+    hypotheses: Sequence[Hypothesis],
+    experiment: Experiment | None,
+) -> tuple[str, float] | None:
+    """What a model without some names misses of what they do in an experiment: channel and noise
+    levels; None where it cannot be simulated.
+    """
+    of = {frozenset(label.split("+")): rig for label, rig, _ in hypotheses}
+    own = next((rig for label, rig in of.items() if names and names <= label), None)
+    effects = [n for n in names if n in EFFECTS]
+    if own is None or experiment is None or not effects:
+        return None
+    bare = own
+    for effect in effects:
+        bare = bare.without_effect(effect)
+    settings = asked.problem.settings
+    channels = tuple(asked.recordings[0].recording.channels)
+    noise = {**usual_noise(settings.next_experiment), **asked.noise}
+    pair = [("with", own, 0.5), ("without", bare, 0.5)]
+    with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
+        return apart(outcome_of(experiment, pair, noise, channels, settings), 0, 1, nested=True)
+    return None
+
+
+def _measured(names: Sequence[str]) -> str:
+    """How values of the rig file are told from what looks like them."""
+    return (
+        f"Measure {' or '.join(names)} by itself (scale, ruler, known volume): these recordings "
+        "cannot tell which is wrong"
+    )
+
+
+def same_data(ambiguity: list[list[str]]) -> str:
+    """What tells the two most probable sets apart where they are the same data; empty where they
+    are not.
+    """
+    for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
+        for effect in one:
+            same = EFFECTS[effect].same_data if effect in EFFECTS else None
+            if same is not None and other == one - {effect} | {same.effect}:
+                return same.told_by
+    return ""

@@ -1,0 +1,104 @@
+"""Effects that the nominal model already holds: part of the baseline, each parameter inside what is
+known of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pamrs.diagnosis.fit._starts import CHOSEN
+from pamrs.diagnosis.settings import FitSettings
+from pamrs.effects import CATALOGUE, EFFECTS, Form
+from pamrs.rig import Parameter, Rig
+from pamrs.rig.schema import qualified
+
+__all__ = ["holdable", "known_parameters", "named_entries", "with_known", "without_passing"]
+
+_FIXED = (*CHOSEN, "threshold")
+"""Roles of parameters that stay as the model has them: no fit has a slope in them."""
+
+
+def named_entries(rig: Rig) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Each effect of a rig with the name that its parameters begin with: its id, and behind a dot
+    the block where several have that id.
+    """
+    entries = rig.effects
+    ids = [entry["id"] for entry in entries]
+    for entry in entries:
+        alone = ids.count(entry["id"]) == 1
+        yield entry["id"] if alone else qualified(entry["id"], entry.get("at", "")), entry
+
+
+def _form(entry: Mapping[str, Any]) -> Form:
+    return EFFECTS[entry["id"]].form(entry.get("form", ""))
+
+
+def holdable(entry: Mapping[str, Any]) -> bool:
+    """Whether an effect of a model can be part of a baseline that all recordings share: a name of
+    the catalogue, in a form that acts all the time.
+    """
+    return entry["id"] in CATALOGUE and not _form(entry).transient
+
+
+def without_passing(rig: Rig) -> Rig:
+    """A rig without the effects that no baseline can hold: what happens at times of its own in each
+    recording, and forms without a name.
+    """
+    for entry in rig.effects:
+        if not holdable(entry):
+            rig = rig.without_effect(entry["id"], at=entry.get("at", ""))
+    return rig
+
+
+def known_parameters(rig: Rig, settings: FitSettings) -> dict[str, Parameter]:
+    """Parameters of a rig and of the effects that it holds, by dotted name, SI.
+
+    What is known of an effect's parameter is the standard deviation of the file, but not less than
+    a share of the value: that deviation came from a model in which what is looked for now was still
+    missing, and maybe from the same recordings.
+    """
+    found = dict(rig.parameters)
+    spread = rig.effect_std
+    for full, entry in named_entries(rig):
+        known = spread.get(full, {})
+        for info in _form(entry).parameters:
+            value = entry["parameters"][info.name]
+            least = settings.held_share * abs(value)
+            tol = 0.0 if info.role in _FIXED else max(known.get(info.name, 0.0), least)
+            name = f"{full}.{info.name}"
+            found[name] = Parameter(name, value, info.unit, tol, info.lower, info.upper)
+    return found
+
+
+def with_known(
+    rig: Rig, values: Mapping[str, float], std: Mapping[str, float] | None = None
+) -> Rig:
+    """A rig with other values of its own parameters and of those of the effects that it holds.
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    values : mapping of str to float
+        Dotted name -> SI value.
+    std : mapping of str to float, optional
+        Standard deviations of effects' parameters, SI, by dotted name; others stay as they are.
+    """
+    given = std or {}
+    spread, own = rig.effect_std, set()
+    for full, entry in named_entries(rig):
+        names = {f"{full}.{short}": short for short in entry["parameters"]}
+        mine = {short: values[name] for name, short in names.items() if name in values}
+        known = {short: given[name] for name, short in names.items() if name in given}
+        own |= set(names)
+        if mine or known:
+            rig = rig.with_effect(
+                entry["id"],
+                entry["parameters"] | mine,
+                std=spread.get(full, {}) | known,
+                at=entry.get("at", ""),
+                form=entry.get("form", ""),
+            )
+    rest = {name: value for name, value in values.items() if name not in own}
+    return rig.with_parameters(rest) if rest else rig

@@ -1,0 +1,311 @@
+"""The next experiment: about the block of the mismatch, inside what the stand allows, for each open
+pair, as commands that a rig plays; and as telling as it says.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.explain._next import _pair, _Question, _telling
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.next_experiment import (
+    Experiment,
+    entropy,
+    library,
+    linear,
+    misfit,
+    outcome_of,
+    problem_of,
+    propose,
+    taken,
+    usual_noise,
+)
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.errors import DiagnosisError, RigError
+from pamrs.recordings import Recording, load_recording
+from pamrs.simulation import core_rig, replay
+from tests.diagnosis import again
+
+SETTINGS = DiagnosisSettings()
+OWN = SETTINGS.next_experiment
+NOISE = usual_noise(OWN)
+SHOULDER = pamrs.rigs.shoulder()
+REGULATED = pamrs.rigs.named("regulated_joint")
+SENSORS = ("supply_pressure", "muscle_pressure", "joint_angle")
+OPEN = replace(
+    SETTINGS,
+    verdict=replace(SETTINGS.verdict, settled=0.99999, in_set=5e-4),
+    next_experiment=replace(OWN, simulated_from=5e-4, least_probability=5e-4),
+)
+"""Settings by which hardly anything is settled."""
+
+
+def limited(rig: pamrs.Rig, text: str, folder: Path) -> pamrs.Rig:
+    """A rig whose file says what the stand allows."""
+    file = folder / "limited.toml"
+    file.write_text(f"{rig.to_toml_text()}\n[limits]\n{text}\n", encoding="utf-8")
+    return pamrs.load_rig(file)
+
+
+PAIRS = {
+    "friction or creep": (
+        SHOULDER,
+        ("muscle_hysteresis", {"friction_constant": 0.5, "friction_pressure": 5e-6}),
+        ("muscle_creep", {"stiffness": 60.0, "time_constant": 3.0}),
+        ("staircase", "nested_triangles"),
+    ),
+    "leaks": (
+        SHOULDER,
+        ("leak_muscle", {"conductance": 5e-11}),
+        ("valve_centre_leakage", {"conductance": 5e-12}),
+        ("step_and_shut", "multisine"),
+    ),
+    "regulator or sensor": (
+        REGULATED,
+        ("supply_regulator_deadband", {"dead_band": 2e3}),
+        ("pressure_lag", {}),
+        ("fast_triangle", "set_steps"),
+    ),
+}
+
+
+@pytest.mark.parametrize("pair", PAIRS)
+def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
+    rig, one, other, names = PAIRS[pair]
+    rivals = [rig.with_effect(*one), rig.with_effect(*other)]
+    hypotheses = [(one[0], rivals[0], 0.5), (other[0], rivals[1], 0.5)]
+    pool = library(rig, OWN, sample_time=0.01, highest=4e5, only=names)
+    channels = (pool[0].channel, *SENSORS)
+    proposed = propose(rig, hypotheses, NOISE, channels=channels, experiments=pool)
+    chosen = next(e for e in pool if e.name == proposed.excitation["kind"])
+    outcome = outcome_of(chosen, hypotheses, NOISE, channels, SETTINGS)
+    bits = []
+    for i, j in ((0, 1), (1, 0)):
+        gained, missed = [], []
+        key, predicted = outcome.left[i, j].largest
+        for seed in range(4):
+            # the rig of hypothesis i plays the experiment, with the noise of its sensors
+            run = chosen.simulate(rivals[i])
+            heard = {c: v for c, v in NOISE.items() if c in channels}
+            rng = np.random.default_rng([seed, i])
+            played = taken(run, rig, chosen.name, heard, SETTINGS, rng=rng)
+            problem = problem_of(rig, [played], channels, SETTINGS)
+            problem = replace(problem, blocks=outcome.problem.blocks)
+            right, wrong = (
+                misfit(problem, linear(problem, rivals[k]), outcome.weights) for k in (i, j)
+            )
+            gained.append(wrong.total - right.total)
+            missed.append(wrong.rms[key] ** 2 - right.rms[key] ** 2)
+            bits.append(1.0 - math.log2(1.0 + math.exp(-0.5 * gained[-1])))
+        assert min(gained) > 0.0
+        assert float(np.median(gained)) == pytest.approx(outcome.distance[i, j], rel=0.15)
+        assert math.sqrt(float(np.median(missed))) == pytest.approx(predicted, rel=0.15)
+    # the bound that is stated is one
+    assert float(np.mean(bits)) > outcome.bits - 0.02
+    assert outcome.bits == pytest.approx(proposed.expected_information_bits, abs=1e-3)
+
+
+@pytest.mark.parametrize("rig", [SHOULDER, REGULATED], ids=["valve", "regulator"])
+def test_the_commands_are_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path, capsys) -> None:
+    effects = ("muscle_hysteresis", "muscle_creep")
+    hypotheses = [(name, rig.with_effect(name), 0.5) for name in effects]
+    pool = library(rig, OWN, sample_time=0.01, highest=4e5, only={"staircase"})
+    found = propose(rig, hypotheses, experiments=pool)
+    assert found.protocol is not None
+    assert found.curves is not None
+    file = tmp_path / "next.csv"
+    file.write_text(found.protocol.to_csv(), encoding="utf-8")
+    assert file.read_text(encoding="utf-8").startswith(f"time [s],{pool[0].channel} [")
+    played = replay(hypotheses[0][1], load_recording(file))
+    assert np.allclose(played["joint_angle"], found.curves.predicted[effects[0]], atol=1e-6)
+    model, out = rig.to_toml(tmp_path / "rig.toml"), tmp_path / "out.csv"
+    words = ["simulate", str(model), "--input", str(file), "--output", str(out)]
+    assert cli.main(words) == 0, capsys.readouterr().err
+    assert len(out.read_text(encoding="utf-8").splitlines()) == pool[0].rows + 1
+
+
+def test_experiments_stay_inside_what_the_stand_allows(tmp_path) -> None:
+    rig = limited(SHOULDER, 'max_pressure = { value = 2.6, unit = "bar" }', tmp_path)
+    assert rig.limits == {"max_pressure": pytest.approx(2.6e5)}
+    valve = rig.model["valve"]
+    pool = library(rig, OWN, sample_time=0.01)
+    assert len(pool) > 6
+    for experiment in pool:
+        run = experiment.simulate(rig)
+        assert run["muscle_pressure"].max() <= 2.6e5
+        assert run["supply_pressure"].max() <= 1.02 * rig.model["supply"]["initial_pressure"]
+        assert experiment.command is not None
+        reach = np.abs(experiment.command - valve["null_voltage"]).max()
+        assert reach <= valve["half_range"] + 1e-9
+    # the supply cannot be turned up
+    weak = SHOULDER.with_parameters({"supply.initial_pressure": 3e5})
+    made = library(weak, OWN, sample_time=0.01, only={"holds_both_sides"})
+    assert all(e.initial["supply_pressure"] <= 3e5 for e in made)
+
+
+def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> None:
+    with pytest.raises(DiagnosisError, match="max_pressure"):
+        library(REGULATED, OWN)
+    rig = limited(REGULATED, 'max_pressure = { value = 2.5, unit = "bar" }', tmp_path)
+    pool = library(rig, OWN, sample_time=0.01)
+    assert {"set_steps", "fine_staircase", "nested_triangles"} <= {e.name for e in pool}
+    assert not {"sealed_hold", "null_ramp", "step_and_shut"} & {e.name for e in pool}
+    for experiment in pool:
+        assert experiment.channel == "supply_command"
+        assert experiment.command is not None
+        assert experiment.command.min() >= 0.0
+        assert experiment.command.max() <= 2.5e5
+
+
+def payloads(rig: pamrs.Rig) -> list[Experiment]:
+    return library(rig, OWN, sample_time=0.01, only={"other_payload", "slow_triangle"})
+
+
+def test_another_payload_is_proposed_where_there_is_one(tmp_path) -> None:
+    now = SHOULDER.parameter("arm.payload").value
+    _, unlisted = payloads(SHOULDER)
+    assert unlisted.needs
+    listed = limited(SHOULDER, f'payloads = {{ value = [{now}, 2.0, 7.5], unit = "kg" }}', tmp_path)
+    _, other = payloads(listed)
+    assert (other.needs, other.changes) == ("", {"arm.payload": 2.0})
+    assert pamrs.load_rig(listed.to_toml(tmp_path / "again.toml")).limits == listed.limits
+    only = limited(SHOULDER, f'payloads = {{ value = [{now}], unit = "kg" }}', tmp_path)
+    assert [e.name for e in payloads(only)] == ["slow_triangle"]
+    # one that nobody is known to have comes last, whatever it tells
+    payload = SHOULDER.with_parameters({"arm.payload": 1.1 * now})
+    moment = SHOULDER.parameter("arm.first_moment").value + 0.1 * now * 0.9
+    hypotheses = [
+        ("arm.payload", payload, 0.5),
+        ("arm.first_moment", SHOULDER.with_parameters({"arm.first_moment": moment}), 0.5),
+    ]
+    found = propose(SHOULDER, hypotheses, experiments=payloads(SHOULDER))
+    assert found.ranking[-1].name == "other_payload"
+    assert found.excitation["kind"] == "slow_triangle"
+
+
+@pytest.mark.parametrize("text", ["max_pressure = 3.0", "speed = 1.0", 'payloads = "two"'])
+def test_wrong_limits_are_named(text: str, tmp_path) -> None:
+    with pytest.raises(RigError, match=r"limits\."):
+        limited(SHOULDER, text, tmp_path)
+
+
+def regulated(name: str, role: str, seed: int) -> Recording:
+    """A joint whose recorded command is not what its regulator got: nothing explains that."""
+    rng, time = np.random.default_rng([7, seed]), 0.005 * np.arange(1400)
+    command = 2e5 + 0.8e5 * np.sin(2.0 * np.pi * 0.2 * (1.0 + 0.4 * seed) * time + seed)
+    command += 0.5e5 * np.sign(np.sin(2.0 * np.pi * 0.15 * time))
+    run = pamrs.simulate(steady(), supply_command=command, sample_time=0.005)
+    channels = {k: run[k] + rng.normal(0.0, s, time.size) for k, s in again.NOISE.items()}
+    channels["supply_command"] = command * (1.0 + 0.08 * np.sin(2.0 * np.pi * 0.8 * time))
+    mask = {k: np.ones(time.size, dtype=bool) for k in channels}
+    return Recording(name, role, run.time, 0.005, channels, mask, [], {})
+
+
+def steady() -> pamrs.Rig:
+    return REGULATED.with_parameters({"supply.droop": 0.0})
+
+
+def test_what_a_regulator_lacks_is_asked_of_the_regulator() -> None:
+    records = [regulated(name, role, k) for k, (name, role) in enumerate(again.ROLES)]
+    found = pamrs.diagnose(pamrs.Case("regulated", steady(), records, Path()))
+    assert found.where.block == "supply"
+    asked = found.next_experiment
+    assert asked.excitation["block"] == "supply"
+    assert "set pressure" in asked.text
+    assert "hold" not in asked.excitation["kind"]
+    assert "leak" not in asked.text
+    assert asked.protocol is not None
+    highest = max(float(r.channels["supply_command"].max()) for r in records)
+    assert asked.protocol.commands["supply_command"].max() <= 1.05 * highest
+
+
+@pytest.mark.parametrize(
+    ("rig", "channels", "kinds"),
+    [
+        ("shoulder", ("valve_command", *SENSORS), ["sealed_hold", "step_and_shut", "nested"]),
+        ("regulated_joint", ("supply_command", *SENSORS), ["set_steps", "set_steps", "nested"]),
+        ("sealed_chamber", ("muscle_pressure",), ["hold_low"]),
+    ],
+)
+def test_every_block_has_its_own_experiment(
+    rig: str, channels: tuple[str, ...], kinds: list[str]
+) -> None:
+    model = pamrs.rigs.named(rig)
+    blocks = available_blocks(model, channels, SETTINGS.prepare)
+    told = [_telling(block, model).kind for block in blocks]
+    assert all(name.startswith(kind) for name, kind in zip(told, kinds, strict=True))
+
+
+@pytest.mark.parametrize("wrong", [False, True], ids=["effect", "parameter"])
+def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
+    volume = SHOULDER.parameter("chamber.dead_volume")
+    truth = (
+        SHOULDER.with_parameters({volume.name: volume.value + 6.0 * volume.tol})
+        if wrong
+        else SHOULDER.with_effect("leak_muscle", {"conductance": 1e-10})
+    )
+    given = again.case(truth, SHOULDER)
+    found = pamrs.diagnose(replace(given, recordings=given.recordings[:2]), settings=OPEN)
+    names = {n for s in found.ambiguity for n in s}
+    assert {"unlisted", volume.name if wrong else "leak_muscle"} <= names
+    asked = found.next_experiment
+    between = {frozenset(pair.between) for pair in asked.pairs}
+    labels = {"+".join(n for n in s if n != "unlisted") or "unlisted" for s in found.ambiguity}
+    labels |= {"unlisted"}
+    assert between == {frozenset(two) for two in itertools.combinations(labels, 2)}
+    assert all(pair.text for pair in asked.pairs)
+    first = next(p for p in asked.pairs if "unlisted" in p.between)
+    assert "has to predict" in first.text
+    assert ("Measure chamber.dead_volume" in first.text) is wrong
+    if not wrong:
+        assert first.noises is not None
+        assert first.noises > 1.0
+    assert "Next experiment" in found.summary()
+    assert found.to_dict()["next_experiment"]["pairs"]
+
+
+def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:
+    leak = SHOULDER.with_effect("leak_muscle", {"conductance": 3e-11})
+    pool = library(SHOULDER, OWN, sample_time=0.01, highest=4e5, only={"step_and_shut"})
+    hypotheses = [("leak_muscle", leak, 0.6), ("parameters", SHOULDER, 0.4)]
+    found = propose(SHOULDER, hypotheses, NOISE, experiments=pool)
+    (pair,) = found.pairs
+    assert pair.between == ["leak_muscle", "parameters"]
+    assert pair.noises is not None
+    # a leak of no size is the other model: what tells is what that one misses
+    assert pair.noises > 1.0
+    assert "parameters inside their tolerances" in pair.text
+    assert 0.0 < found.expected_information_bits < entropy([0.6, 0.4])
+
+
+def test_a_pair_that_nothing_simulates_is_told_in_words() -> None:
+    rig = pamrs.rigs.antagonistic_joint()
+    names = ("muscle_pressure", "valve_command")
+    channels = [f"{n}.{side}" for n in names for side in ("flexor", "extensor")]
+    every = ("supply_pressure", "joint_angle.elbow", *channels)
+    blocks = available_blocks(rig, every, SETTINGS.prepare)
+    from pamrs.diagnosis.evidence import Candidate, Group, Judged
+    from pamrs.diagnosis.fit import Fit
+
+    fit = Fit((), rig, {}, {}, np.zeros((0, 0)), 0.0, {})
+    start = Candidate((), fit, {}, {}, 0.0)
+    sets = [["muscle_creep"], ["muscle_hysteresis"]]
+    arm = blocks[-1]
+    group = Group([arm], {}, {}, [start], {}, arm, {}, [arm])
+    judged = [Judged(group, "effects", {}, sets, start)]
+    problem = Problem(blocks, [], core_rig(rig), SETTINGS)
+    asked = _Question(rig, judged, blocks, [], problem)
+    told = _pair(asked, *sets, [])
+    assert told.between == ["muscle_creep", "muscle_hysteresis"]
+    assert "nested loops" in told.text
+    assert "arm.elbow" in told.text
+    assert (told.experiment, told.noises) == ("", None)
