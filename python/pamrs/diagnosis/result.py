@@ -30,10 +30,12 @@ from pamrs.findings import (
 )
 from pamrs.report import text as words
 
-__all__ = ["SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
+__all__ = ["READABLE", "SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
 
-SCHEMA: Final = "pamrs.diagnosis/1"
+SCHEMA: Final = "pamrs.diagnosis/2"
 """Name of the JSON schema that `Diagnosis.to_json` follows."""
+READABLE: Final = ("pamrs.diagnosis/1", SCHEMA)
+"""Schemas of results that can be read: every key of an earlier one has kept its meaning."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -92,10 +94,18 @@ class Diagnosis(Findings):
     budget : list of BudgetTerm
         What of the nominal model's excess over the noise each term takes on held-out recordings:
         ``block``, ``kind``, ``id``, ``form``, ``share`` with its ``interval``, ``probability``, and
-        what the block keeps after it (``noises``, ``size``, ``unit``).
+        what the block keeps after it (``noises``, ``size``, ``unit``), ``at`` and ``parameters``.
     unexplained : list of Unexplained
         Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``,
-        ``size`` (SI), and the ``verdict`` of their group.
+        ``size`` (SI), the ``verdict`` of their group, its ``share`` of the budget with
+        ``interval``, the ``conditions`` under which it is largest, and the ``form`` that carries
+        over, in words.
+    free_run : list of FreeRun or None
+        The whole rig simulated from its commands alone, for each held-out recording (each fitted
+        one where none was held out): ``recording``, ``role``, ``seconds``, ``channels`` {channel:
+        {unit, before, after, cut_before, cut_after}}, root mean square errors beside those of the
+        cut chain, SI, and a ``note``. None where no recording has the commands;
+        ``free_run_note`` says why.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``,
         ``value``, ``std``, ``interval`` (95 %), ``unit``, ``moved_sigmas``, ``probability``, and
@@ -128,7 +138,7 @@ class Diagnosis(Findings):
 
     settings: DiagnosisSettings = field(
         default_factory=DiagnosisSettings,
-        metadata=told("the numbers that the verdict rests on, by step", required=False),
+        metadata=told("the numbers that the verdict rests on, by step"),
     )
 
     @property
@@ -149,7 +159,7 @@ class Diagnosis(Findings):
         return {"schema": SCHEMA, **found, "settings": self.settings.to_dict()}
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Return the result as strict JSON (schema `pamrs.diagnosis/1`).
+        """Return the result as strict JSON (schema `pamrs.diagnosis/2`).
 
         Parameters
         ----------
@@ -301,14 +311,14 @@ class Diagnosis(Findings):
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of `pamrs.diagnosis/1` as a dictionary, made from the types of the
+    """Return the JSON Schema of `pamrs.diagnosis/2` as a dictionary, made from the types of the
     result.
     """
     definitions = dict(DEFINITIONS)
     found = object_of(Diagnosis, definitions)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "urn:pamrs:schema:pamrs.diagnosis:1",
+        "$id": "urn:pamrs:schema:pamrs.diagnosis:2",
         "title": SCHEMA,
         **found,
         ("description"): (

@@ -11,6 +11,7 @@ from pamrs.findings._entries import (
     BudgetTerm,
     EffectFound,
     FitErrors,
+    FreeRun,
     ParameterFound,
     Unexplained,
     Where,
@@ -51,6 +52,11 @@ class Findings:
         Blocks with a mismatch that stays unexplained, the largest first.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong.
+    free_run : list of FreeRun or None
+        Errors of the whole rig simulated from its commands alone, for each held-out recording (each
+        fitted one where none was held out); None where no recording has the commands.
+    free_run_note : str
+        Why there is no free run, or of some recordings none; empty where nothing is missing.
     parameters : dict of str to ParameterFound
         Parameters of the baseline, SI.
     fit : FitErrors
@@ -99,26 +105,32 @@ class Findings:
     )
     blocks: list[BlockVerdict] = field(
         default_factory=list,
-        metadata=told(
-            "the verdict of each group of blocks that is judged by itself", required=False
-        ),
+        metadata=told("the verdict of each group of blocks that is judged by itself"),
     )
     budget: list[BudgetTerm] = field(
         default_factory=list,
         metadata=told(
-            "what of the nominal model's excess over the noise each term takes, block by block",
-            required=False,
+            "what of the nominal model's excess over the noise each term takes, block by block"
         ),
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
-        metadata=told(
-            "blocks with a mismatch that stays unexplained, the largest first", required=False
-        ),
+        metadata=told("blocks with a mismatch that stays unexplained, the largest first"),
     )
     wrong_parameters: list[WrongParameter] = field(
         default_factory=list,
-        metadata=told("values of the rig file that are wrong", required=False),
+        metadata=told("values of the rig file that are wrong"),
+    )
+    free_run: list[FreeRun] | None = field(
+        default=None,
+        metadata=told(
+            "the whole rig simulated from its commands alone, by held-out recording (by fitted "
+            "one where none was held out); null where no recording has the commands"
+        ),
+    )
+    free_run_note: str = field(
+        default="",
+        metadata=told("why there is no free run, or of some recordings none; empty otherwise"),
     )
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
