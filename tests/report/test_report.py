@@ -100,7 +100,7 @@ def test_ambiguity_is_shown_only_when_open(page: str) -> None:
         synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
     )
     assert "cannot separate" in html
-    assert "<li>muscle leak + heat transfer</li>" in html
+    assert '<li>muscle leak + heat transfer <span class="note">(0.01)</span></li>' in html
 
 
 def test_page_of_nothing_missing() -> None:

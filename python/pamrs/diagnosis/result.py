@@ -38,6 +38,10 @@ READABLE: Final = ("pamrs.diagnosis/1", SCHEMA)
 """Schemas of results that can be read: every key of an earlier one has kept its meaning."""
 
 
+_ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
+"""Signs that a terminal may lack."""
+
+
 @dataclass(frozen=True, repr=False)
 class Diagnosis(Findings):
     """Result of `pamrs.diagnose`.
@@ -110,6 +114,8 @@ class Diagnosis(Findings):
         Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``,
         ``value``, ``std``, ``interval`` (95 %), ``unit``, ``moved_sigmas``, ``probability``, and
         ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
+    measured : list of str
+        Channels that every recording has.
     residuals : dict of str to BlockResidual
         {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline
         against the noise level.
@@ -229,7 +235,7 @@ class Diagnosis(Findings):
         """What takes the mismatch of each block."""
         lines = []
         for block, own in words.budgets(self).items():
-            told = f"Budget of {block}: {words.budget_sentence(own)}"
+            told = f"Budget of {block}: {words.budget_sentence(own)}".translate(_ASCII)
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []
 

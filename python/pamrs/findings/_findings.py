@@ -73,6 +73,8 @@ class Findings:
         Final model, with what was found.
     traces : list of Trace
         Measured and simulated channels.
+    measured : list of str
+        Channels that every recording has.
     residuals : dict of str to BlockResidual
         Residual of each block's refitted baseline against the noise level.
     condition_map : ConditionMap or None
@@ -140,6 +142,7 @@ class Findings:
     text: str = field(default="", metadata=told(json=False))
     rig: ModelFile | None = field(default=None, metadata=told(json=False))
     traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
+    measured: list[str] = field(default_factory=list, metadata=told(json=False))
     residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
     condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
     timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))

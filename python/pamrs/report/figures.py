@@ -22,6 +22,7 @@ from pamrs.report.text import (
     display_unit,
     format_number,
     format_probability,
+    format_share,
     headline,
     hypothesis_label,
     is_named,
@@ -357,6 +358,13 @@ def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
     return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
 
 
+def _beside(axes: Axes, x: float, y: float, text: str) -> None:
+    """A number beside the end of a bar (SVG drops spaces that stand before a text)."""
+    axes.annotate(
+        text, (x, y), xytext=(4.0, 0.0), textcoords="offset points", va="center", fontsize="small"
+    )
+
+
 def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows: int = 1) -> None:
     position = np.arange(len(rows))
     size = np.asarray([r[1] for r in rows])
@@ -364,13 +372,18 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
     axes.barh(position, size - left, left=left, color=colours, height=0.62)
     axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
-    axes.text(1.0, -0.62, " noise level", va="bottom", ha="left", color="#374151", fontsize="small")
+    axes.annotate(
+        "noise level",
+        (1.0, -0.62),
+        xytext=(4.0, 0.0),
+        textcoords="offset points",
+        color="#374151",
+        fontsize="small",
+    )
     axes.set_xscale("log")
     axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
-        axes.text(
-            value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small"
-        )
+        _beside(axes, value, y, f"{format_number(value, 2)}×")
     axes.set_yticks(position, [label(r[0]) for r in rows])
     axes.set_ylim(max(len(rows), least_rows) - 0.45, -1.0)
     axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
@@ -410,7 +423,7 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
 
 def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
     colours = {"parameters": COLOURS["quiet"], "unexplained": COLOURS["before"]}
-    names = ["nominal model"]
+    names, least = ["nominal model"], 0.0
     axes.barh(0, 100.0, color="#d1d5db", height=0.62)
     left = 1.0
     for row, term in enumerate(terms, 1):
@@ -422,12 +435,15 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
             ends = [100.0 * (left - share) for share in term.interval]
             axes.plot(ends, [row, row], color="#1f1f1f", lw=0.9)
             left -= term.share
+            least = min(least, left, *(end / 100.0 for end in ends))
         side = 100.0 * max(begin, begin + term.share)
-        axes.text(side, row, f"  {100 * term.share:.0f} %", va="center", fontsize="small")
+        if not rest:
+            side = max(side, *ends)
+        _beside(axes, side, row, format_share(term.share))
         names.append(term_label(term))
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(min(0.0, 100.0 * min(t.share for t in terms) - 5.0), 118.0)
+    axes.set_xlim(min(0.0, max(-50.0, 100.0 * least) - 3.0), 118.0)
     axes.grid(axis="y", visible=False)
     axes.set_title(label(block), loc="left", fontsize="medium")
 

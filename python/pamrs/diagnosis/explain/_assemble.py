@@ -130,6 +130,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         budget=terms,
         unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal),
         wrong_parameters=_wrong(nominal, judged, fitted, table),
+        measured=list(case.channels),
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),

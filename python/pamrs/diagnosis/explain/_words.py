@@ -16,7 +16,17 @@ from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.findings import BlockVerdict, ChannelError, Findings, NextExperiment, Where
 from pamrs.recordings import Case
-from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
+from pamrs.report.text import (
+    display_unit,
+    format_number,
+    format_probability,
+    is_number,
+    is_open,
+    kept_sentence,
+    leading,
+    name_chance,
+    sentence_of,
+)
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
@@ -143,8 +153,8 @@ def verdict(
     if kind == "unlisted":
         tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
         text = (
-            "Physics is missing. Either it is not in the catalogue, or no effect of the catalogue "
-            f"explains the data well enough to be named. {place}"
+            "Physics is missing, and no effect of the catalogue explains the data well enough to "
+            f"be named{_outside(leading(diagnosis)[1])}. {place}"
             + (f" Closest: {tried}." if tried else "")
         )
         if not forms and not sought:
@@ -168,9 +178,9 @@ def verdict(
         )
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(
-        f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects
+        f"{e.name} ({e.id}, probability {name_chance(diagnosis, e)})" for e in diagnosis.effects
     )
-    text = f"The model leaves out: {names}. {place}"
+    text = f"{_opening(diagnosis, 'the model leaves out')}: {names}. {place}"
     if gap is not None:
         it = "it" if len(diagnosis.effects) == 1 else "them"
         text += (
@@ -186,6 +196,17 @@ def verdict(
             "volume of the rig file."
         )
     return text + _beside(diagnosis, missing, forms, sought=sought)
+
+
+def _opening(diagnosis: Findings, claim: str) -> str:
+    """A claim, no surer than it is: as what is most probable where other answers are left."""
+    return f"Most probable is that {claim}" if is_open(diagnosis) else _capital(claim)
+
+
+def _outside(chance: float) -> str:
+    """How probable it is that something else acts."""
+    known = is_number(chance)
+    return f" (probability of an effect outside it: {format_probability(chance)})" if known else ""
 
 
 def _proof(case: Case) -> str:
@@ -213,10 +234,10 @@ def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: Warn
             for channel, e in told_by.items()
         )
         told.append(
-            f"{sentence_of(wrong)} (probability {wrong.probability:.2f}, "
+            f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong)}, "
             f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {_proof(case)} {errors}."
         )
-    text = "The rig file is wrong: " + " ".join(told)
+    text = f"{_opening(diagnosis, 'the rig file is wrong')}: " + " ".join(told)
     if gap is not None:
         text += (
             f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside "
