@@ -191,13 +191,7 @@ class Diagnosis(Findings):
                 "",
                 *textwrap.wrap(where, 96, initial_indent="where  ", subsequent_indent=" " * 7),
             ]
-        if self.probabilities:
-            lines.append("")
-            for name, p in words.ranked_probabilities(self, 5):
-                lines.append(
-                    f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
-                    f"{'#' * round(30 * p)}"
-                )
+        lines += self._summary_probabilities()
         for effect in self.effects:
             lines.append("")
             lines.append(words.effect_title(effect))
@@ -230,6 +224,22 @@ class Diagnosis(Findings):
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.case!r}: {self.verdict}; {self.headline})"
+
+    def _summary_probabilities(self) -> list[str]:
+        """Bars of each group of blocks with a mismatch."""
+        lines = []
+        for block in words.told_probabilities(self):
+            rows = words.ranked_probabilities(block.probabilities, 5)
+            if rows:
+                lines.append("")
+            if rows and len(self.blocks) > 1 and block.blocks:
+                lines.append(f"{words.blocks_label(block)}:")
+            lines += [
+                f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
+                f"{'#' * round(30 * p)}".rstrip()
+                for name, p in rows
+            ]
+        return lines
 
     def _summary_budget(self) -> list[str]:
         """What takes the mismatch of each block."""
@@ -300,7 +310,9 @@ class Diagnosis(Findings):
             f"<td>{html.escape(words.format_probability(p))}</td>"
             f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
             f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"
-            for name, p in words.ranked_probabilities(self, 5)
+            for name, p in words.ranked_probabilities(
+                words.told_probabilities(self)[0].probabilities, 5
+            )
         )
         gap = self.fit.gap_closed
         closed = (

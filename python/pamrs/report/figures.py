@@ -18,6 +18,7 @@ from matplotlib.figure import Figure
 
 from pamrs.findings import BudgetTerm, ConditionMap, Curves, Findings, Trace
 from pamrs.report.text import (
+    blocks_label,
     budgets,
     display_unit,
     format_number,
@@ -30,6 +31,7 @@ from pamrs.report.text import (
     label,
     ranked_probabilities,
     term_label,
+    told_probabilities,
 )
 
 __all__ = [
@@ -514,9 +516,10 @@ def _draw_maps(
 
 
 def _draw_probabilities(axes: Axes, diagnosis: Findings) -> None:
-    rows = ranked_probabilities(diagnosis, 6)
+    block = told_probabilities(diagnosis)[0]
+    rows = ranked_probabilities(block.probabilities, 6)
     position = np.arange(len(rows))
-    colours = [COLOURS["after" if is_named(diagnosis, name) else "quiet"] for name, _ in rows]
+    colours = [COLOURS["after" if is_named(block, name) else "quiet"] for name, _ in rows]
     axes.barh(position, [p for _, p in rows], color=colours, height=0.62)
     for y, (_, p) in zip(position.tolist(), rows, strict=True):
         axes.text(p + 0.015, y, format_probability(p), va="center", fontsize="small")
@@ -596,11 +599,13 @@ def _draw_right(right: Any, diagnosis: Findings) -> None:
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     rows = _block_rows(diagnosis)
     below = bool(content) or bool(rows)
-    above = bool(diagnosis.probabilities)
+    told = told_probabilities(diagnosis)[0]
+    above = bool(told.probabilities)
     parts = right.subfigures(int(above) + int(below) or 1, 1, squeeze=False)[:, 0]
     if above:
         _draw_probabilities(parts[0].subplots(), diagnosis)
-        _head(parts[0], "Probability of each hypothesis")
+        of = f", {blocks_label(told)}" if len(diagnosis.blocks) > 1 and told.blocks else ""
+        _head(parts[0], textwrap.shorten(f"Probability of each hypothesis{of}", 60))
     if content and diagnosis.condition_map is not None:
         _head(parts[-1], "When: residual over two conditions")
         _draw_maps(

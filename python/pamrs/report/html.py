@@ -19,6 +19,7 @@ from pamrs.report.page import render_page
 __all__ = ["render"]
 
 HELD_OUT_SHOWN = 2
+WARNINGS_SHOWN = 6
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
@@ -315,15 +316,26 @@ def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     return shown, len(groups) - len(shown)
 
 
-def _probabilities(diagnosis: Findings) -> list[dict[str, Any]]:
+def _probabilities(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The bars of each group of blocks with a mismatch, under its name where there are several
+    groups.
+    """
+    several = len(diagnosis.blocks) > 1
     return [
-        {
-            "name": words.hypothesis_label(name),
-            "text": words.format_probability(p),
-            "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
-            "named": words.is_named(diagnosis, name),
-        }
-        for name, p in words.ranked_probabilities(diagnosis, 12)
+        (
+            words.blocks_label(block) if several else "",
+            [
+                {
+                    "name": words.hypothesis_label(name),
+                    "text": words.format_probability(p),
+                    "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
+                    "named": words.is_named(block, name),
+                }
+                for name, p in words.ranked_probabilities(block.probabilities, 8)
+            ],
+        )
+        for block in words.told_probabilities(diagnosis)
+        if block.probabilities
     ]
 
 
@@ -417,6 +429,7 @@ def render(diagnosis: Findings) -> str:
         headline=_typeset(words.claim(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),
+        warnings=(diagnosis.warnings[:WARNINGS_SHOWN], diagnosis.warnings[WARNINGS_SHOWN:]),
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
         intervals=_intervals(diagnosis),

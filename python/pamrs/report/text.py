@@ -19,6 +19,7 @@ from pamrs.findings import (
 
 __all__ = [
     "HEALTHY",
+    "blocks_label",
     "budget_sentence",
     "budgets",
     "chance_of",
@@ -46,6 +47,7 @@ __all__ = [
     "span95",
     "term_label",
     "told_blocks",
+    "told_probabilities",
 ]
 
 _LABELS = {
@@ -178,9 +180,11 @@ def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
     return None
 
 
-def ranked_probabilities(diagnosis: Findings, count: int = 8) -> list[tuple[str, float]]:
+def ranked_probabilities(
+    probabilities: Mapping[str, float], count: int = 8
+) -> list[tuple[str, float]]:
     """Most probable hypotheses first, at most `count`; the rest is pooled under ``all others``."""
-    known = [(k, float(v)) for k, v in diagnosis.probabilities.items() if is_number(v)]
+    known = [(k, float(v)) for k, v in probabilities.items() if is_number(v)]
     known.sort(key=lambda item: (-item[1], item[0]))
     if len(known) <= count:
         return known
@@ -188,11 +192,29 @@ def ranked_probabilities(diagnosis: Findings, count: int = 8) -> list[tuple[str,
     return [*known[: count - 1], (f"all others ({len(rest)})", sum(p for _, p in rest))]
 
 
-def is_named(diagnosis: Findings, hypothesis: str) -> bool:
-    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that the verdict names."""
-    wrong = {w.name for w in diagnosis.wrong_parameters}
-    effects = {e.id for e in diagnosis.effects} if diagnosis.verdict == "effects" else set()
-    named = effects | wrong or {diagnosis.verdict}
+def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
+    """The groups of blocks whose probabilities a reader needs, that of the headline first: those
+    with a mismatch; one for the whole case where none has, or where a result does not tell them
+    apart.
+    """
+    blocks = told_blocks(diagnosis)
+    found = [b for b in blocks if b.verdict not in HEALTHY or b.wrong_parameters or b.ambiguity]
+    if not diagnosis.blocks or not found:
+        names = [w.name for w in diagnosis.wrong_parameters]
+        effects = [e.id for e in diagnosis.effects if diagnosis.verdict == "effects"]
+        whole = BlockVerdict([], diagnosis.verdict, diagnosis.probabilities, effects, names, [])
+        return [whole]
+    return sorted(found, key=lambda b: diagnosis.where.block not in b.blocks)
+
+
+def blocks_label(block: BlockVerdict) -> str:
+    """The blocks of a group, in words: ``supply and chamber``."""
+    return " and ".join(_spoken(name) for name in block.blocks)
+
+
+def is_named(block: BlockVerdict, hypothesis: str) -> bool:
+    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that a group names."""
+    named = {*block.effects, *block.wrong_parameters} or {block.verdict}
     return set(hypothesis.replace(" ", "").split("+")) == named
 
 
@@ -392,6 +414,9 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
         found = [chance_of(probabilities, [key]) for key in HEALTHY]
         known = [p for p in found if is_number(p)]
         return "no physics is missing", sum(known) if known else math.nan
+    own = [b for b in told_blocks(diagnosis) if b.effects or b.wrong_parameters]
+    if len(own) == 1:
+        return set_label(names), _of_names(diagnosis, own[0])
     whole = BlockVerdict(
         blocks=[],
         verdict="",
@@ -478,7 +503,7 @@ def _outside(diagnosis: Findings, place: str) -> str:
         return f"Physics outside the catalogue acts{place or ' on this rig'}{_how_sure(chance)}"
     rivals = [
         (key, p)
-        for key, p in ranked_probabilities(diagnosis, len(diagnosis.probabilities))
+        for key, p in ranked_probabilities(diagnosis.probabilities, len(diagnosis.probabilities))
         if key not in (*HEALTHY, "unlisted")
     ]
     others = " or ".join(_answer(key.split("+"), p) for key, p in rivals[:2])

@@ -383,12 +383,6 @@ def warnings(
         n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()
     }
     for recording in case.recordings:
-        for issue in recording.issues[:8]:
-            when = f"{issue.start:g} to {issue.stop:g} s"
-            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
-        if len(recording.issues) > 8:
-            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
-    for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (
                 channel_of(channel) not in ("muscle_pressure", "supply_pressure")
@@ -431,6 +425,13 @@ def warnings(
         out.append(
             f"{name} is marked unknown: values that scale with it hold for the placeholder only"
         )
+    # what was only masked comes last
+    for recording in case.recordings:
+        for issue in recording.issues[:8]:
+            when = f"{issue.start:g} to {issue.stop:g} s"
+            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
+        if len(recording.issues) > 8:
+            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     return out
 
 
