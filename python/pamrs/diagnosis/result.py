@@ -59,7 +59,7 @@ class Diagnosis(Findings):
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
         which the intervals belong.
     effects : list of EffectFound
-        What is named (with the verdict ``unlisted`` what comes closest): ``id``, ``probability``,
+        What is named (with another verdict what comes closest): ``id``, ``probability``,
         ``name`` (in words), ``parameters`` {name: {value, std, unit, interval?, identifiable?}},
         most probable first; SI, 95 % intervals; ``events``, what happened in single recordings
         (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the
@@ -194,7 +194,7 @@ class Diagnosis(Findings):
         lines += self._summary_probabilities()
         for effect in self.effects:
             lines.append("")
-            lines.append(words.effect_title(effect))
+            lines.append(words.effect_heading(self, effect))
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)
@@ -205,6 +205,7 @@ class Diagnosis(Findings):
             lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
         lines += self._summary_budget()
         lines += self._summary_fit()
+        lines += self._summary_free_run()
         for kept in self.unexplained:
             lines += textwrap.wrap(
                 f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
@@ -237,8 +238,25 @@ class Diagnosis(Findings):
             lines += [
                 f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
                 f"{'#' * round(30 * p)}".rstrip()
-                for name, p in rows
+                for place, (name, p) in enumerate(rows)
+                if place == 0 or p >= 0.005
             ]
+        return lines
+
+    def _summary_free_run(self) -> list[str]:
+        """The whole rig from its commands alone, one line for each of the first recordings."""
+        lines = []
+        for run in (self.free_run or [])[:2]:
+            told = []
+            for channel, error in run.channels.items():
+                unit, factor = words.display_unit(error.unit, error.before)
+                before, after = (
+                    words.format_number(v * factor, unicode=False)
+                    for v in (error.before, error.after)
+                )
+                told.append(f"{channel} {before} to {after} {unit}")
+            text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
+            lines += textwrap.wrap(text.translate(_ASCII), 96, subsequent_indent="  ")
         return lines
 
     def _summary_budget(self) -> list[str]:

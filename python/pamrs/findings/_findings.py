@@ -36,7 +36,7 @@ class Findings:
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
-        What is named (with the verdict ``unlisted`` what comes closest), most probable first.
+        What is named (with another verdict what comes closest), most probable first.
     ambiguity : list of list of str
         Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
         the data cannot separate; empty when settled.

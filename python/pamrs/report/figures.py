@@ -425,7 +425,7 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
 
 def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
     colours = {"parameters": COLOURS["quiet"], "unexplained": COLOURS["before"]}
-    names, least = ["nominal model"], 0.0
+    names, reached = ["nominal model"], [0.0, 1.0]
     axes.barh(0, 100.0, color="#d1d5db", height=0.62)
     left = 1.0
     for row, term in enumerate(terms, 1):
@@ -434,10 +434,10 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
         colour = colours.get(term.kind, COLOURS["after"])
         axes.barh(row, 100.0 * term.share, left=100.0 * begin, color=colour, height=0.62)
         if not rest:
-            ends = [100.0 * (left - share) for share in term.interval]
+            ends = [min(250.0, max(-50.0, 100.0 * (left - share))) for share in term.interval]
             axes.plot(ends, [row, row], color="#1f1f1f", lw=0.9)
             left -= term.share
-            least = min(least, left, *(end / 100.0 for end in ends))
+            reached += [left, *(end / 100.0 for end in ends)]
         side = 100.0 * max(begin, begin + term.share)
         if not rest:
             side = max(side, *ends)
@@ -445,7 +445,8 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
         names.append(term_label(term))
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(min(0.0, max(-50.0, 100.0 * least) - 3.0), 118.0)
+    low, high = min(reached), max(reached)
+    axes.set_xlim(100.0 * low - 3.0, 100.0 * (high + 0.16 * (high - low)))
     axes.grid(axis="y", visible=False)
     axes.set_title(label(block), loc="left", fontsize="medium")
 

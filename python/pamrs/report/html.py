@@ -91,7 +91,7 @@ def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
         rows.append(
             {
                 "id": effect.id,
-                "name": words.effect_title(effect),
+                "name": words.effect_heading(diagnosis, effect),
                 "probability": words.name_chance(diagnosis, effect),
                 "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
                 "parameters": parameters,

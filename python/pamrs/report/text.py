@@ -25,6 +25,7 @@ __all__ = [
     "chance_of",
     "claim",
     "display_unit",
+    "effect_heading",
     "effect_title",
     "format_number",
     "format_probability",
@@ -54,6 +55,7 @@ _LABELS = {
     "none": "nothing missing",
     "parameters": "parameters in tolerance",
     "unlisted": "unlisted effect",
+    "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
 
@@ -537,6 +539,12 @@ def effect_title(effect: EffectFound) -> str:
     """Name of an effect, with its form where it is not the usual one."""
     form = f", form: {label(effect.form)}" if effect.form else ""
     return (effect.name or label(effect.id)) + form
+
+
+def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:
+    """The same, and that it only comes closest where it is not named."""
+    title = effect_title(effect)
+    return title if diagnosis.verdict == "effects" else f"not named, but closest: {title}"
 
 
 def budget_sentence(terms: Sequence[BudgetTerm]) -> str:
