@@ -13,7 +13,14 @@ import pytest
 
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
 from pamrs.diagnosis.schema import FILE, is_current
-from pamrs.findings import BlockVerdict, Condition, EffectParameterFound, Where
+from pamrs.findings import (
+    BlockVerdict,
+    Condition,
+    EffectParameterFound,
+    FreeRun,
+    FreeRunError,
+    Where,
+)
 from pamrs.report import render_html
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
@@ -111,6 +118,15 @@ def test_summary_names_the_effect() -> None:
     assert "do not determine" in summary
     assert 12 <= len(summary.splitlines()) <= 32
     assert max(map(len, summary.splitlines())) <= 100
+    assert summary.isascii()
+
+
+def test_summary_says_how_the_whole_rig_runs_and_what_is_only_closest() -> None:
+    errors = {"joint_angle": FreeRunError("rad", 0.1, 0.01, None, None)}
+    run = FreeRun("random", "held_out", 30.0, errors)
+    summary = synthetic.diagnosis(verdict="unlisted", free_run=[run]).summary()
+    assert "Whole rig from its commands alone, random: joint_angle 5.73 to 0.573 deg" in summary
+    assert "not named, but closest: heat transfer" in summary
     assert summary.isascii()
 
 
