@@ -12,7 +12,7 @@ from typing import Any
 
 from .effects import LISTED, TYPES
 
-SCHEMA = "pamrs.diagnosis/1"
+RESULTS = ("pamrs.diagnosis/1", "pamrs.diagnosis/2")
 VERDICTS = ("none", "parameters", "effects", "unlisted")
 HEALTHY = ("none", "parameters")
 #: sum over the channels of what a refit leaves above the noise, in units of it, below which there
@@ -186,8 +186,8 @@ def _result(folder: Path, case: str) -> dict[str, Any] | None:
     for path in (folder / case / "out.json", folder / f"{case}.json"):
         if path.is_file():
             data = json.loads(path.read_text(encoding="utf-8"))
-            if not isinstance(data, dict) or data.get("schema") != SCHEMA:
-                raise ValueError(f"{path}: schema must be {SCHEMA!r}")
+            if not isinstance(data, dict) or data.get("schema") not in RESULTS:
+                raise ValueError(f"{path}: schema must be one of {', '.join(RESULTS)}")
             if data.get("verdict") not in VERDICTS:
                 raise ValueError(
                     f"{path}: verdict {data.get('verdict')!r} is not one of {', '.join(VERDICTS)}"

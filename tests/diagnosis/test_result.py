@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -12,7 +13,15 @@ import pytest
 
 from pamrs.diagnosis.result import Diagnosis, Trace, schema
 from pamrs.diagnosis.schema import FILE, is_current
-from pamrs.findings import Condition, EffectParameterFound, Where
+from pamrs.findings import (
+    BlockVerdict,
+    Condition,
+    EffectParameterFound,
+    FreeRun,
+    FreeRunError,
+    Where,
+)
+from pamrs.report import render_html
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
 
@@ -112,6 +121,15 @@ def test_summary_names_the_effect() -> None:
     assert summary.isascii()
 
 
+def test_summary_says_how_the_whole_rig_runs_and_what_is_only_closest() -> None:
+    errors = {"joint_angle": FreeRunError("rad", 0.1, 0.01, None, None)}
+    run = FreeRun("random", "held_out", 30.0, errors)
+    summary = synthetic.diagnosis(verdict="unlisted", free_run=[run]).summary()
+    assert "Whole rig from its commands alone, random: joint_angle 5.73 to 0.573 deg" in summary
+    assert "not named, but closest: heat transfer" in summary
+    assert summary.isascii()
+
+
 def test_headlines() -> None:
     assert "chamber" in synthetic.diagnosis().headline
     assert synthetic.nothing().headline.startswith("Nothing is missing")
@@ -120,7 +138,123 @@ def test_headlines() -> None:
     )
     assert "outside the catalogue" in synthetic.diagnosis(verdict="unlisted", effects=[]).headline
     rivals = synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
-    assert "cannot tell muscle leak from muscle leak + heat transfer" in rivals.headline
+    assert "tell muscle leak (0.02) from muscle leak + heat transfer (0.01)" in rivals.headline
+
+
+ARM = {"blocks": ["arm"], "ambiguity": [], "wrong_parameters": [], "effects": []}
+
+
+def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagnosis:
+    """A result of one group of blocks."""
+    block = BlockVerdict(verdict=verdict, probabilities=probabilities, **(ARM | more))
+    effects = [
+        {
+            "id": name,
+            "probability": sum(p for key, p in probabilities.items() if name in key.split("+")),
+            "parameters": {},
+        }
+        for name in block.effects
+    ]
+    return synthetic.diagnosis(
+        verdict=verdict,
+        probabilities=probabilities,
+        effects=effects,
+        ambiguity=block.ambiguity,
+        blocks=[block],
+        where={"block": "arm"},
+        traces=[],
+        condition_map=None,
+    )
+
+
+@pytest.mark.parametrize(
+    ("found", "said", "badge", "chance"),
+    [
+        (
+            _judged("effects", {"muscle_creep": 0.97, "unlisted": 0.03}, effects=["muscle_creep"]),
+            "leaves out: muscle creep in the arm, probability 0.97",
+            "missing physics named",
+            0.97,
+        ),
+        # never surer than 0.55 against 0.45
+        (
+            _judged(
+                "unlisted",
+                {"unlisted": 0.55, "muscle_creep": 0.45},
+                ambiguity=[["unlisted"], ["muscle_creep"]],
+            ),
+            "cannot tell an effect outside the catalogue (0.55) from muscle creep (0.45)",
+            "missing physics, no name",
+            0.55,
+        ),
+        # many rivals, none of them probable enough for a set
+        (
+            _judged(
+                "unlisted",
+                {"unlisted": 0.88, "muscle_creep": 0.04, "payload_change": 0.04, "none": 0.04},
+            ),
+            "nothing is probable enough to be named: an effect outside the catalogue (0.88), "
+            "muscle creep (0.04) or payload change (0.04)",
+            "missing physics, no name",
+            0.88,
+        ),
+        (
+            _judged("unlisted", {"unlisted": 0.96, "muscle_creep": 0.04}),
+            "Physics outside the catalogue acts in the arm, probability 0.96",
+            "missing physics, not in the catalogue",
+            0.96,
+        ),
+        (
+            _judged(
+                "effects",
+                {"muscle_creep": 0.79, "payload_change+muscle_creep": 0.14, "unlisted": 0.07},
+                effects=["muscle_creep"],
+                ambiguity=[["muscle_creep"], ["muscle_creep", "payload_change"], ["unlisted"]],
+            ),
+            "cannot tell muscle creep (0.79), muscle creep + payload change (0.14) and an effect "
+            "outside the catalogue (0.07) apart",
+            "missing physics, the name is not settled",
+            0.79,
+        ),
+        # named by what its sets have in common, though none of them leads
+        (
+            _judged(
+                "effects",
+                {"unlisted": 0.4, "muscle_creep": 0.3, "muscle_creep+payload_change": 0.3},
+                effects=["muscle_creep"],
+            ),
+            "leaves out: muscle creep in the arm, probability 0.60",
+            "missing physics named",
+            0.6,
+        ),
+        (
+            _judged("none", {"none": 0.6, "parameters": 0.38, "unlisted": 0.02}),
+            "Nothing is missing",
+            "nothing missing",
+            0.98,
+        ),
+        (
+            _judged(
+                "parameters",
+                {"parameters": 0.8, "muscle_creep": 0.2},
+                ambiguity=[["parameters"], ["muscle_creep"]],
+            ),
+            "cannot rule out muscle creep (0.20) in the arm",
+            "parameters or physics, not settled",
+            0.8,
+        ),
+    ],
+)
+def test_headline_badge_page_and_json_say_the_same(
+    found: Diagnosis, said: str, badge: str, chance: float
+) -> None:
+    assert said in found.headline
+    assert words.leading(found)[1] == pytest.approx(chance)
+    html = render_html(found)
+    assert f">{badge}</span>" in html
+    assert f"<b>{words.format_probability(chance)}</b>" in html
+    assert found.headline in found.summary().replace("\n", " ")
+    assert json.loads(found.to_json())["verdict"] == found.verdict
 
 
 def test_notebook_html_escapes() -> None:

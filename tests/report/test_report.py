@@ -16,7 +16,9 @@ from tests.diagnosis import synthetic
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")
 
+from pamrs.findings import BudgetTerm
 from pamrs.report import figures, render_html
+from pamrs.report import text as words
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +102,7 @@ def test_ambiguity_is_shown_only_when_open(page: str) -> None:
         synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
     )
     assert "cannot separate" in html
-    assert "<li>muscle leak + heat transfer</li>" in html
+    assert '<li>muscle leak + heat transfer <span class="note">(0.01)</span></li>' in html
 
 
 def test_page_of_nothing_missing() -> None:
@@ -165,3 +167,24 @@ def test_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setitem(sys.modules, "jinja2", None)
     with pytest.raises(ImportError, match=r"pamrs\[report\]"):
         render_html(synthetic.diagnosis())
+
+
+def test_a_budget_is_drawn_with_all_its_terms_inside() -> None:
+    def term(kind: str, name: str, share: float, interval: list[float]) -> BudgetTerm:
+        return BudgetTerm("arm", kind, name, "", share, interval, None, 3.0, 0.01, "rad")
+
+    terms = [
+        term("parameters", "", -0.66, [-3.07, 0.38]),  # the refit spoils what was held out
+        term("effect", "muscle_creep", 1.656, [0.3, 2.5]),
+        term("unexplained", "", 0.004, [0.0, 0.01]),
+    ]
+    svg = figures.budget_svg(synthetic.diagnosis(budget=terms))
+    assert svg is not None
+    assert [text for text in ("\u221266 %", "166 %", "under 1 %") if text not in svg] == []
+    # a number that lies outside of the picture would be lost
+    width = float(re.search(r'viewBox="0 0 ([\d.]+)', svg)[1])  # type: ignore[index]
+    places = [float(x) for x in re.findall(r'<text [^>]*\bx="([\d.]+)"', svg)]
+    assert max(places) < width
+    sentence = words.budget_sentence(terms)
+    assert "muscle creep 166 % (30 to 250)" in sentence
+    assert "under 1 % unexplained" in sentence

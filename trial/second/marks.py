@@ -9,12 +9,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..score import HEALTHY, gap_of
+from ..score import HEALTHY, RESULTS, gap_of
 from .cases import SCHEMA
 from .design import STRENGTHS
 from .families import KNOWN, OTHER, UNLISTED
 
-RESULTS = ("pamrs.diagnosis/1", "pamrs.diagnosis/2")
 #: noises that must be left for the targets to ask for a name: 3, less what the search for a size
 #: leaves open
 SEEN = 2.5

@@ -37,7 +37,7 @@ def diagnose_command(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     json: Annotated[
-        Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/1).")
+        Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/2).")
     ] = None,
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[

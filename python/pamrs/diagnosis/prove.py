@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from pamrs._writing import write_atomically
+from pamrs.diagnosis.result import READABLE
 from pamrs.errors import CaseError, ParameterError
 
 __all__ = [
@@ -39,7 +40,6 @@ __all__ = [
 
 SCHEMA: Final = "pamrs.prove/1"
 MANIFEST: Final = "manifest.json"
-_RESULT: Final = "pamrs.diagnosis/1"
 _VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
 TIMEOUT: Final = 1800.0
 """Time after which a case is given up [s]."""
@@ -159,7 +159,7 @@ def valid_result(path: Path) -> dict[str, Any] | None:
         return None
     good = (
         isinstance(told, dict)
-        and told.get("schema") == _RESULT
+        and told.get("schema") in READABLE
         and told.get("verdict") in _VERDICTS
     )
     return told if good else None

@@ -30,10 +30,16 @@ from pamrs.findings import (
 )
 from pamrs.report import text as words
 
-__all__ = ["SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
+__all__ = ["READABLE", "SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
 
-SCHEMA: Final = "pamrs.diagnosis/1"
+SCHEMA: Final = "pamrs.diagnosis/2"
 """Name of the JSON schema that `Diagnosis.to_json` follows."""
+READABLE: Final = ("pamrs.diagnosis/1", SCHEMA)
+"""Schemas of results that can be read: every key of an earlier one has kept its meaning."""
+
+
+_ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
+"""Signs that a terminal may lack."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -53,7 +59,7 @@ class Diagnosis(Findings):
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
         which the intervals belong.
     effects : list of EffectFound
-        What is named (with the verdict ``unlisted`` what comes closest): ``id``, ``probability``,
+        What is named (with another verdict what comes closest): ``id``, ``probability``,
         ``name`` (in words), ``parameters`` {name: {value, std, unit, interval?, identifiable?}},
         most probable first; SI, 95 % intervals; ``events``, what happened in single recordings
         (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the
@@ -94,14 +100,24 @@ class Diagnosis(Findings):
     budget : list of BudgetTerm
         What of the nominal model's excess over the noise each term takes on held-out recordings:
         ``block``, ``kind``, ``id``, ``form``, ``share`` with its ``interval``, ``probability``, and
-        what the block keeps after it (``noises``, ``size``, ``unit``).
+        what the block keeps after it (``noises``, ``size``, ``unit``), ``at`` and ``parameters``.
     unexplained : list of Unexplained
         Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``,
-        ``size`` (SI), and the ``verdict`` of their group.
+        ``size`` (SI), the ``verdict`` of their group, its ``share`` of the budget with
+        ``interval``, the ``conditions`` under which it is largest, and the ``form`` that carries
+        over, in words.
+    free_run : list of FreeRun or None
+        The whole rig simulated from its commands alone, for each held-out recording (each fitted
+        one where none was held out): ``recording``, ``role``, ``seconds``, ``channels`` {channel:
+        {unit, before, after, cut_before, cut_after}}, root mean square errors beside those of the
+        cut chain, SI, and a ``note``. None where no recording has the commands;
+        ``free_run_note`` says why.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong: ``name``, ``block``, ``nominal``, ``tolerance``,
         ``value``, ``std``, ``interval`` (95 %), ``unit``, ``moved_sigmas``, ``probability``, and
         ``held_out`` {channel: {before, refit, after}}, the error as in ``fit``, SI.
+    measured : list of str
+        Channels that every recording has.
     residuals : dict of str to BlockResidual
         {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline
         against the noise level.
@@ -130,7 +146,7 @@ class Diagnosis(Findings):
 
     settings: DiagnosisSettings = field(
         default_factory=DiagnosisSettings,
-        metadata=told("the numbers that the verdict rests on, by step", required=False),
+        metadata=told("the numbers that the verdict rests on, by step"),
     )
 
     @property
@@ -151,7 +167,7 @@ class Diagnosis(Findings):
         return {"schema": SCHEMA, **found, "settings": self.settings.to_dict()}
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
-        """Return the result as strict JSON (schema `pamrs.diagnosis/1`).
+        """Return the result as strict JSON (schema `pamrs.diagnosis/2`).
 
         Parameters
         ----------
@@ -177,16 +193,10 @@ class Diagnosis(Findings):
                 "",
                 *textwrap.wrap(where, 96, initial_indent="where  ", subsequent_indent=" " * 7),
             ]
-        if self.probabilities:
-            lines.append("")
-            for name, p in words.ranked_probabilities(self, 5):
-                lines.append(
-                    f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
-                    f"{'#' * round(30 * p)}"
-                )
+        lines += self._summary_probabilities()
         for effect in self.effects:
             lines.append("")
-            lines.append(words.effect_title(effect))
+            lines.append(words.effect_heading(self, effect))
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)
@@ -197,6 +207,7 @@ class Diagnosis(Findings):
             lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
         lines += self._summary_budget()
         lines += self._summary_fit()
+        lines += self._summary_free_run()
         for kept in self.unexplained:
             lines += textwrap.wrap(
                 f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
@@ -215,11 +226,44 @@ class Diagnosis(Findings):
     def __repr__(self) -> str:
         return f"Diagnosis({self.case!r}: {self.verdict}; {self.headline})"
 
+    def _summary_probabilities(self) -> list[str]:
+        """Bars of each group of blocks with a mismatch."""
+        lines = []
+        for block in words.told_probabilities(self):
+            rows = words.ranked_probabilities(block.probabilities, 5)
+            if rows:
+                lines.append("")
+            if rows and len(self.blocks) > 1 and block.blocks:
+                lines.append(f"{words.blocks_label(block)}:")
+            lines += [
+                f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
+                f"{'#' * round(30 * p)}".rstrip()
+                for place, (name, p) in enumerate(rows)
+                if place == 0 or p >= 0.005
+            ]
+        return lines
+
+    def _summary_free_run(self) -> list[str]:
+        """The whole rig from its commands alone, one line for each of the first recordings."""
+        lines = []
+        for run in (self.free_run or [])[:2]:
+            told = []
+            for channel, error in run.channels.items():
+                unit, factor = words.display_unit(error.unit, error.before)
+                before, after = (
+                    words.format_number(v * factor, unicode=False)
+                    for v in (error.before, error.after)
+                )
+                told.append(f"{channel} {before} to {after} {unit}")
+            text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
+            lines += textwrap.wrap(text.translate(_ASCII), 96, subsequent_indent="  ")
+        return lines
+
     def _summary_budget(self) -> list[str]:
         """What takes the mismatch of each block."""
         lines = []
         for block, own in words.budgets(self).items():
-            told = f"Budget of {block}: {words.budget_sentence(own)}"
+            told = f"Budget of {block}: {words.budget_sentence(own)}".translate(_ASCII)
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []
 
@@ -297,7 +341,9 @@ class Diagnosis(Findings):
             f"<td>{html.escape(words.format_probability(p))}</td>"
             f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
             f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"
-            for name, p in words.ranked_probabilities(self, 5)
+            for name, p in words.ranked_probabilities(
+                words.told_probabilities(self)[0].probabilities, 5
+            )
         )
         gap = self.fit.gap_closed
         closed = (
@@ -314,14 +360,14 @@ class Diagnosis(Findings):
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema of `pamrs.diagnosis/1` as a dictionary, made from the types of the
+    """Return the JSON Schema of `pamrs.diagnosis/2` as a dictionary, made from the types of the
     result.
     """
     definitions = dict(DEFINITIONS)
     found = object_of(Diagnosis, definitions)
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "urn:pamrs:schema:pamrs.diagnosis:1",
+        "$id": "urn:pamrs:schema:pamrs.diagnosis:2",
         "title": SCHEMA,
         **found,
         ("description"): (

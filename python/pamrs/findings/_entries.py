@@ -12,11 +12,14 @@ __all__ = [
     "VERDICTS",
     "BlockMismatch",
     "BlockVerdict",
+    "BudgetTerm",
     "ChannelError",
     "Condition",
     "EffectFound",
     "EffectParameterFound",
     "FitErrors",
+    "FreeRun",
+    "FreeRunError",
     "MismatchSize",
     "MismatchStages",
     "ParameterFound",
@@ -254,6 +257,15 @@ class Unexplained(Entry):
         How large it is, in units of the noise and in the unit of the channel.
     verdict : str
         Of its group of blocks.
+    share : float or None
+        Of the nominal model's excess variance over the noise; None where the nominal model has
+        none on these recordings.
+    interval : list of two floats or None
+        95 % interval of the share.
+    conditions : list of Condition
+        Under which it is largest, the most telling first.
+    form : str
+        What it is a function of, in words, where such a form carries over to other recordings.
     """
 
     block: str
@@ -262,6 +274,21 @@ class Unexplained(Entry):
     noises: float = field(metadata=told("in units of the noise"))
     size: float = field(metadata=told("in the unit of the channel"))
     verdict: str = field(metadata=told("of its group of blocks", enum=VERDICTS[1:]))
+    share: float | None = field(
+        default=None, metadata=told("of the nominal model's excess variance over the noise")
+    )
+    interval: list[float] | None = field(
+        default=None, metadata=told("95 % interval of the share", kind="pair_or_null")
+    )
+    conditions: list[Condition] = field(
+        default_factory=list, metadata=told("under which it is largest, the most telling first")
+    )
+    form: str = field(
+        default="",
+        metadata=told(
+            "what it is a function of, in words, where that carries over to other recordings"
+        ),
+    )
 
 
 TERMS = ("held", "parameters", "wrong_parameter", "effect", "form", "unexplained")
@@ -295,6 +322,10 @@ class BudgetTerm(Entry):
         What the block keeps after it, in units of the noise and in the channel's unit.
     unit : str
         SI unit.
+    at : str
+        Name of the block at which the effect acts; empty where it acts at every block of its kind.
+    parameters : dict of str to EffectParameterFound
+        Values of the term: those of the effect, or of the wrong parameters by dotted name, SI.
     """
 
     block: str
@@ -309,6 +340,14 @@ class BudgetTerm(Entry):
     noises: float = field(metadata=told("what the block keeps after it, in units of the noise"))
     size: float = field(metadata=told("the same in the unit of the channel"))
     unit: str
+    at: str = field(
+        default="",
+        metadata=told("block at which the effect acts; empty for every block of its kind"),
+    )
+    parameters: dict[str, EffectParameterFound] = field(
+        default_factory=dict,
+        metadata=told("values of the effect, or of the wrong parameters by dotted name"),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -433,4 +472,51 @@ class FitErrors(Entry):
             "(refit - after)/(refit - noise), held-out data, channels pooled in units of their "
             "noise; 1 is down to the noise"
         ),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRunError(Entry):
+    """Root mean square error of a channel in a free run, beside that of the cut chain.
+
+    Attributes
+    ----------
+    unit : str
+        SI unit of all of them.
+    before, after : float
+        Of the whole rig from its commands alone: nominal model, and with what was found; NaN where
+        the simulation left its range.
+    cut_before, cut_after : float or None
+        Of the block driven by its measured neighbours; None where no block predicts the channel.
+    """
+
+    unit: str
+    before: float = field(metadata=told("nominal model, driven by its commands alone"))
+    after: float = field(metadata=told("with what was found, driven by its commands alone"))
+    cut_before: float | None = field(metadata=told("nominal block, driven by what was measured"))
+    cut_after: float | None = field(metadata=told("the same with what was found"))
+
+
+@dataclass(frozen=True, eq=False)
+class FreeRun(Entry):
+    """One recording simulated as a whole, from its commands and its first measured values.
+
+    Attributes
+    ----------
+    recording, role : str
+        Its name; ``fit`` or ``held_out``.
+    seconds : float
+        How long it is [s].
+    channels : dict of str to FreeRunError
+        By measured channel.
+    note : str
+        Why a model gives no numbers; empty where both do.
+    """
+
+    recording: str
+    role: str = field(metadata=told(enum=("fit", "held_out")))
+    seconds: float = field(metadata=told("length of the recording"))
+    channels: dict[str, FreeRunError]
+    note: str = field(
+        default="", metadata=told("why a model gives no numbers; empty where both do")
     )

@@ -39,7 +39,8 @@ def told(
     omit_empty : bool
         Whether JSON leaves it out where it is None or empty.
     kind : str
-        What its type does not say: ``probability``, ``pair`` and ``pairs`` of numbers, ``events``.
+        What its type does not say: ``probability``, ``pair``, ``pair_or_null`` and ``pairs`` of
+        numbers, ``events``.
     enum : sequence of str
         Allowed values.
     required : bool

@@ -11,6 +11,7 @@ from pamrs.findings._entries import (
     BudgetTerm,
     EffectFound,
     FitErrors,
+    FreeRun,
     ParameterFound,
     Unexplained,
     Where,
@@ -35,7 +36,7 @@ class Findings:
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
-        What is named (with the verdict ``unlisted`` what comes closest), most probable first.
+        What is named (with another verdict what comes closest), most probable first.
     ambiguity : list of list of str
         Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
         the data cannot separate; empty when settled.
@@ -51,6 +52,11 @@ class Findings:
         Blocks with a mismatch that stays unexplained, the largest first.
     wrong_parameters : list of WrongParameter
         Values of the rig file that are wrong.
+    free_run : list of FreeRun or None
+        Errors of the whole rig simulated from its commands alone, for each held-out recording (each
+        fitted one where none was held out); None where no recording has the commands.
+    free_run_note : str
+        Why there is no free run, or of some recordings none; empty where nothing is missing.
     parameters : dict of str to ParameterFound
         Parameters of the baseline, SI.
     fit : FitErrors
@@ -67,6 +73,8 @@ class Findings:
         Final model, with what was found.
     traces : list of Trace
         Measured and simulated channels.
+    measured : list of str
+        Channels that every recording has.
     residuals : dict of str to BlockResidual
         Residual of each block's refitted baseline against the noise level.
     condition_map : ConditionMap or None
@@ -99,26 +107,32 @@ class Findings:
     )
     blocks: list[BlockVerdict] = field(
         default_factory=list,
-        metadata=told(
-            "the verdict of each group of blocks that is judged by itself", required=False
-        ),
+        metadata=told("the verdict of each group of blocks that is judged by itself"),
     )
     budget: list[BudgetTerm] = field(
         default_factory=list,
         metadata=told(
-            "what of the nominal model's excess over the noise each term takes, block by block",
-            required=False,
+            "what of the nominal model's excess over the noise each term takes, block by block"
         ),
     )
     unexplained: list[Unexplained] = field(
         default_factory=list,
-        metadata=told(
-            "blocks with a mismatch that stays unexplained, the largest first", required=False
-        ),
+        metadata=told("blocks with a mismatch that stays unexplained, the largest first"),
     )
     wrong_parameters: list[WrongParameter] = field(
         default_factory=list,
-        metadata=told("values of the rig file that are wrong", required=False),
+        metadata=told("values of the rig file that are wrong"),
+    )
+    free_run: list[FreeRun] | None = field(
+        default=None,
+        metadata=told(
+            "the whole rig simulated from its commands alone, by held-out recording (by fitted "
+            "one where none was held out); null where no recording has the commands"
+        ),
+    )
+    free_run_note: str = field(
+        default="",
+        metadata=told("why there is no free run, or of some recordings none; empty otherwise"),
     )
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
@@ -128,6 +142,7 @@ class Findings:
     text: str = field(default="", metadata=told(json=False))
     rig: ModelFile | None = field(default=None, metadata=told(json=False))
     traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
+    measured: list[str] = field(default_factory=list, metadata=told(json=False))
     residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
     condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
     timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))

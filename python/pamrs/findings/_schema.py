@@ -20,6 +20,7 @@ _NUMBER, _PROBABILITY = {"$ref": "#/$defs/number"}, {"$ref": "#/$defs/probabilit
 _PAIR = {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}
 _KINDS: dict[str, dict[str, Any]] = {
     "pair": _PAIR,
+    "pair_or_null": {"oneOf": [{"type": "null"}, _PAIR]},
     "pairs": {"type": "array", "items": _PAIR},
     "events": {
         "type": "array",

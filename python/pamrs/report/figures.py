@@ -18,10 +18,12 @@ from matplotlib.figure import Figure
 
 from pamrs.findings import BudgetTerm, ConditionMap, Curves, Findings, Trace
 from pamrs.report.text import (
+    blocks_label,
     budgets,
     display_unit,
     format_number,
     format_probability,
+    format_share,
     headline,
     hypothesis_label,
     is_named,
@@ -29,6 +31,7 @@ from pamrs.report.text import (
     label,
     ranked_probabilities,
     term_label,
+    told_probabilities,
 )
 
 __all__ = [
@@ -357,6 +360,13 @@ def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
     return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
 
 
+def _beside(axes: Axes, x: float, y: float, text: str) -> None:
+    """A number beside the end of a bar (SVG drops spaces that stand before a text)."""
+    axes.annotate(
+        text, (x, y), xytext=(4.0, 0.0), textcoords="offset points", va="center", fontsize="small"
+    )
+
+
 def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows: int = 1) -> None:
     position = np.arange(len(rows))
     size = np.asarray([r[1] for r in rows])
@@ -364,13 +374,18 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
     axes.barh(position, size - left, left=left, color=colours, height=0.62)
     axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
-    axes.text(1.0, -0.62, " noise level", va="bottom", ha="left", color="#374151", fontsize="small")
+    axes.annotate(
+        "noise level",
+        (1.0, -0.62),
+        xytext=(4.0, 0.0),
+        textcoords="offset points",
+        color="#374151",
+        fontsize="small",
+    )
     axes.set_xscale("log")
     axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
-        axes.text(
-            value, y, f"  {format_number(value, 2)}×", va="center", ha="left", fontsize="small"
-        )
+        _beside(axes, value, y, f"{format_number(value, 2)}×")
     axes.set_yticks(position, [label(r[0]) for r in rows])
     axes.set_ylim(max(len(rows), least_rows) - 0.45, -1.0)
     axes.xaxis.set_major_formatter(lambda v, _: format_number(v, 1))
@@ -415,6 +430,7 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
         "unexplained": COLOURS["before"],
     }
     held = any(term.kind == "held" for term in terms)
+    reached = [0.0, 1.0]
     names = ["model without what it holds" if held else "nominal model"]
     axes.barh(0, 100.0, color="#d1d5db", height=0.62)
     left = 1.0
@@ -424,15 +440,19 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
         colour = colours.get(term.kind, COLOURS["after"])
         axes.barh(row, 100.0 * term.share, left=100.0 * begin, color=colour, height=0.62)
         if not rest:
-            ends = [100.0 * (left - share) for share in term.interval]
+            ends = [min(250.0, max(-50.0, 100.0 * (left - share))) for share in term.interval]
             axes.plot(ends, [row, row], color="#1f1f1f", lw=0.9)
             left -= term.share
+            reached += [left, *(end / 100.0 for end in ends)]
         side = 100.0 * max(begin, begin + term.share)
-        axes.text(side, row, f"  {100 * term.share:.0f} %", va="center", fontsize="small")
+        if not rest:
+            side = max(side, *ends)
+        _beside(axes, side, row, format_share(term.share))
         names.append(term_label(term))
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
-    axes.set_xlim(min(0.0, 100.0 * min(t.share for t in terms) - 5.0), 118.0)
+    low, high = min(reached), max(reached)
+    axes.set_xlim(100.0 * low - 3.0, 100.0 * (high + 0.16 * (high - low)))
     axes.grid(axis="y", visible=False)
     axes.set_title(label(block), loc="left", fontsize="medium")
 
@@ -503,9 +523,10 @@ def _draw_maps(
 
 
 def _draw_probabilities(axes: Axes, diagnosis: Findings) -> None:
-    rows = ranked_probabilities(diagnosis, 6)
+    block = told_probabilities(diagnosis)[0]
+    rows = ranked_probabilities(block.probabilities, 6)
     position = np.arange(len(rows))
-    colours = [COLOURS["after" if is_named(diagnosis, name) else "quiet"] for name, _ in rows]
+    colours = [COLOURS["after" if is_named(block, name) else "quiet"] for name, _ in rows]
     axes.barh(position, [p for _, p in rows], color=colours, height=0.62)
     for y, (_, p) in zip(position.tolist(), rows, strict=True):
         axes.text(p + 0.015, y, format_probability(p), va="center", fontsize="small")
@@ -585,11 +606,13 @@ def _draw_right(right: Any, diagnosis: Findings) -> None:
     content = diagnosis.condition_map and _grids(diagnosis.condition_map)
     rows = _block_rows(diagnosis)
     below = bool(content) or bool(rows)
-    above = bool(diagnosis.probabilities)
+    told = told_probabilities(diagnosis)[0]
+    above = bool(told.probabilities)
     parts = right.subfigures(int(above) + int(below) or 1, 1, squeeze=False)[:, 0]
     if above:
         _draw_probabilities(parts[0].subplots(), diagnosis)
-        _head(parts[0], "Probability of each hypothesis")
+        of = f", {blocks_label(told)}" if len(diagnosis.blocks) > 1 and told.blocks else ""
+        _head(parts[0], textwrap.shorten(f"Probability of each hypothesis{of}", 60))
     if content and diagnosis.condition_map is not None:
         _head(parts[-1], "When: residual over two conditions")
         _draw_maps(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +13,13 @@ from pamrs.channels import UNITS
 from pamrs.findings import ChannelError, Findings, Trace
 from pamrs.report import figures
 from pamrs.report import text as words
+from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
 
 __all__ = ["render"]
 
 HELD_OUT_SHOWN = 2
+WARNINGS_SHOWN = 6
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
@@ -27,8 +30,23 @@ BADGES = {
 }
 
 
-WRONG = "a value of the rig file is wrong"
-"""Badge of the verdict ``parameters`` where a value is named."""
+OPEN_BADGES = {
+    "none": "nothing missing, but not settled",
+    "parameters": "parameters or physics, not settled",
+    "effects": "missing physics, the name is not settled",
+    "unlisted": "missing physics, no name",
+}
+"""The same where several answers are left."""
+
+WRONG, PERHAPS_WRONG = "a value of the rig file is wrong", "a value of the rig file may be wrong"
+"""Badges of the verdict ``parameters`` where a value is named."""
+
+
+def _badge(verdict: str, *, wrong: bool, is_open: bool) -> str:
+    """A verdict in a few words, no surer than it is."""
+    if wrong and verdict == "parameters":
+        return PERHAPS_WRONG if is_open else WRONG
+    return (OPEN_BADGES if is_open else BADGES)[verdict]
 
 
 def _span(bounds: tuple[float, float] | None, digits: int = 3) -> str:
@@ -49,6 +67,12 @@ def _unit(unit: Any) -> str:
     return text
 
 
+def _typeset(text: str) -> str:
+    """Text of a terminal as a page has it: ``361.9 ± 1.2 cm³``."""
+    raised = re.sub(r"\b(c?m?m)([23])\b", lambda m: m[1] + {"2": "²", "3": "³"}[m[2]], text)
+    return raised.replace("+-", "±")
+
+
 def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
     rows = []
     for effect in diagnosis.effects:
@@ -67,8 +91,8 @@ def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
         rows.append(
             {
                 "id": effect.id,
-                "name": words.effect_title(effect),
-                "probability": words.format_probability(effect.probability),
+                "name": words.effect_heading(diagnosis, effect),
+                "probability": words.name_chance(diagnosis, effect),
                 "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
                 "parameters": parameters,
             }
@@ -106,7 +130,11 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
             )
         rows.append(
             {
-                "verdict": WRONG if entry.wrong_parameters else BADGES[entry.verdict],
+                "verdict": _badge(
+                    entry.verdict,
+                    wrong=bool(entry.wrong_parameters),
+                    is_open=len(entry.ambiguity) > 1,
+                ),
                 "names": words.set_label(found) if found else "–",
                 "probability": words.format_probability(chance),
                 "leading": words.hypothesis_label(leading),
@@ -137,7 +165,7 @@ def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
                 "value": words.format_uncertain(entry.value * factor, entry.std * factor),
                 "interval": _span((interval[0], interval[1]), 4),
                 "moved": f"{entry.moved_sigmas:+.1f}".replace("-", "−"),
-                "probability": words.format_probability(entry.probability),
+                "probability": words.name_chance(diagnosis, entry),
                 "errors": "; ".join(errors),
             }
         )
@@ -235,6 +263,32 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
     return rows
 
 
+def _free_run(diagnosis: Findings) -> list[dict[str, Any]]:
+    """Errors of free runs beside those of the cut chain, channel by channel."""
+    rows = []
+    for run in diagnosis.free_run or []:
+        for k, (channel, error) in enumerate(run.channels.items()):
+            every = (error.before, error.after, error.cut_before, error.cut_after)
+            sizes = [abs(v) for v in every if words.is_number(v)]
+            unit, factor = words.display_unit(error.unit, max(sizes, default=math.nan))
+            cells = [words.format_number(v * factor) if words.is_number(v) else "–" for v in every]
+            rows.append(
+                {
+                    "recording": run.recording if k == 0 else "",
+                    "channel": words.label(channel),
+                    "unit": unit,
+                    "cells": cells,
+                }
+            )
+    return rows
+
+
+def _free_notes(diagnosis: Findings) -> list[str]:
+    """What is missing among the free runs, and why."""
+    notes = [f"{run.recording}: {run.note}" for run in diagnosis.free_run or [] if run.note]
+    return [*notes, *([diagnosis.free_run_note] if diagnosis.free_run_note else [])]
+
+
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     """One fitted and up to two held-out recordings with their figure, and how many are not
     shown.
@@ -262,15 +316,26 @@ def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     return shown, len(groups) - len(shown)
 
 
-def _probabilities(diagnosis: Findings) -> list[dict[str, Any]]:
+def _probabilities(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The bars of each group of blocks with a mismatch, under its name where there are several
+    groups.
+    """
+    several = len(diagnosis.blocks) > 1
     return [
-        {
-            "name": words.hypothesis_label(name),
-            "text": words.format_probability(p),
-            "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
-            "named": words.is_named(diagnosis, name),
-        }
-        for name, p in words.ranked_probabilities(diagnosis, 12)
+        (
+            words.blocks_label(block) if several else "",
+            [
+                {
+                    "name": words.hypothesis_label(name),
+                    "text": words.format_probability(p),
+                    "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
+                    "named": words.is_named(block, name),
+                }
+                for name, p in words.ranked_probabilities(block.probabilities, 8)
+            ],
+        )
+        for block in words.told_probabilities(diagnosis)
+        if block.probabilities
     ]
 
 
@@ -281,11 +346,9 @@ def _markup(svg: str | None) -> Markup | None:
 def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
     """The few numbers under the headline."""
     facts = []
-    if diagnosis.probabilities:
-        name, p = words.ranked_probabilities(diagnosis, len(diagnosis.probabilities))[0]
-        facts.append(
-            (words.format_probability(p), f"probability of: {words.hypothesis_label(name)}")
-        )
+    answer, chance = words.leading(diagnosis)
+    if words.is_number(chance):
+        facts.append((words.format_probability(chance), f"probability: {answer}"))
     gap = diagnosis.fit.gap_closed
     if words.is_number(gap):
         facts.append(
@@ -367,15 +430,22 @@ def render(diagnosis: Findings) -> str:
     return render_page(
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
-        badge=WRONG
-        if diagnosis.verdict == "parameters" and diagnosis.wrong_parameters
-        else BADGES[diagnosis.verdict],
-        headline=words.headline(diagnosis),
-        paragraphs=[p.strip() for p in diagnosis.text.split("\n\n") if p.strip()],
+        badge=_badge(
+            diagnosis.verdict,
+            wrong=bool(diagnosis.wrong_parameters),
+            is_open=words.is_open(diagnosis),
+        ),
+        headline=_typeset(words.claim(diagnosis)),
+        paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
         facts=_facts(diagnosis),
-        where_text=diagnosis.where.text,
+        warnings=(diagnosis.warnings[:WARNINGS_SHOWN], diagnosis.warnings[WARNINGS_SHOWN:]),
+        # said above already, where the text has it
+        where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
         intervals=_intervals(diagnosis),
         conditions=[condition.text for condition in diagnosis.where.conditions],
+        chain=_markup(chain_svg(diagnosis)),
+        free_run=_free_run(diagnosis),
+        free_notes=_free_notes(diagnosis),
         blocks=_markup(figures.blocks_svg(diagnosis)),
         map=_markup(figures.map_svg(diagnosis)),
         map_block=words.label(shown or diagnosis.where.block or ""),
@@ -388,8 +458,12 @@ def render(diagnosis: Findings) -> str:
             for block, own in words.budgets(diagnosis).items()
         ],
         wrong=_wrong(diagnosis),
-        kept=[words.kept_sentence(u) for u in diagnosis.unexplained],
-        ambiguity=[words.set_label(list(s)) for s in diagnosis.ambiguity],
+        kept=[words.kept_details(u) for u in diagnosis.unexplained],
+        ambiguity=[
+            (words.set_label(s), words.format_probability(chance))
+            for s in diagnosis.ambiguity
+            for chance in [words.chance_of(diagnosis.probabilities, s)]
+        ],
         tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,
         excitation=_excitation(diagnosis),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, TypeGuard
 
 from pamrs.effects import EFFECTS
@@ -18,33 +18,53 @@ from pamrs.findings import (
 )
 
 __all__ = [
+    "HEALTHY",
+    "blocks_label",
     "budget_sentence",
     "budgets",
+    "chance_of",
+    "claim",
     "display_unit",
+    "effect_heading",
     "effect_title",
     "format_number",
     "format_probability",
+    "format_share",
     "format_uncertain",
     "headline",
     "hypothesis_label",
     "is_named",
     "is_number",
+    "is_open",
+    "kept_details",
     "kept_sentence",
     "label",
+    "leading",
     "moved_parameters",
+    "name_chance",
     "ranked_probabilities",
     "sentence_of",
     "set_label",
     "span95",
     "term_label",
+    "told_blocks",
+    "told_probabilities",
 ]
 
 _LABELS = {
     "none": "nothing missing",
     "parameters": "parameters in tolerance",
     "unlisted": "unlisted effect",
+    "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
+
+SETTLED = 0.9
+"""Probability from which physics is said to lie outside the catalogue (that from which an answer is
+settled, `VerdictSettings.settled`)."""
+
+HEALTHY = ("none", "parameters")
+"""Hypotheses by which no physics is missing."""
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DISPLAY = {
@@ -162,9 +182,11 @@ def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
     return None
 
 
-def ranked_probabilities(diagnosis: Findings, count: int = 8) -> list[tuple[str, float]]:
+def ranked_probabilities(
+    probabilities: Mapping[str, float], count: int = 8
+) -> list[tuple[str, float]]:
     """Most probable hypotheses first, at most `count`; the rest is pooled under ``all others``."""
-    known = [(k, float(v)) for k, v in diagnosis.probabilities.items() if is_number(v)]
+    known = [(k, float(v)) for k, v in probabilities.items() if is_number(v)]
     known.sort(key=lambda item: (-item[1], item[0]))
     if len(known) <= count:
         return known
@@ -172,11 +194,29 @@ def ranked_probabilities(diagnosis: Findings, count: int = 8) -> list[tuple[str,
     return [*known[: count - 1], (f"all others ({len(rest)})", sum(p for _, p in rest))]
 
 
-def is_named(diagnosis: Findings, hypothesis: str) -> bool:
-    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that the verdict names."""
-    wrong = {w.name for w in diagnosis.wrong_parameters}
-    effects = {e.id for e in diagnosis.effects} if diagnosis.verdict == "effects" else set()
-    named = effects | wrong or {diagnosis.verdict}
+def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
+    """The groups of blocks whose probabilities a reader needs, that of the headline first: those
+    with a mismatch; one for the whole case where none has, or where a result does not tell them
+    apart.
+    """
+    blocks = told_blocks(diagnosis)
+    found = [b for b in blocks if b.verdict not in HEALTHY or b.wrong_parameters or b.ambiguity]
+    if not diagnosis.blocks or not found:
+        names = [w.name for w in diagnosis.wrong_parameters]
+        effects = [e.id for e in diagnosis.effects if diagnosis.verdict == "effects"]
+        whole = BlockVerdict([], diagnosis.verdict, diagnosis.probabilities, effects, names, [])
+        return [whole]
+    return sorted(found, key=lambda b: diagnosis.where.block not in b.blocks)
+
+
+def blocks_label(block: BlockVerdict) -> str:
+    """The blocks of a group, in words: ``supply and chamber``."""
+    return " and ".join(_spoken(name) for name in block.blocks)
+
+
+def is_named(block: BlockVerdict, hypothesis: str) -> bool:
+    """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that a group names."""
+    named = {*block.effects, *block.wrong_parameters} or {block.verdict}
     return set(hypothesis.replace(" ", "").split("+")) == named
 
 
@@ -223,6 +263,19 @@ def kept_sentence(kept: Unexplained) -> str:
     ).replace("°", "deg")
 
 
+def kept_details(kept: Unexplained) -> str:
+    """The same with its share of the budget and the conditions under which it is largest."""
+    text = kept_sentence(kept)
+    if is_number(kept.share) and kept.interval is not None:
+        text += (
+            f"; {format_share(kept.share)} of what the nominal model misses "
+            f"({_span(kept.interval)})"
+        )
+    if kept.conditions:
+        text += f"; largest under: {'; '.join(c.text for c in kept.conditions[:2])}"
+    return text
+
+
 def _spoken(name: str) -> str:
     """A block or a parameter of the rig file by its dotted name, in words: ``chamber flexor``,
     ``chamber dead volume``.
@@ -234,23 +287,29 @@ def headline(diagnosis: Findings) -> str:
     """One sentence that states the verdict: what was found in each block, then what stays
     unexplained.
     """
-    blocks = _blocks(diagnosis)
+    blocks = told_blocks(diagnosis)
+    open_ = {n for b in blocks if b.verdict == "unlisted" and b.ambiguity for n in b.blocks}
+    kept = [
+        kept_sentence(u)
+        for u in diagnosis.unexplained
+        if u.verdict == "unlisted" and u.block not in open_
+    ]
+    return "; ".join([claim(diagnosis), *kept[:2]])
+
+
+def claim(diagnosis: Findings) -> str:
+    """The headline without what stays unexplained."""
+    blocks = told_blocks(diagnosis)
     named = [b for b in blocks if b.effects or b.wrong_parameters]
     doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
     if not named and not doubtful:
         return _unnamed(diagnosis)
     found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b.effects)]
     text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
-    open_ = {name for b in doubtful for name in b.blocks}
-    kept = [
-        kept_sentence(u)
-        for u in diagnosis.unexplained
-        if u.verdict == "unlisted" and u.block not in open_
-    ]
-    return "; ".join([text[:1].upper() + text[1:], *kept[:2]])
+    return text[:1].upper() + text[1:]
 
 
-def _blocks(diagnosis: Findings) -> list[BlockVerdict]:
+def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
     """The groups of blocks with their names; one of the whole case where a result does not tell
     them apart.
     """
@@ -261,7 +320,7 @@ def _blocks(diagnosis: Findings) -> list[BlockVerdict]:
         BlockVerdict(
             blocks=[block] if block else [],
             verdict="",  # that of the case, which is told apart
-            probabilities={},
+            probabilities=diagnosis.probabilities,
             effects=[e.id for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
             wrong_parameters=[w.name for w in diagnosis.wrong_parameters],
             ambiguity=diagnosis.ambiguity,
@@ -283,7 +342,9 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
     if len(block.ambiguity) > 1:
-        rivals = f"these recordings cannot tell {_from_each_other(block.ambiguity)}"
+        rivals = "these recordings cannot tell " + _from_each_other(
+            block.ambiguity, block.probabilities
+        )
         healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
         if all(
             "." in name or name in ("none", "parameters") for s in block.ambiguity for name in s
@@ -297,19 +358,96 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     told = {e.id: e for e in diagnosis.effects}
     if block.effects:
         names = " and ".join((told[e].name if e in told else "") or label(e) for e in block.effects)
-        chances = [told[e].probability for e in block.effects if e in told]
-        chance = min((p for p in chances if is_number(p)), default=math.nan)
-        how_sure = f", probability {format_probability(chance)}" if math.isfinite(chance) else ""
+        how_sure = _how_sure(_of_names(diagnosis, block))
         return f"the model leaves out: {names}{place}{how_sure}"
     wrong = {w.name: w for w in diagnosis.wrong_parameters}
     values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
-    chance = min(wrong[name].probability for name in block.wrong_parameters)
-    return f"the rig file is wrong: {values}, probability {format_probability(chance)}"
+    return f"the rig file is wrong: {values}{_how_sure(_of_names(diagnosis, block))}"
 
 
-def _from_each_other(sets: list[list[str]]) -> str:
-    """Hypotheses that are left: ``a from b``, ``a, b and c apart``."""
-    told = [_answer(s) for s in sets]
+def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float:
+    """Probability of a hypothesis by its names, in whatever order its key has them; NaN where it is
+    not among them.
+    """
+    wanted = set(names)
+    found = (float(p) for key, p in probabilities.items() if set(key.split("+")) == wanted)
+    return next((p for p in found if is_number(p)), math.nan)
+
+
+def _of_names(diagnosis: Findings, block: BlockVerdict) -> float:
+    """Probability of what a block names: of that set of names where it leads, else of the least
+    probable of the names, whatever else acts beside it.
+    """
+    names = [*block.effects, *block.wrong_parameters]
+    known = [float(p) for p in block.probabilities.values() if is_number(p)]
+    together = chance_of(block.probabilities, names)
+    if is_number(together) and together >= max(known):
+        return together
+    every: list[EffectFound | WrongParameter] = [
+        *(e for e in diagnosis.effects if e.id in names),
+        *(w for w in diagnosis.wrong_parameters if w.name in names),
+    ]
+    return min((e.probability for e in every if is_number(e.probability)), default=math.nan)
+
+
+def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str:
+    """Probability of one name, and that it counts sets with others where these make a
+    difference: ``0.93, alone or with others``.
+    """
+    name = entry.id if isinstance(entry, EffectFound) else entry.name
+    text = format_probability(entry.probability)
+    for block in told_blocks(diagnosis):
+        named = [*block.effects, *block.wrong_parameters]
+        if name in named and format_probability(_of_names(diagnosis, block)) != text:
+            return f"{text}, alone or with others"
+    return text
+
+
+def leading(diagnosis: Findings) -> tuple[str, float]:
+    """What a diagnosis answers for the whole case, in words, and its probability; NaN where it is
+    not known.
+    """
+    probabilities = diagnosis.probabilities
+    wrong = [w.name for w in diagnosis.wrong_parameters]
+    names = wrong + [e.id for e in diagnosis.effects if diagnosis.verdict == "effects"]
+    if not names and diagnosis.verdict == "unlisted":
+        return label("unlisted"), chance_of(probabilities, ["unlisted"])
+    if not names:
+        found = [chance_of(probabilities, [key]) for key in HEALTHY]
+        known = [p for p in found if is_number(p)]
+        return "no physics is missing", sum(known) if known else math.nan
+    own = [b for b in told_blocks(diagnosis) if b.effects or b.wrong_parameters]
+    if len(own) == 1:
+        return set_label(names), _of_names(diagnosis, own[0])
+    whole = BlockVerdict(
+        blocks=[],
+        verdict="",
+        probabilities=probabilities,
+        effects=[n for n in names if n not in wrong],
+        wrong_parameters=wrong,
+        ambiguity=[],
+    )
+    return set_label(names), _of_names(diagnosis, whole)
+
+
+def is_open(diagnosis: Findings) -> bool:
+    """Whether the answer is not settled: several sets are left, or no name is given and an effect
+    outside the catalogue is not probable enough to be said.
+    """
+    if len(diagnosis.ambiguity) > 1:
+        return True
+    return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < SETTLED
+
+
+def _how_sure(chance: float) -> str:
+    return f", probability {format_probability(chance)}" if is_number(chance) else ""
+
+
+def _from_each_other(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:
+    """Hypotheses that are left, the most probable first: ``a (0.80) from b (0.12)``, ``a (0.50), b
+    (0.30) and c (0.20) apart``.
+    """
+    told = [_answer(s, chance_of(probabilities, s)) for s in sets]
     return (
         f"{told[0]} from {told[1]}"
         if len(told) == 2
@@ -317,15 +455,19 @@ def _from_each_other(sets: list[list[str]]) -> str:
     )
 
 
-def _answer(names: list[str]) -> str:
-    """One of several hypotheses, in words."""
-    if names == ["parameters"]:
-        return "parameter values that are off"
-    if names == ["unlisted"]:
-        return "an effect outside the catalogue"
-    if names == ["none"]:
-        return "nothing missing"
-    return " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
+def _answer(names: list[str], chance: float = math.nan) -> str:
+    """One of several hypotheses, in words, with its probability."""
+    fixed = {
+        "parameters": "parameter values that are off",
+        "unlisted": "an effect outside the catalogue",
+        "none": "nothing missing",
+    }
+    text = (
+        fixed[names[0]]
+        if len(names) == 1 and names[0] in fixed
+        else " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
+    )
+    return f"{text} ({format_probability(chance)})" if is_number(chance) else text
 
 
 def _unnamed(diagnosis: Findings) -> str:
@@ -333,7 +475,7 @@ def _unnamed(diagnosis: Findings) -> str:
     block = diagnosis.where.block
     place = f" in the {_spoken(block)}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
-    rivals = " or ".join(_answer(s) for s in doubtful)
+    rivals = " or ".join(_answer(s, chance_of(diagnosis.probabilities, s)) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
         return (
             "The model explains these recordings down to the noise level, but they cannot rule out "
@@ -351,11 +493,26 @@ def _unnamed(diagnosis: Findings) -> str:
         which = f": {', '.join(moved)}" if moved else ""
         return f"No physics is missing; parameter values explain the difference{which}"
     if len(doubtful) > 1:
-        return (
-            f"Physics is missing{place}: these recordings cannot tell {_from_each_other(doubtful)}"
-        )
-    kept = [kept_sentence(u) for u in diagnosis.unexplained if u.verdict == "unlisted"]
-    return "; ".join([f"Physics outside the catalogue acts{place or ' on this rig'}", *kept[:2]])
+        apart = _from_each_other(doubtful, diagnosis.probabilities)
+        return f"Physics is missing{place}: these recordings cannot tell {apart}"
+    return _outside(diagnosis, place)
+
+
+def _outside(diagnosis: Findings, place: str) -> str:
+    """That something has no name, no more surely than its probability allows."""
+    chance = leading(diagnosis)[1]
+    if not chance < SETTLED:
+        return f"Physics outside the catalogue acts{place or ' on this rig'}{_how_sure(chance)}"
+    rivals = [
+        (key, p)
+        for key, p in ranked_probabilities(diagnosis.probabilities, len(diagnosis.probabilities))
+        if key not in (*HEALTHY, "unlisted")
+    ]
+    others = " or ".join(_answer(key.split("+"), p) for key, p in rivals[:2])
+    return (
+        f"Physics is missing{place}, and nothing is probable enough to be named: "
+        f"{_answer(['unlisted'], chance)}{f', {others}' if others else ''}"
+    )
 
 
 def term_label(term: BudgetTerm) -> str:
@@ -386,18 +543,42 @@ def effect_title(effect: EffectFound) -> str:
     return (effect.name or label(effect.id)) + form
 
 
+def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:
+    """The same, and that it only comes closest where it is not named."""
+    title = effect_title(effect)
+    return title if diagnosis.verdict == "effects" else f"not named, but closest: {title}"
+
+
 def budget_sentence(terms: Sequence[BudgetTerm]) -> str:
     """The budget of one block in words."""
-    told = []
-    for term in terms[:-1]:
-        low, high = (100.0 * share for share in term.interval)
-        told.append(f"{term_label(term)} {100 * term.share:.0f} % ({low:.0f} to {high:.0f})")
+    told = [
+        f"{term_label(term)} {format_share(term.share)} ({_span(term.interval)})"
+        for term in terms[:-1]
+    ]
     last = terms[-1]
     unit, factor = display_unit(last.unit, abs(last.size))
     left = (
-        f"{100 * last.share:.0f} % unexplained: {format_number(last.noises, 2)} noise levels, "
+        f"{format_share(last.share)} unexplained: {format_number(last.noises, 2)} noise levels, "
         f"{format_number(last.size * factor, 2)} {unit}"
         if last.noises > 0.0
         else "nothing unexplained beyond the noise"
     )
     return "; ".join([*told, left]) + "."
+
+
+def format_share(share: float) -> str:
+    """A share of a budget in percent, a small one not as nothing."""
+    if 0.0 < share < 0.005:
+        return "under 1 %"
+    return f"{_percent(share)} %"
+
+
+def _percent(share: float) -> str:
+    """Whole percent, without a sign of zero."""
+    text = f"{100.0 * share:.0f}"
+    return "0" if text == "-0" else text.replace("-", "\u2212")
+
+
+def _span(interval: Sequence[float]) -> str:
+    """An interval in percent."""
+    return " to ".join(_percent(share) for share in interval)

@@ -4,10 +4,11 @@
 //! `p_e = p - min(p, p_th)` for `p > 0`, the corner at `p_th` rounded over a tenth of it on either
 //! side. N. G. Tsagarakis & D. G. Caldwell, "Improved modelling and assessment of pneumatic muscle
 //! actuators", ICRA 2000; E. G. Hocking & N. M. Wereley, "Analysis of nonlinear elastic behavior in
-//! miniature pneumatic artificial muscles", Smart Materials and Structures 22, 2013.
+//! miniature pneumatic artificial muscles", Smart Materials and Structures 22, 014016, 2013.
 //!
 //! `saturating`: `p_e = p - p p_th/(p + p_th) = p^2/(p + p_th)` for `p > 0`: a bladder that meets
-//! its braid little by little, what is lost growing to `p_th`. Hocking & Wereley (2013).
+//! its braid little by little, what is lost growing to `p_th`. A smooth threshold of our own: no
+//! published source is known to us.
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Port};
 use crate::blocks::gas::Gas;
@@ -30,7 +31,8 @@ pub const INFO: EffectInfo = EffectInfo {
     id: "activation_pressure",
     block: "muscle",
     at: "muscle",
-    source: "Tsagarakis & Caldwell (2000); Hocking & Wereley (2013)",
+    source:
+        "Tsagarakis & Caldwell (2000); Hocking & Wereley (2013); the form saturating is our own",
     forms: &[THRESHOLD, Form { name: "saturating", make: made_by!(saturating), ..THRESHOLD }],
     ..EffectInfo::USUAL
 };

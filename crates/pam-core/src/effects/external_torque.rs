@@ -1,16 +1,16 @@
 //! `external_torque`: something from outside pushes a link; the environment, not the base.
 //!
 //! `pushes`: a torque on the joint from a time on for a duration, each edge over a rise (20 ms of a
-//! blow, half a second of a hand), and a second and a third of their own. Time counts from the start
-//! of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion control for advanced
+//! blow, half a second of a hand), and a second and a third of their own. Time counts from the
+//! start of the recording. K. Ohnishi, M. Shibata & T. Murakami, "Motion control for advanced
 //! mechatronics", IEEE/ASME Trans. Mechatronics 1, 1996 (disturbance torque).
 //!
 //! `constant`: `tau = T` at all times. Ohnishi et al. (1996).
 //!
-//! `vibration`: `tau = T sin(2 pi f t) + U cos(2 pi f t)`, a machine that shakes with one frequency;
-//! with both parts the amplitude is linear and the phase free. M. Bodson, A. Sacks & P. Khosla,
-//! "Harmonic generation in adaptive feedforward cancellation schemes", IEEE Trans. Automatic
-//! Control 39, 1994.
+//! `vibration`: `tau = T sin(2 pi f t) + U cos(2 pi f t)`, a machine that shakes with one
+//! frequency; with both parts the amplitude is linear and the phase free, as in M. Bodson, A. Sacks
+//! & P. Khosla, "Harmonic generation in adaptive feedforward cancellation schemes", IEEE Trans.
+//! Automatic Control 39, 1994.
 
 use super::{risen_over, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::blocks::gas::Gas;
@@ -58,7 +58,9 @@ pub const INFO: EffectInfo = EffectInfo {
     id: "external_torque",
     block: "arm",
     at: "joint",
-    source: "Ohnishi, Shibata & Murakami (1996), disturbance torque",
+    source:
+        "Ohnishi, Shibata & Murakami (1996), disturbance torque; Bodson, Sacks & Khosla (1994) \
+        for the vibration",
     forms: &[
         PUSHES,
         Form { name: "constant", parameters: &[TORQUE], make: made_by!(steady), ..PUSHES },

@@ -15,8 +15,8 @@
 //!
 //! `load_proportional`: the same with `c = m T`, `T` the torques that the muscles put on the joint,
 //! all counted as positive: what rubs is what the bearing or the pulley carries. P. Hamon, M.
-//! Gautier & P. Garrec, "Dynamic identification of robots with a dry friction model depending on load and velocity",
-//! IROS 2010.
+//! Gautier & P. Garrec, "Dynamic identification of robots with a dry friction model depending on
+//! load and velocity", IROS 2010.
 //!
 //! `per_direction`: the exponential form, another `r` times as large where the joint turns to
 //! smaller angles. Armstrong-Helouvry et al. (1994).

@@ -1,16 +1,17 @@
 //! `leak_muscle`: leakage of the chamber (muscle, fitting or hose) to ambient.
 //!
-//! `orifice_and_laminar`: a hole leaks like an orifice, a porous wall or a long thin crack like a laminar path; `s` is the
-//! share of the latter: `m_l = C rho0 sqrt(T0/T) [ (1-s) p psi(pa/p)/psi(0) + s (p^2 - pa^2)/p_ref
-//! ]` with the sonic conductance `C` of ISO 6358 and `p_ref` = 500 kPa absolute. Sealed, choked and
-//! with `s = 0` the absolute pressure decays with the time constant `V/(alpha_out C rho0 R T)`.
-//! Beater, *Pneumatic Drives* (2007).
+//! `orifice_and_laminar`: a hole leaks like an orifice, a porous wall or a long thin crack like a
+//! laminar path; `s` is the share of the latter: `m_l = C rho0 sqrt(T0/T) [ (1-s) p
+//! psi(pa/p)/psi(0) + s (p^2 - pa^2)/p_ref ]` with the sonic conductance `C` of ISO 6358 and
+//! `p_ref` = 500 kPa absolute. Sealed, choked and with `s = 0` the absolute pressure decays with
+//! the time constant `V/(alpha_out C rho0 R T)`. Beater, *Pneumatic Drives* (2007).
 //!
-//! `power`: `m_l = C rho0 sqrt(T0/T) p_ref (pg/pg_ref)^n` with the gauge pressures `pg` and `pg_ref`
-//! of `p_ref`, at which it is what a choked orifice of that conductance leaks: a crack that opens
-//! with pressure, `n` = 0.5 as turbulent and 1 as laminar flow through a stiff one, up to 2. Below
-//! 1 kPa it is rounded to a slope. ASHRAE Handbook, *Fundamentals*, "Ventilation
-//! and infiltration" (power law of cracks).
+//! `power`: `m_l = C rho0 sqrt(T0/T) p_ref (pg/pg_ref)^n` with the gauge pressures `pg` and
+//! `pg_ref` of `p_ref`, at which it is what a choked orifice of that conductance leaks: a crack
+//! that opens with pressure, `n` = 0.5 as turbulent and 1 as laminar flow through a stiff one, up
+//! to 2. Below 1 kPa it is rounded to a slope. The power law of cracks: ASHRAE Handbook,
+//! *Fundamentals*, "Ventilation and infiltration", where the power is 0.5 to 1; that it may be
+//! larger where the crack opens is our own.
 
 use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port, Use};
 use crate::blocks::gas::Gas;
@@ -41,7 +42,8 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "chamber",
     at: "chamber",
     source:
-        "Beater, Pneumatic Drives (2007); ISO 6358; ASHRAE Handbook, Fundamentals, for the power",
+        "Beater, Pneumatic Drives (2007); ISO 6358; ASHRAE Handbook, Fundamentals, Ventilation and \
+        infiltration, for the power law of cracks",
     forms: &[
         ORIFICE_AND_LAMINAR,
         Form {

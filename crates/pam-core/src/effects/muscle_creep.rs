@@ -11,10 +11,10 @@
 //! decade apart, of the generalised Maxwell model (Findley, Lai & Onaran, ch. 5).
 //!
 //! `force_relaxation`: a share of what the muscle pulls relaxes, whatever moved it, pressure or
-//! length: `F - s y`, `y' = (F - y)/tau`, `F` the force before this effect; after long rest `(1 - s)
-//! F` is left. The quasi-linear viscoelasticity of Y. C. Fung, *Biomechanics* (1981), ch. 7, with
-//! one exponential. One state, the force `y` [N] that has relaxed; at the start it is that of the
-//! muscle, at rest.
+//! length: `F - s y`, `y' = (F - y)/tau`, `F` the force before this effect; after long rest `(1 -
+//! s) F` is left. The quasi-linear viscoelasticity of Y. C. Fung, *Biomechanics: Mechanical
+//! Properties of Living Tissues* (1981), ch. 7, with one exponential in the place of his spectrum.
+//! One state, the force `y` [N] that has relaxed; at the start it is that of the muscle, at rest.
 //!
 //! `bladder_relaxation`: the same of the bladder's part of the force, which is what is rubber.
 
@@ -55,7 +55,9 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "muscle",
     at: "muscle",
     order: 2,
-    source: "Findley, Lai & Onaran (1976); Schulte (1961); Fung (1981) for the relaxation of force",
+    source:
+        "Findley, Lai & Onaran (1976); Schulte (1961); Fung, Biomechanics (1981), quasi-linear \
+        viscoelasticity for the relaxation of force",
     forms: &[
         SOLID,
         Form {

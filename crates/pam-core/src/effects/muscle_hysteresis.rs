@@ -9,15 +9,17 @@
 //! `pressure_stops`: the Prandtl-Ishlinskii operator of eight stops, evenly spread up to `d` and
 //! equally stiff: `m = sum(i zeta_i)/sum(i)` with `d_i = d i/8`, and `W = W0 + c pg` scales
 //! stiffness and width together. P. Krejci & K. Kuhnen, "Inverse control of systems with hysteresis
-//! and creep", IEE Proc. Control Theory Appl. 148, 2001; its way to the full width is a parabola.
+//! and creep", IEE Proc. Control Theory Appl. 148, 2001 (operators of this kind); its way to the
+//! full width is a parabola.
 //!
 //! `force_proportional`: the elements of `maxwell_slip`, `W = W0 + s |F|` with the muscle's force
-//! `F` before this effect: threads that rub under the tension that they carry. S. Davis & D. G.
-//! Caldwell, "Braid effects on contractile range and friction modeling in pneumatic muscle
-//! actuators", Int. J. Robotics Research 25, 2006.
+//! `F` before this effect: threads that rub under the tension that they carry. The form is as
+//! commonly used, Coulomb friction under a load; that the threads' friction makes the loop, and how
+//! their contact grows: S. Davis & D. G. Caldwell, "Braid effects on contractile range and friction
+//! modeling in pneumatic muscle actuators", Int. J. Robotics Research 25, 2006.
 //!
 //! `dahl`: one state, `m' = 3.75 L'/d (1 - m sgn L')`, as stiff before it slips as the elements. P.
-//! R. Dahl, *A solid friction model* (1968).
+//! R. Dahl, *A solid friction model*, Aerospace Corporation TOR-0158(3107-18)-1 (1968).
 //!
 //! Between steps the states move in closed form; inside a step the force follows the stage's
 //! length, so that smooth stretches keep the integrator's order.

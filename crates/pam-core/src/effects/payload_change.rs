@@ -5,8 +5,9 @@
 //! so that no impulse is exchanged. Time counts from the start of the recording. This is the form
 //! `step`.
 //!
-//! `ramp`: `dm` comes evenly over a duration, as what is poured. M. W. Spong, S. Hutchinson & M.
-//! Vidyasagar, *Robot Modeling and Control*, ch. 7, with a mass that is a function of time.
+//! `ramp`: `dm` comes evenly over a duration, as what is poured. Both forms are as commonly used:
+//! M. W. Spong, S. Hutchinson & M. Vidyasagar, *Robot Modeling and Control* (2006), ch. 7, with a
+//! mass that is a function of time.
 
 use super::{risen, Effect, EffectInfo, EffectParameter, Form, Port, Use, RISE};
 use crate::blocks::gas::Gas;
@@ -37,7 +38,7 @@ pub const INFO: EffectInfo = EffectInfo {
     at: "joint",
     last_only: true,
     on_loads: true,
-    source: "Spong, Hutchinson & Vidyasagar, Robot Modeling and Control, ch. 7",
+    source: "Spong, Hutchinson & Vidyasagar, Robot Modeling and Control (2006), ch. 7",
     forms: &[
         STEP,
         Form {

@@ -5,7 +5,7 @@
 //! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`, the tube by ISO 6358 with its sonic
 //! conductance and a critical ratio of 0.3. The node is found by Newton steps inside a bracket; one
 //! more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
-//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014); W.
+//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014);
 //! Eckersten, "Simplified flow calculations for pneumatic components", 1975. A conductance of
 //! [`NONE`] or more restricts nothing.
 //!

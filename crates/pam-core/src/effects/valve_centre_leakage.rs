@@ -1,13 +1,16 @@
 //! `valve_centre_leakage`: flow through the clearance between spool and sleeve around the null.
 //!
-//! `exponential`: `C_l(x) = C_0 exp(-|x|/x_l)` from the supply to the chamber and from the chamber to the ambient
-//! at once: with the valve shut the pressure goes to where both are the same, from either side. M.
-//! Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model of the flow stage of a
-//! pneumatic servo-distributor", 1999; *Energies* 12, 1096 (2019).
+//! `exponential`: `C_l(x) = C_0 exp(-|x|/x_l)` from the supply to the chamber and from the chamber
+//! to the ambient at once: with the valve shut the pressure goes to where both are the same, from
+//! either side. M. Belgharbi, S. Sesmat, S. Scavarda & D. Thomasset, "Analytical model of the flow
+//! stage of a pneumatic servo-distributor for simulation and nonlinear control", 6th Scandinavian
+//! Int. Conf. Fluid Power, 1999 (that it leaks around the null); that it fades as an exponential is
+//! our own.
 //!
 //! `hyperbolic`: `C_l(x) = C_0/(1 + |x|/x_l)`, a gap that grows as long as the spool has moved, in
-//! laminar flow. B. Eryilmaz & B. H. Wilson, "Unified modeling and analysis of a proportional
-//! valve", J. Franklin Institute 343, 2006.
+//! laminar flow. B. Eryilmaz & B. H. Wilson, "Combining leakage and orifice flows in a hydraulic
+//! servovalve model", ASME J. Dyn. Syst. Meas. Control 122, 2000, and "Unified modeling and
+//! analysis of a proportional valve", J. Franklin Institute 343, 2006 (of oil, in turbulent flow).
 
 use super::{Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
 use crate::blocks::gas::Gas;
@@ -34,8 +37,9 @@ pub const INFO: EffectInfo = EffectInfo {
     block: "valve",
     at: "valve",
     order: 1,
-    source: "Belgharbi, Sesmat, Scavarda & Thomasset (1999); Energies 12, 1096 (2019); Eryilmaz & \
-        Wilson (2006)",
+    source:
+        "Belgharbi, Sesmat, Scavarda & Thomasset (1999); Eryilmaz & Wilson (2000, 2006) for the \
+        form hyperbolic",
     forms: &[EXPONENTIAL, Form { name: "hyperbolic", make: made_by!(hyperbolic), ..EXPONENTIAL }],
     ..EffectInfo::USUAL
 };

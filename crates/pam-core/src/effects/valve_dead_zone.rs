@@ -1,13 +1,14 @@
 //! `valve_dead_zone`: positive overlap of the spool.
 //!
-//! `symmetric`: `x_e = sgn(x) max(|x| - d, 0)/(1 - d)` in the place of the normalised spool position `x`; one
-//! half width `d` for both edges, since a difference of the edges is a shift of the null voltage.
-//! E. Richer & Y. Hurmuzlu, "A high performance pneumatic force actuator system", ASME J. Dyn.
-//! Syst. Meas. Control 122, 2000; A. C. Valdiero et al., "Nonlinear mathematical modeling in
-//! pneumatic servo position applications", Math. Probl. Eng. 2011.
+//! `symmetric`: `x_e = sgn(x) max(|x| - d, 0)/(1 - d)` in the place of the normalised spool
+//! position `x`; one half width `d` for both edges, since a difference of the edges is a shift of
+//! the null voltage. E. Richer & Y. Hurmuzlu, "A high performance pneumatic force actuator system",
+//! ASME J. Dyn. Syst. Meas. Control 122, 2000; A. C. Valdiero, C. S. Ritter, C. F. Rios & M.
+//! Rafikov, "Nonlinear mathematical modeling in pneumatic servo position applications", Math.
+//! Probl. Eng. 2011, 472903.
 //!
-//! `two_widths`: `d` where the valve fills and `d_v` where it vents, with the null voltage where the
-//! data sheet says. Valdiero et al. (2011), whose edges are two.
+//! `two_widths`: `d` where the valve fills and `d_v` where it vents, with the null voltage where
+//! the data sheet says. Valdiero et al. (2011), whose edges are two.
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
 use crate::blocks::gas::Gas;

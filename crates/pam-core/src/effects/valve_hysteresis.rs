@@ -1,9 +1,10 @@
 //! `valve_hysteresis`: play of the spool by the friction of spool and solenoid.
 //!
-//! `play`: `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a distance
-//! `h`. Between steps the recursion is exact; a data sheet's hysteresis is `2 h` of the stroke. M.
-//! Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii model
-//! inversion for hysteresis compensation", IEEE/ASME Trans. Mechatronics 16, 2011 (play operator).
+//! `play`: `y <- min(max(y, x - h), x + h)`: the spool `y` follows the commanded position `x` at a
+//! distance `h`. Between steps the recursion is exact; a data sheet's hysteresis is `2 h` of the
+//! stroke. M. Al Janaideh, S. Rakheja & C.-Y. Su, "An analytical generalized Prandtl-Ishlinskii
+//! model inversion for hysteresis compensation in micropositioning control", IEEE/ASME Trans.
+//! Mechatronics 16, 2011 (play operator).
 //!
 //! `play_with_slope`: `x_e = y + g (x - y)`: a spool that gives by a share `g` before it breaks
 //! away, so that no small command is lost. The play operator and a linear part of the same paper.

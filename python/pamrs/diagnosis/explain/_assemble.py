@@ -31,6 +31,7 @@ from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
+from pamrs.diagnosis.explain._free_run import free_run
 from pamrs.diagnosis.explain._next import next_experiment
 from pamrs.diagnosis.fit import (
     CHOSEN,
@@ -109,6 +110,10 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         else None
     )
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
+    terms = budget(judged, held, out_found, noise_level, nominal, models.final)
+    forms = _forms(judged, fitted)
+    stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
+    runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -131,25 +136,34 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         rig=models.final if verdict == "none" else _with_std(models.final, nominal, models.chosen),
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
-        budget=budget(judged, held, out_found, noise_level, nominal, models.final),
-        unexplained=unexplained(judged, blocks),
+        budget=terms,
+        unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal),
         wrong_parameters=_wrong(nominal, judged, fitted, table),
+        measured=list(case.channels),
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
         tested=_tested(groups, settings.evidence),
+        free_run=runs,
+        free_run_note=runs_note,
         settings=settings,
     )
-    missing = [j.group for j in judged if j.verdict == "unlisted"]
-    forms = [
-        describe_closure(g.closure.fit, replace(fitted, blocks=g.blocks), g.candidates[0].fit)
-        for g in missing
-        if g.closure is not None
-    ]
-    sought = any(g.sought for g in missing)
+    sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
+    told = list(dict.fromkeys(forms.values()))
     return replace(
-        diagnosis, text=words.verdict(diagnosis, case, gap, forms, settings.warnings, sought=sought)
+        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings.warnings, sought=sought)
     )
+
+
+def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
+    """What a mismatch without a name is a function of, in words, by block."""
+    found: dict[str, str] = {}
+    for group in (j.group for j in judged if j.verdict == "unlisted"):
+        if group.closure is not None:
+            own = replace(fitted, blocks=group.blocks)
+            text = describe_closure(group.closure.fit, own, group.candidates[0].fit)
+            found |= dict.fromkeys((b.name for b in group.blocks), text)
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,14 +192,18 @@ class _Models:
         """Whether the model has effects that the nominal one does not hold."""
         return len(self.final.effects) > len(self.nominal.effects)
 
+    @property
+    def events(self) -> Events | None:
+        """What happened in single recordings."""
+        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
+        return next(happened, None) if self.added else None
+
     def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
         """Residuals of some recordings at every stage."""
-        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
-        events = next(happened, None) if self.added else None
         return {
             "before": _run(problem, self.nominal, None),
             "refit": _run(problem, self.baseline, None),
-            "after": _run(problem, self.final, events),
+            "after": _run(problem, self.final, self.events),
         }
 
 

@@ -4,12 +4,24 @@ after.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, significant
+from pamrs.diagnosis.explain._conditions import describe
 from pamrs.diagnosis.fit import Key, Problem
 from pamrs.diagnosis.noise import NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.findings import BlockMismatch, BlockVerdict, MismatchSize, MismatchStages, Unexplained
+from pamrs.findings import (
+    BlockMismatch,
+    BlockVerdict,
+    BudgetTerm,
+    Condition,
+    MismatchSize,
+    MismatchStages,
+    Unexplained,
+)
+from pamrs.rig import Rig
 
 __all__ = ["block_entries", "unexplained"]
 
@@ -72,7 +84,15 @@ def _sizes(
     return MismatchStages(**sizes)
 
 
-def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexplained]:
+def unexplained(
+    judged: list[Judged],
+    entries: list[BlockVerdict],
+    stages: list[tuple[Problem, Stages]],
+    noise_level: dict[Key, NoiseLevel],
+    terms: list[BudgetTerm],
+    forms: Mapping[str, str],
+    nominal: Rig,
+) -> list[Unexplained]:
     """Blocks with a mismatch beside what is named, or without a name, the largest first.
 
     Parameters
@@ -82,11 +102,22 @@ def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexp
     entries : list of BlockVerdict
         From :func:`block_entries`. The size is that of the held-out recordings, where they show it,
         else of the fitted ones.
+    stages : list of (Problem, dict of str to dict)
+        Held-out recordings, if any, then fitted ones, with their residuals by stage, block and
+        recording.
+    noise_level : dict
+        Noise by block and recording.
+    terms : list of BudgetTerm
+        The budget of every block.
+    forms : mapping of str to str
+        Words of the form of what is missing, by block.
+    nominal : Rig
+        The model of the rig file.
 
     Returns
     -------
     list of Unexplained
-        What names leave, and the verdict of the group.
+        What names leave, its share, and the verdict of the group.
     """
     found = []
     for j, entry in zip(judged, entries, strict=True):
@@ -94,23 +125,64 @@ def unexplained(judged: list[Judged], entries: list[BlockVerdict]) -> list[Unexp
             entry.verdict == "parameters" and not entry.wrong_parameters
         ):
             continue
-        suspects = {b.name for b in j.group.suspects}
-        for block in (m for m in entry.mismatch if m.block in suspects):
+        suspects = {b.name: b for b in j.group.suspects}
+        for own in (m for m in entry.mismatch if m.block in suspects):
             # a form without a name takes up what no name explains, and is no explanation
             stage = "refit" if entry.verdict == "unlisted" else "after"
-            sizes: list[MismatchSize] = [
-                part[stage] for part in (block.held_out, block.fitted) if part is not None
-            ]
-            left = next((size for size in sizes if size.more_than_noise), None)
-            if left is not None:
-                found.append(
-                    Unexplained(
-                        block.block,
-                        block.channel,
-                        block.unit,
-                        left.noises,
-                        left.size,
-                        entry.verdict,
-                    )
+            parts = [part for part in (own.held_out, own.fitted) if part is not None]
+            left = next(
+                (
+                    (part[stage], problem, residuals[stage])
+                    for part, (problem, residuals) in zip(parts, stages, strict=True)
+                    if part[stage].more_than_noise
+                ),
+                None,
+            )
+            if left is None:
+                continue
+            size, problem, residual = left
+            share, interval = _rest(own.block, terms)
+            found.append(
+                Unexplained(
+                    own.block,
+                    own.channel,
+                    own.unit,
+                    size.noises,
+                    size.size,
+                    entry.verdict,
+                    share,
+                    interval,
+                    _conditions(suspects[own.block], problem, residual, noise_level, nominal),
+                    forms.get(own.block, "") if entry.verdict == "unlisted" else "",
                 )
+            )
     return sorted(found, key=lambda u: -(u.noises or 0.0))
+
+
+def _rest(block: str, terms: list[BudgetTerm]) -> tuple[float | None, list[float] | None]:
+    """Share of a block's excess that nothing with a name takes, and its interval; none where the
+    block has no budget.
+    """
+    own = [t for t in terms if t.block == block]
+    rest = [t for t in own if t.kind in ("form", "unexplained")]
+    if not rest:
+        return None, None
+    share = sum(t.share for t in rest)
+    if len(rest) == 1:
+        return share, rest[0].interval
+    # only parameters stand before a form without a name, and the shares of every draw add up to 1
+    low, high = own[0].interval
+    return share, [1.0 - high, 1.0 - low]
+
+
+def _conditions(
+    block: Block,
+    problem: Problem,
+    residual: dict[Key, Residual],
+    noise_level: dict[Key, NoiseLevel],
+    nominal: Rig,
+) -> list[Condition]:
+    """Under which conditions what is left is largest."""
+    least = problem.settings.warnings.telling_condition
+    picture = describe(block, problem.recordings, nominal, residual, None, noise_level)
+    return [c for c in picture.conditions if c.share > least * c.time][:6]

@@ -16,8 +16,9 @@ from pamrs.diagnosis.fit import Key, Problem, acts_in, form_in, residuals
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import EFFECTS
 from pamrs.errors import SimulationError
-from pamrs.findings import BudgetTerm
+from pamrs.findings import BudgetTerm, EffectParameterFound
 from pamrs.rig import Rig
 
 __all__ = ["budget"]
@@ -168,6 +169,8 @@ def _terms(
             noises=now.systematic,
             size=now.systematic * now.noise,
             unit=unit_of(block.channel),
+            at=next((e.get("at", "") for e in final.effects if e["id"] == name), ""),
+            parameters=_values(name, judged),
         )
         was = now
     share, interval = _share(before, was, None, counts, draws)
@@ -183,6 +186,24 @@ def _terms(
         size=was.systematic * was.noise,
         unit=unit_of(block.channel),
     )
+
+
+def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
+    """What the recordings say of a term: values of the effect, or of the wrong parameters, SI."""
+    found, names = judged.chosen.fit, set(name.split("+"))
+    form = EFFECTS[name].form(form_in(found.rig, name)).parameters if name in EFFECTS else ()
+    units = {p.name: p.unit for p in form}
+    out = {}
+    for full, value in found.values.items():
+        own, _, parameter = full.partition(".")
+        if own == name:
+            key, unit = parameter, units.get(parameter, "")
+        elif full in names:
+            key, unit = full, found.rig.parameter(full).unit
+        else:
+            continue
+        out[key] = EffectParameterFound(value, found.std.get(full), unit)
+    return out
 
 
 def _share(

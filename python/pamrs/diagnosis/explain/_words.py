@@ -12,7 +12,17 @@ from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.effects import CATALOGUE
 from pamrs.findings import BlockVerdict, ChannelError, Findings, Where
 from pamrs.recordings import Case
-from pamrs.report.text import display_unit, format_number, kept_sentence, sentence_of
+from pamrs.report.text import (
+    display_unit,
+    format_number,
+    format_probability,
+    is_number,
+    is_open,
+    kept_sentence,
+    leading,
+    name_chance,
+    sentence_of,
+)
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
@@ -137,8 +147,8 @@ def verdict(
     if kind == "unlisted":
         tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
         text = (
-            "Physics is missing. Either it is not in the catalogue, or no effect of the catalogue "
-            f"explains the data well enough to be named. {place}"
+            "Physics is missing, and no effect of the catalogue explains the data well enough to "
+            f"be named{_outside(leading(diagnosis)[1])}. {place}"
             + (f" Closest: {tried}." if tried else "")
         )
         if not forms and not sought:
@@ -162,9 +172,9 @@ def verdict(
         )
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(
-        f"{e.name} ({e.id}, probability {e.probability:.2f})" for e in diagnosis.effects
+        f"{e.name} ({e.id}, probability {name_chance(diagnosis, e)})" for e in diagnosis.effects
     )
-    text = f"The model leaves out: {names}. {place}"
+    text = f"{_opening(diagnosis, 'the model leaves out')}: {names}. {place}"
     if gap is not None:
         it = "it" if len(diagnosis.effects) == 1 else "them"
         text += (
@@ -180,6 +190,17 @@ def verdict(
             "volume of the rig file."
         )
     return text + _beside(diagnosis, missing, forms, sought=sought)
+
+
+def _opening(diagnosis: Findings, claim: str) -> str:
+    """A claim, no surer than it is: as what is most probable where other answers are left."""
+    return f"Most probable is that {claim}" if is_open(diagnosis) else _capital(claim)
+
+
+def _outside(chance: float) -> str:
+    """How probable it is that something else acts."""
+    known = is_number(chance)
+    return f" (probability of an effect outside it: {format_probability(chance)})" if known else ""
 
 
 def _proof(case: Case) -> str:
@@ -207,10 +228,10 @@ def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: Warn
             for channel, e in told_by.items()
         )
         told.append(
-            f"{sentence_of(wrong)} (probability {wrong.probability:.2f}, "
+            f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong)}, "
             f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {_proof(case)} {errors}."
         )
-    text = "The rig file is wrong: " + " ".join(told)
+    text = f"{_opening(diagnosis, 'the rig file is wrong')}: " + " ".join(told)
     if gap is not None:
         text += (
             f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside "
@@ -271,12 +292,6 @@ def warnings(
         n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()
     }
     for recording in case.recordings:
-        for issue in recording.issues[:8]:
-            when = f"{issue.start:g} to {issue.stop:g} s"
-            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
-        if len(recording.issues) > 8:
-            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
-    for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (
                 channel_of(channel) not in ("muscle_pressure", "supply_pressure")
@@ -319,6 +334,13 @@ def warnings(
         out.append(
             f"{name} is marked unknown: values that scale with it hold for the placeholder only"
         )
+    # what was only masked comes last
+    for recording in case.recordings:
+        for issue in recording.issues[:8]:
+            when = f"{issue.start:g} to {issue.stop:g} s"
+            out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
+        if len(recording.issues) > 8:
+            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
     return out
 
 

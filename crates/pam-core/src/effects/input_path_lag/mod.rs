@@ -1,11 +1,12 @@
 //! `input_path_lag`: command delay, spool and line, lumped into one lag and one delay between
 //! command and opening.
 //!
-//! `lag_and_delay`: `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three equal lags
-//! `z_i' = (z_(i-1) - z_i)/(D/3)`, `z_0 = w`: a delay that can be differentiated. Commands are
-//! held, so that the chain moves in closed form over any time, by the phi functions of exponential
-//! integrators (M. Hochbruck & A. Ostermann, *Acta Numerica* 19, 2010), and no step is too long for
-//! it. E. Richer & Y. Hurmuzlu (2000); J. F. Carneiro & F. G. de Almeida (2006).
+//! `lag_and_delay`: `w' = (x - w)/T` of the normalised command `x`, then the delay `D` as three
+//! equal lags `z_i' = (z_(i-1) - z_i)/(D/3)`, `z_0 = w`: a delay that can be differentiated.
+//! Commands are held, so that the chain moves in closed form over any time, by the phi functions of
+//! exponential integrators (M. Hochbruck & A. Ostermann, "Exponential integrators", *Acta Numerica*
+//! 19, 2010), and no step is too long for it. The form is as commonly used for valves and their
+//! drivers.
 //!
 //! The forms `second_order`, `slew_limit` and `up_and_down` stand in files of their own.
 
@@ -45,8 +46,9 @@ pub const INFO: EffectInfo = EffectInfo {
     id: "input_path_lag",
     block: "valve",
     at: "valve",
-    source: "Richer & Hurmuzlu (2000); Carneiro & de Almeida (2006); Hochbruck & Ostermann (2010) \
-        for its closed form; Hildebrandt, Sawodny, Neumann & Hartmann (2005)",
+    source: "lags, delay and limits in the forms as commonly used; Richer & Hurmuzlu (2000) for a \
+        spool of second order; Hochbruck & Ostermann (2010) for the closed form; Hildebrandt, \
+        Sawodny, Neumann & Hartmann (2005) for valves of muscles",
     forms: &[LAG_AND_DELAY, second_order::FORM, slew_limit::FORM, up_and_down::FORM],
     ..EffectInfo::USUAL
 };

@@ -2,7 +2,9 @@
 //!
 //! `w = 2 zeta/T`, so that `T` is what a slow command comes late by, and a large `zeta` is a lag of
 //! first order. The spool ends at its stops, -1 and 1. The command is held, so that the motion is
-//! that of a free oscillator about it, in closed form. E. Richer & Y. Hurmuzlu (2000); A.
+//! that of a free oscillator about it, in closed form. E. Richer & Y. Hurmuzlu, "A high performance
+//! pneumatic force actuator system: part I, nonlinear mathematical model", ASME J. Dyn. Syst. Meas.
+//! Control 122, 2000 (spool, coil and springs). A model of servo valves that feed muscles: A.
 //! Hildebrandt, O. Sawodny, R. Neumann & A. Hartmann, "Cascaded control concept of a robot with two
 //! degrees of freedom driven by four artificial pneumatic muscle actuators", ACC 2005.
 

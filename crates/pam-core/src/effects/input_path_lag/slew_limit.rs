@@ -2,8 +2,8 @@
 //!
 //! The spool of a valve whose solenoid gives no more: a large step of the command takes a time in
 //! proportion to its size, the rest of the way is a lag. The command is held, so that the way is a
-//! straight line and then an exponential, in closed form. J. F. Carneiro & F. G. de Almeida (2006);
-//! A. Hildebrandt et al. (2005).
+//! straight line and then an exponential, in closed form. The form is as commonly used, in models
+//! of servo valves and their actuators.
 
 use super::{lagging, opens, LAG_AND_DELAY, SHORTEST, TIME_CONSTANT};
 use crate::blocks::gas::Gas;

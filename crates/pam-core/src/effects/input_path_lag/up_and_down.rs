@@ -1,8 +1,8 @@
 //! `up_and_down`: `T y' = x - y` while the position rises, `T_d y' = x - y` while it falls.
 //!
 //! The spool of a solenoid against a spring, which pushes with another force than it lets go. The
-//! command is held, so that a position goes one way towards it, in closed form. E. Richer & Y.
-//! Hurmuzlu (2000).
+//! command is held, so that a position goes one way towards it, in closed form. The form is as
+//! commonly used, for valves whose data sheet has one time to open and another to close.
 
 use super::{lagging, opens, LAG_AND_DELAY, SHORTEST, TIME_CONSTANT};
 use crate::blocks::gas::Gas;

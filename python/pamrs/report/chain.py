@@ -1,0 +1,381 @@
+"""Drawing of the rig's chain from supply to joint: what was measured, what was judged together, and
+where the mismatch is. An SVG element, made from the structure of the rig.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from html import escape
+
+from pamrs.channels import dotted
+from pamrs.effects import EFFECTS
+from pamrs.findings import BlockMismatch, Findings
+from pamrs.report.figures import COLOURS
+from pamrs.report.text import format_number, label
+from pamrs.rig import Rig
+
+__all__ = ["chain_svg"]
+
+COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
+"""Distance of columns, width of a box, height of a line of text, margin of a frame and distance of
+rows [px]."""
+
+KINDS = ("supply", "valve", "line", "chamber", "muscle", "joint", "load")
+"""Kinds of blocks that are drawn; transmissions, arms and links go with their joint."""
+
+CHANNELS = {
+    "supply": ("supply_command", "supply_pressure"),
+    "valve": ("valve_command",),
+    "line": ("line_pressure",),
+    "chamber": ("muscle_pressure",),
+    "muscle": ("muscle_force",),
+    "joint": ("joint_angle",),
+    "load": ("length", "force"),
+}
+"""Channels that a block can have a sensor, or a command, for."""
+
+ALWAYS = ("supply_pressure", "valve_command", "muscle_pressure", "joint_angle", "length")
+"""Channels that are shown where nothing measured them, too."""
+
+ELSEWHERE = {
+    "line": ("valve", "supply", "chamber"),
+    "joint": ("load", "muscle"),
+    "arm": ("joint", "load"),
+    "link": ("joint",),
+    "transmission": ("joint", "load"),
+    "sensors": ("valve", "chamber"),
+    "valve": ("line", "chamber"),
+    "supply": ("line", "chamber"),
+    "muscle": ("chamber",),
+}
+"""Where something of a block is drawn that the rig has not, or that has no box of its own."""
+
+
+@dataclass(eq=False)
+class _Part:
+    """A block of the rig in the drawing.
+
+    Attributes
+    ----------
+    kind, name : str
+        Its kind, and its name, empty for the only one.
+    after : list of str
+        Blocks that lead to it, in full.
+    column, row : float
+        Place [columns, rows].
+    found : list of str
+        What was found to be missing or wrong in it, in words.
+    """
+
+    kind: str
+    name: str
+    title: str
+    after: list[str] = field(default_factory=list)
+    column: float = 0.0
+    row: float = 0.0
+    found: list[str] = field(default_factory=list)
+
+    @property
+    def full(self) -> str:
+        return dotted(self.kind, self.name)
+
+
+def chain_svg(diagnosis: Findings) -> str | None:
+    """The rig as a chain of blocks; None where the diagnosis has no rig.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        With the final model as `rig`; its `measured` channels are marked, the blocks that it judges
+        by themselves framed, and the located one is lit.
+
+    Returns
+    -------
+    str or None
+        SVG element.
+    """
+    rig = diagnosis.rig
+    if not isinstance(rig, Rig):
+        return None
+    parts = _parts(rig)
+    _place(parts, rig)
+    _mark(parts, diagnosis)
+    return _Drawing(parts, diagnosis, rig).svg()
+
+
+def _title(rig: Rig, kind: str, name: str) -> str:
+    """What a block is called in the drawing."""
+    table = rig.tables(kind)[name]
+    own = {
+        "supply": {"tank": "tank", "regulator": "regulator"}.get(str(table.get("kind")), "supply"),
+        "line": "orifice" if table.get("kind") == "orifice" else "tube",
+        "joint": "joint and arm" if rig.tables("arm") else "joint",
+        "load": "load frame" if table.get("kind") == "frame" else "hanging mass",
+    }.get(kind, kind)
+    return f"{own} {label(name)}".strip()
+
+
+def _parts(rig: Rig) -> dict[str, _Part]:
+    """The blocks that are drawn, each with those that lead to it."""
+    parts = {}
+    for kind in KINDS:
+        for name in rig.tables(kind):
+            part = _Part(kind, name, _title(rig, kind, name))
+            parts[part.full] = part
+    links = [
+        pair
+        for kind in ("valve", "line")
+        for name, ports in rig.ports(kind).items()
+        for pair in (
+            (ports.get("from", ""), dotted(kind, name)),
+            (dotted(kind, name), ports.get("to", "")),
+        )
+    ]
+    for name, ports in rig.ports("muscle").items():
+        links.append((ports.get("chamber", ""), dotted("muscle", name)))
+        links.append((dotted("muscle", name), ports.get("joint", "")))
+    for first, second in links:
+        if first in parts and second in parts and first not in parts[second].after:
+            parts[second].after.append(first)
+    return parts
+
+
+def _place(parts: dict[str, _Part], rig: Rig) -> None:
+    """Columns by the way from the supply, rows so that what belongs together is level."""
+
+    def depth(part: _Part, seen: tuple[str, ...] = ()) -> int:
+        before = [parts[a] for a in part.after if a not in seen]
+        return 1 + max((depth(p, (*seen, part.full)) for p in before), default=-1)
+
+    for part in parts.values():
+        part.column = depth(part)
+    lane = "muscle" if rig.tables("muscle") else "chamber"
+    lanes = [p for p in parts.values() if p.kind == lane]
+    for part in lanes:
+        part.row = [p for p in lanes if p.column == part.column].index(part)
+    # along the chain to both sides of the lanes, each in the middle of what it is connected to
+    for part in sorted(parts.values(), key=lambda p: -p.column):
+        if part not in lanes:
+            ahead = [p.row for p in parts.values() if part.full in p.after]
+            part.row = _middle(ahead, part.row)
+    for part in sorted(parts.values(), key=lambda p: p.column):
+        if part.kind in ("joint", "load"):
+            part.row = _middle([parts[a].row for a in part.after], part.row)
+    for column in {p.column for p in parts.values()}:
+        row = -1.0
+        for part in sorted((p for p in parts.values() if p.column == column), key=lambda p: p.row):
+            part.row = row = max(part.row, row + 1.0)
+
+
+def _middle(rows: list[float], otherwise: float) -> float:
+    return sum(rows) / len(rows) if rows else otherwise
+
+
+def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
+    """What was found, at the blocks that it acts in."""
+    named = diagnosis.effects if diagnosis.verdict == "effects" else []
+    open_ = {n for b in diagnosis.blocks if len(b.ambiguity) > 1 for s in b.ambiguity for n in s}
+    for effect in named:
+        kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
+        doubt = "perhaps " if effect.id in open_ else ""
+        where = {t.at for t in diagnosis.budget if t.id == effect.id}
+        for part in _at(parts, kind, next(iter(where), "")):
+            part.found.append(f"{doubt}missing: {label(effect.id)}")
+    for wrong in diagnosis.wrong_parameters:
+        kind, _, rest = wrong.name.partition(".")
+        name, _, key = rest.rpartition(".")
+        if kind == "sensors":
+            kind = "chamber" if key.startswith("pressure") else "joint"
+        doubt = "perhaps wrong: " if wrong.name in open_ else "wrong: "
+        for part in _at(parts, kind, name):
+            part.found.append(doubt + label(key))
+
+
+def _at(parts: dict[str, _Part], kind: str, name: str) -> list[_Part]:
+    """Boxes of a block; of the nearest one that is drawn where it has none."""
+    for own in (kind, *ELSEWHERE.get(kind, ())):
+        found = [p for p in parts.values() if p.kind == own]
+        if found:
+            return [p for p in found if p.name == name] or found
+    return []
+
+
+@dataclass
+class _Drawing:
+    """Boxes and frames with their texts, on a canvas that grows with them."""
+
+    parts: dict[str, _Part]
+    diagnosis: Findings
+    rig: Rig
+
+    def svg(self) -> str:
+        """The element."""
+        parts = self.parts.values()
+        lines = {p.full: self._lines(p) for p in parts}
+        height = {p.full: 46.0 + LINE * len(lines[p.full]) for p in parts}
+        pitch = max(height.values()) + GAP + 2 * PAD
+        place = {
+            p.full: (
+                PAD + 4.0 + COLUMN * p.column,
+                2 * PAD + 22.0 + pitch * p.row,
+            )
+            for p in parts
+        }
+        body = [self._frame(m, place, height) for m in self._judged()]
+        body += [self._arrow(a, p.full, place) for p in parts for a in p.after]
+        body += [self._box(p, lines[p.full], *place[p.full], height[p.full]) for p in parts]
+        width = max(x for x, _ in place.values()) + BOX + PAD + 5.0
+        tall = max(y + height[full] for full, (_, y) in place.items()) + PAD + 6.0
+        return (
+            f'<svg class="chain" viewBox="0 0 {width:.0f} {tall:.0f}" role="img" '
+            f'style="min-width:{0.75 * width:.0f}px;max-width:{1.15 * width:.0f}px" '
+            f'font-size="12" aria-label="{escape(self._spoken())}">'
+            '<defs><marker id="chain-tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
+            'markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z" fill="#6b7280"/></marker>'
+            f"</defs>{''.join(body)}</svg>"
+        )
+
+    def _spoken(self) -> str:
+        """The drawing in one sentence, for who cannot see it."""
+        names = ", ".join(p.title for p in self.parts.values())
+        located = self.diagnosis.where.block
+        return f"The rig: {names}." + (f" The mismatch is in {located}." if located else "")
+
+    def _lines(self, part: _Part) -> list[tuple[str, str]]:
+        """Text lines of a box with their kind: ``measured``, ``unmeasured`` or ``found``."""
+        out = []
+        for channel in CHANNELS[part.kind]:
+            given = dotted(channel, part.name) in self.diagnosis.measured
+            if given or (channel in ALWAYS and self.diagnosis.measured):
+                out.append((label(channel), "measured" if given else "unmeasured"))
+        for text in part.found:
+            out += [(line, "found") for line in textwrap.wrap(text, 18)]
+        return out
+
+    def _judged(self) -> list[tuple[str, list[str], BlockMismatch | None]]:
+        """Blocks of the diagnosis, each with the boxes in it."""
+        own = {m.block: m for b in self.diagnosis.blocks for m in b.mismatch}
+        names = own or dict.fromkeys(self.diagnosis.residuals)
+        found = []
+        for name in names:
+            kind, _, of = name.partition(".")
+            inside = list(self._inside(kind, of))
+            if inside:
+                found.append((name, inside, own.get(name)))
+        return found
+
+    def _inside(self, kind: str, name: str) -> Iterable[str]:
+        """Boxes of a block of the diagnosis: a chamber with what feeds it, a joint or a load with
+        its muscles.
+        """
+        target = dotted("joint" if kind in ("arm", "joint") else kind, name)
+        if target not in self.parts:
+            return
+        yield target
+        if kind == "chamber":  # an outlet that leads nowhere else
+            led = {a for p in self.parts.values() for a in p.after}
+            outlets = (p for p in self.parts.values() if p.kind == "line" and target in p.after)
+            yield from (p.full for p in outlets if p.full not in led)
+        feeding = {"chamber": ("valve", "line")}.get(kind, ("muscle",))
+        waiting = [target]
+        while waiting:
+            for before in self.parts[waiting.pop()].after:
+                if before in self.parts and self.parts[before].kind in feeding:
+                    yield before
+                    waiting.append(before)
+
+    def _frame(
+        self,
+        judged: tuple[str, list[str], BlockMismatch | None],
+        place: dict[str, tuple[float, float]],
+        height: dict[str, float],
+    ) -> str:
+        """Frame around what is judged together, with its residual."""
+        name, inside, mismatch = judged
+        x = min(place[n][0] for n in inside) - PAD
+        y = min(place[n][1] for n in inside) - PAD - 20.0
+        right = max(place[n][0] for n in inside) + BOX + PAD
+        low = max(place[n][1] + height[n] for n in inside) + PAD
+        lit = name == self.diagnosis.where.block
+        verdict = next(
+            (b.verdict for b in self.diagnosis.blocks if name in b.blocks), "effects" if lit else ""
+        )
+        exceeds = mismatch is not None and mismatch.fitted.refit.more_than_noise
+        size = "" if mismatch is None else "fits to the noise"
+        residual = self.diagnosis.residuals.get(name)
+        if exceeds and residual is not None:
+            size = f"misses {format_number(residual.excess, 2)} × noise"
+        colour = COLOURS["before"] if lit or (exceeds and verdict != "none") else "#8a94a3"
+        fill = "#fdebdd" if lit else "#f6f7f9"
+        room = int((right - x) / 6.4)
+        text = textwrap.shorten(size, room, placeholder=" …")
+        return (
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{right - x:.1f}" height="{low - y:.1f}" rx="9" '
+            f'fill="{fill}" stroke="{colour}" stroke-width="{2.4 if lit else 1.2}"/>'
+            f'<text x="{x + 9:.1f}" y="{y + 17:.1f}" fill="{"#a33f00" if lit else "#57606a"}" '
+            f'font-weight="{700 if lit else 400}">{escape(text)}</text>'
+        )
+
+    def _arrow(self, first: str, second: str, place: dict[str, tuple[float, float]]) -> str:
+        """From one box to the next, at the height of their titles."""
+        (x, y), (to, end) = place[first], place[second]
+        if to > x:
+            start, stop = x + BOX, to - 2.0
+        else:
+            start, stop = x, to + BOX + 2.0
+        middle = 0.5 * (start + stop)
+        return (
+            f'<path d="M{start:.1f} {y + 24:.1f}C{middle:.1f} {y + 24:.1f} {middle:.1f} '
+            f'{end + 24:.1f} {stop:.1f} {end + 24:.1f}" fill="none" stroke="#6b7280" '
+            'stroke-width="1.6" marker-end="url(#chain-tip)"/>'
+        )
+
+    def _box(
+        self, part: _Part, lines: list[tuple[str, str]], x: float, y: float, height: float
+    ) -> str:
+        """A block with its symbol, its channels and what was found in it."""
+        edge = COLOURS["before"] if part.found else "#aeb5bf"
+        out = [
+            f'<rect x="{x:.1f}" y="{y:.1f}" width="{BOX}" height="{height:.1f}" rx="6" '
+            f'fill="#fff" stroke="{edge}" stroke-width="{1.8 if part.found else 1.0}"/>',
+            f'<g transform="translate({x + 8:.1f} {y + 11:.1f})" fill="none" stroke="#374151" '
+            f'stroke-width="1.5">{SYMBOLS[part.kind]}</g>',
+        ]
+        wrapped = textwrap.wrap(part.title, 12)[:2] or [""]
+        top = y + 28.0 if len(wrapped) == 1 else y + 21.0
+        out += [
+            f'<text x="{x + 42:.1f}" y="{top + 14 * k:.1f}" font-weight="600" fill="#1b1f24">'
+            f"{escape(text)}</text>"
+            for k, text in enumerate(wrapped)
+        ]
+        for k, (text, kind) in enumerate(lines):
+            base = y + 54.0 + LINE * k
+            fill = {"measured": "#1b1f24", "unmeasured": "#7a8594", "found": "#a33f00"}[kind]
+            if kind != "found":
+                dot = COLOURS["after"] if kind == "measured" else "none"
+                ring = COLOURS["after"] if kind == "measured" else "#7a8594"
+                out.append(
+                    f'<circle cx="{x + 13:.1f}" cy="{base - 4:.1f}" r="4" fill="{dot}" '
+                    f'stroke="{ring}" stroke-width="1.2"/>'
+                )
+            left, weight = (22.0, 400) if kind != "found" else (9.0, 600)
+            out.append(
+                f'<text x="{x + left:.1f}" y="{base:.1f}" fill="{fill}" font-weight="{weight}">'
+                f"{escape(text)}</text>"
+            )
+        return "".join(out)
+
+
+SYMBOLS = {
+    "supply": '<path d="M3 6v13a4 4 0 0 0 4 4h11a4 4 0 0 0 4-4V6a4 4 0 0 0-4-4H7a4 4 0 0 0-4 4z'
+    'M8 2v21"/>',
+    "valve": '<path d="M3 5l20 15V5L3 20zM13 12V3M9 3h8"/>',
+    "line": '<path d="M1 9h24M1 17h24"/>',
+    "chamber": '<circle cx="13" cy="13" r="10"/><path d="M13 13l5-5"/>',
+    "muscle": '<path d="M1 13h3M22 13h3M4 13c4-9 14-9 18 0c-4 9-14 9-18 0zM8 8l9 10M17 8L8 18"/>',
+    "joint": '<circle cx="6" cy="19" r="4"/><path d="M9 16L24 4"/>',
+    "load": '<path d="M13 1v7M5 8h16l3 15H2z"/>',
+}
+"""Symbols of the blocks, in a square of 26 px."""

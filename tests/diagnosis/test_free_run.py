@@ -1,0 +1,148 @@
+"""Free runs of the whole rig beside the cut chain, and what else schema 2 has."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.explain import _free_run
+from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.prove import valid_result
+from pamrs.diagnosis.result import schema
+from pamrs.errors import SimulationError
+from pamrs.recordings import Recording
+from pamrs.rig import Rig
+from pamrs.simulation import core_rig
+from tests.diagnosis import synthetic
+from tests.diagnosis.test_assemble import NAMES, recorded
+from trial.score import _result as scored
+
+SETTINGS = DiagnosisSettings()
+
+
+def problem_of(rig: Rig, records: list[Recording]) -> Problem:
+    names = [n for n in NAMES if all(n in r.channels for r in records)]
+    blocks = available_blocks(rig, names, SETTINGS.prepare)
+    return Problem(blocks, [prepare(r, rig, SETTINGS) for r in records], core_rig(rig), SETTINGS)
+
+
+def test_the_true_model_runs_freely_to_the_noise_and_the_nominal_one_drifts() -> None:
+    rig = pamrs.rigs.shoulder()
+    true = rig.with_effect("leak_muscle", {"conductance": 3e-9})
+    problem = problem_of(rig, [recorded(true, "a", "held_out")])
+    found = {"before": residuals(problem, rig), "after": residuals(problem, true)}
+    runs, note = _free_run.free_run(problem, found, rig, true, None)
+    assert note == ""
+    assert runs is not None
+    (run,) = runs
+    assert (run.recording, run.role, run.note) == ("a", "held_out", "")
+    assert run.seconds == pytest.approx(9.995)
+    assert set(run.channels) == {"supply_pressure", "muscle_pressure", "joint_angle"}
+    error = run.channels["muscle_pressure"]
+    assert error.unit == "Pa"
+    assert error.after == pytest.approx(400.0, rel=0.1)  # the transducer's noise
+    assert error.before > 3.0 * error.after
+    assert error.cut_after is not None
+    assert error.cut_before is not None
+    assert error.cut_after < error.cut_before
+
+
+def test_without_a_command_there_is_no_free_run_and_it_is_said_why() -> None:
+    rig = pamrs.rigs.shoulder()
+    silent = recorded(rig, "silent", "held_out", leave_out="valve_command")
+    whole = recorded(rig, "whole", "held_out", seed=2)
+    problem = problem_of(rig, [silent])
+    found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
+    runs, note = _free_run.free_run(problem, found, rig, rig, None)
+    assert runs is None
+    assert "silent" in note
+    assert "valve_command" in note
+    both = problem_of(rig, [silent, whole])
+    found = {"before": residuals(both, rig), "after": residuals(both, rig)}
+    runs, note = _free_run.free_run(both, found, rig, rig, None)
+    assert [r.recording for r in runs or []] == ["whole"]
+    assert "silent" in note
+
+
+def test_a_model_that_leaves_its_range_has_no_number_and_stops_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = pamrs.rigs.shoulder()
+    worse = rig.with_effect("leak_muscle", {"conductance": 3e-9})
+    problem = problem_of(rig, [recorded(rig, "a", "fit")])
+    found = {"before": residuals(problem, rig), "after": residuals(problem, worse)}
+    honest = _free_run.replay
+
+    def left(model: Rig, recording: Recording) -> pamrs.Simulation:
+        if model.effects:
+            raise SimulationError("contraction left the table")
+        return honest(model, recording)
+
+    monkeypatch.setattr(_free_run, "replay", left)
+    runs, _ = _free_run.free_run(problem, found, rig, worse, None)
+    assert runs is not None
+    (run,) = runs
+    assert run.note == "with what was found: contraction left the table"
+    assert all(math.isnan(e.after) and e.before > 0.0 for e in run.channels.values())
+    content = synthetic.diagnosis(free_run=runs).to_dict()
+    assert content["free_run"][0]["channels"]["joint_angle"]["after"] is None
+    jsonschema.validate(json.loads(json.dumps(content)), schema())
+
+
+def test_what_happened_in_one_recording_is_in_its_free_run_only() -> None:
+    rig = pamrs.rigs.shoulder()
+    event = {"torque": 4.0, "time": 3.0, "duration": 1.0}
+    final = rig.with_effect("external_torque", event)
+    records = [recorded(rig, name, "fit", seed=k) for k, name in enumerate("ab")]
+    problem = problem_of(rig, records)
+    found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
+    events = Events("external_torque", {"a": event})
+    runs, _ = _free_run.free_run(problem, found, rig, final, events)
+    assert runs is not None
+    pushed, quiet = (run.channels["joint_angle"] for run in runs)
+    assert pushed.after != pushed.before
+    assert quiet.after == quiet.before
+
+
+def test_a_diagnosis_has_the_keys_of_schema_2() -> None:
+    rig = pamrs.rigs.shoulder()
+    late = rig.with_effect("leak_muscle", {"conductance": 3e-9})
+    records = [recorded(late, f"r{k}", "fit", seed=k) for k in range(2)]
+    records.append(recorded(late, "r2", "held_out", seed=2))
+    found = pamrs.diagnose(pamrs.Case("leaky", rig, records, Path()))
+    content = json.loads(found.to_json())
+    jsonschema.validate(content, schema())
+    assert content["schema"] == "pamrs.diagnosis/2"
+    named = [t for t in content["budget"] if t["kind"] == "effect"]
+    assert {t["id"] for t in named} == {"leak_muscle"}
+    assert named[0]["parameters"]["conductance"]["value"] == pytest.approx(3e-9, rel=0.2)
+    assert named[0]["at"] == ""
+    (run,) = content["free_run"]
+    assert run["recording"] == "r2"
+    pressure = run["channels"]["muscle_pressure"]
+    assert pressure["after"] < 0.5 * pressure["before"]
+    assert content["settings"]["seed"] == found.settings.seed
+    for kept in content["unexplained"]:
+        assert kept["share"] is None or kept["interval"][0] <= kept["share"] <= kept["interval"][1]
+
+
+@pytest.mark.parametrize(("name", "read"), [("1", True), ("2", True), ("3", False)])
+def test_results_of_the_first_schema_can_still_be_read(
+    tmp_path: Path, name: str, read: bool
+) -> None:
+    out = tmp_path / "case_a" / "out.json"
+    out.parent.mkdir()
+    out.write_text(json.dumps({"schema": f"pamrs.diagnosis/{name}", "verdict": "none"}))
+    assert (valid_result(out) is not None) == read
+    if read:
+        assert scored(tmp_path, "case_a") is not None
+    else:
+        with pytest.raises(ValueError, match="schema must be one of"):
+            scored(tmp_path, "case_a")
