@@ -101,11 +101,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    gap = (
-        _gap(table, settings.verdict.least_gap)
-        if models.final.effects or any(j.wrong for j in judged)
-        else None
-    )
+    known = models.chosen if named else models.starts
+    changed = models.final.effects or any(j.wrong for j in judged)
+    gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
     terms = budget(judged, held, out_found, noise_level, models.final)
     forms = _forms(judged, fitted)
@@ -118,9 +116,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(
-            nominal, models.chosen if named else models.starts, settings.fit.known_share
-        ),
+        parameters=_parameters(nominal, known, settings.fit.known_share),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=_next(verdict, probabilities, ambiguity, nominal, judged, fitted, held),
         warnings=_warnings(case, models, table, settings, same=held is fitted),
@@ -139,10 +135,21 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         free_run_note=runs_note,
         settings=settings,
     )
+    return _worded(diagnosis, case, gap, judged, forms)
+
+
+def _worded(
+    diagnosis: Diagnosis,
+    case: Case,
+    gap: float | None,
+    judged: list[Judged],
+    forms: dict[str, str],
+) -> Diagnosis:
+    """A diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
-    told = list(dict.fromkeys(forms.values()))
+    told, settings = list(dict.fromkeys(forms.values())), diagnosis.settings.warnings
     return replace(
-        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings.warnings, sought=sought)
+        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings, sought=sought)
     )
 
 
