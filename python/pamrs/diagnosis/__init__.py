@@ -205,13 +205,14 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*held, *diagnosis.warnings, *left_out]
+    warnings = [*held, *left_out, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
-        warnings.append(
+        warnings.insert(
+            0,
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
             f"{what} as an effect would, so the probability of an effect of muscles and what they "
-            f"move is capped at {100 * factor:.0f} %"
+            f"move is capped at {100 * factor:.0f} %",
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")

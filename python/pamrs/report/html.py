@@ -263,6 +263,30 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
     return rows
 
 
+def _fits(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
+    """The tables of errors with their titles."""
+    tables = (
+        ("Held-out recordings (not used for the fit)", _fit(diagnosis.fit.held_out)),
+        ("Fitted recordings", _fit(diagnosis.fit.channels)),
+    )
+    return [(title, rows) for title, rows in tables if rows]
+
+
+def _sets(diagnosis: Findings) -> list[tuple[str, str]]:
+    """The sets that are left, each with its probability: as the headline has it, by the one group
+    of blocks that is open, else that of the case.
+    """
+    is_open = [b for b in diagnosis.blocks if len(b.ambiguity) > 1]
+    own = is_open[0].probabilities if len(is_open) == 1 else {}
+    found = []
+    for names in diagnosis.ambiguity:
+        chance = words.chance_of(own, names)
+        if not words.is_number(chance):
+            chance = words.chance_of(diagnosis.probabilities, names)
+        found.append((words.set_label(names), words.format_probability(chance)))
+    return found
+
+
 def _free_run(diagnosis: Findings) -> list[dict[str, Any]]:
     """Errors of free runs beside those of the cut chain, channel by channel."""
     rows = []
@@ -459,11 +483,7 @@ def render(diagnosis: Findings) -> str:
         ],
         wrong=_wrong(diagnosis),
         kept=[words.kept_details(u) for u in diagnosis.unexplained],
-        ambiguity=[
-            (words.set_label(s), words.format_probability(chance))
-            for s in diagnosis.ambiguity
-            for chance in [words.chance_of(diagnosis.probabilities, s)]
-        ],
+        ambiguity=_sets(diagnosis),
         tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,
         excitation=_excitation(diagnosis),
@@ -471,14 +491,7 @@ def render(diagnosis: Findings) -> str:
         separating=_markup(_separating(diagnosis)),
         ranking=_ranking(diagnosis),
         pairs=_pairs(diagnosis),
-        fits=[
-            (title, rows)
-            for title, rows in (
-                ("Held-out recordings (not used for the fit)", _fit(diagnosis.fit.held_out)),
-                ("Fitted recordings", _fit(diagnosis.fit.channels)),
-            )
-            if rows
-        ],
+        fits=_fits(diagnosis),
         recordings=recordings,
         hidden=hidden,
         parameters=_parameters(diagnosis),

@@ -104,11 +104,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    gap = (
-        _gap(table, settings.verdict.least_gap)
-        if models.added or any(j.wrong for j in judged)
-        else None
-    )
+    known = models.chosen if named else models.starts
+    changed = models.added or any(j.wrong for j in judged)
+    gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
     terms = budget(judged, held, out_found, noise_level, nominal, models.final)
     forms = _forms(judged, fitted)
@@ -121,7 +119,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=_effects(judged, verdict, settings.verdict.in_set),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, models.chosen if named else models.starts, settings.fit),
+        parameters=_parameters(nominal, known, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=next_experiment(
             verdict,
@@ -148,10 +146,21 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         free_run_note=runs_note,
         settings=settings,
     )
+    return _worded(diagnosis, case, gap, judged, forms)
+
+
+def _worded(
+    diagnosis: Diagnosis,
+    case: Case,
+    gap: float | None,
+    judged: list[Judged],
+    forms: dict[str, str],
+) -> Diagnosis:
+    """A diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
-    told = list(dict.fromkeys(forms.values()))
+    told, settings = list(dict.fromkeys(forms.values())), diagnosis.settings.warnings
     return replace(
-        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings.warnings, sought=sought)
+        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings, sought=sought)
     )
 
 

@@ -127,17 +127,7 @@ def unexplained(
             continue
         suspects = {b.name: b for b in j.group.suspects}
         for own in (m for m in entry.mismatch if m.block in suspects):
-            # a form without a name takes up what no name explains, and is no explanation
-            stage = "refit" if entry.verdict == "unlisted" else "after"
-            parts = [part for part in (own.held_out, own.fitted) if part is not None]
-            left = next(
-                (
-                    (part[stage], problem, residuals[stage])
-                    for part, (problem, residuals) in zip(parts, stages, strict=True)
-                    if part[stage].more_than_noise
-                ),
-                None,
-            )
+            left = _left(own, entry.verdict, stages)
             if left is None:
                 continue
             size, problem, residual = left
@@ -157,6 +147,20 @@ def unexplained(
                 )
             )
     return sorted(found, key=lambda u: -(u.noises or 0.0))
+
+
+def _left(
+    own: BlockMismatch, verdict: str, stages: list[tuple[Problem, Stages]]
+) -> tuple[MismatchSize, Problem, dict[Key, Residual]] | None:
+    """What a block keeps, and the recordings that show it; None where it is no more than noise."""
+    # a form without a name takes up what no name explains, and is no explanation
+    stage = "refit" if verdict == "unlisted" else "after"
+    parts = [part for part in (own.held_out, own.fitted) if part is not None]
+    for part, (problem, residuals) in zip(parts, stages, strict=True):
+        size: MismatchSize = part[stage]
+        if size.more_than_noise:
+            return size, problem, residuals[stage]
+    return None
 
 
 def _rest(block: str, terms: list[BudgetTerm]) -> tuple[float | None, list[float] | None]:
