@@ -24,7 +24,7 @@ from pamrs.diagnosis.evidence import (
     weigh,
     without_autocorrelation,
 )
-from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, depends, fits, residuals
+from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, depends, fits, form_in, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen, stand_of
@@ -567,8 +567,20 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
         tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            found.append(replace(min(fitted, key=_left_everywhere), gain=gains[effect]))
+            alike = trial.settings.evidence.form_share_alike
+            found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
     return found
+
+
+def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
+    """Of one effect's fits the one that leaves least; of forms that leave as little, the one that
+    the catalogue lists first, which is the usual one.
+    """
+    least = min(_left_everywhere(c) for c in fitted)
+    near = [c for c in fitted if _left_everywhere(c) <= least + alike]
+    (effect,) = near[0].effects
+    order = ["", *(form.name for form in EFFECTS[effect].forms[1:])]
+    return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), _left_everywhere(c)))
 
 
 def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
