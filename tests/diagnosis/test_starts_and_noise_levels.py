@@ -263,3 +263,21 @@ def test_excess_inside_the_stated_error_of_the_model_is_none() -> None:
         assert lenient.noise == strict.noise  # that of the sensor stays what it is
     # an error ten times smaller than the mismatch hides nothing
     assert significant(judged({"joint_angle": {"size": np.radians(0.05)}}))
+
+
+def test_what_relaxes_at_once_is_another_stiffness() -> None:
+    """A time constant below its own standard deviation was not seen: the wrong value wins."""
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    start = named((), 400.0, {})
+    value = replace(named((), 1.02, {}), wrong=("muscle.modulus_scale",))
+    moved = {"muscle.modulus_scale": -10.0}
+    value = replace(value, fit=replace(value.fit, moved=moved, freed=tuple(moved)))
+    creep = named(("muscle_creep",), 1.0, {"muscle_creep.time_constant": 2.0})
+
+    def odds(std: float) -> dict[str, float]:
+        told = replace(creep, fit=replace(creep.fit, std={"muscle_creep.time_constant": std}))
+        return weigh([start, told, value], blocks, 0.985, 30.0, SETTINGS)
+
+    seen, unseen = odds(0.2), odds(3.0)
+    assert seen["muscle_creep"] > 0.8
+    assert unseen["muscle.modulus_scale"] > 0.8

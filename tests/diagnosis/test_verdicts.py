@@ -241,3 +241,12 @@ def test_sentences_have_units_of_the_field() -> None:
         "the residual of the arm is 15 times the noise level (0.40 deg), and no listed effect "
         "explains it"
     )
+
+
+def test_a_wrong_value_is_named_beside_an_effect() -> None:
+    judged, verdict = said(
+        group("chamber", {"clock_skew+valve.discharge_area_max": 0.9, "unlisted": 0.1})
+    )
+    assert verdict == "effects"
+    assert judged[0].named == ("clock_skew",)
+    assert judged[0].wrong == ("valve.discharge_area_max",)
