@@ -4,8 +4,9 @@ Entries have attributes and can be read like dictionaries. This package computes
 below reports and diagnosis, so that neither has to know the other to name what lies between them.
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`; `to_plain` and `told`, by
-which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a schema comes of them.
+`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`; `to_plain` and
+`told`, by which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a schema
+comes of them.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from pamrs.findings._details import (
     Tried,
 )
 from pamrs.findings._entries import (
+    HEALTHY,
     VERDICTS,
     BlockMismatch,
     BlockVerdict,
@@ -48,6 +50,7 @@ from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
     "DEFINITIONS",
+    "HEALTHY",
     "VERDICTS",
     "BlockMismatch",
     "BlockResidual",

@@ -9,6 +9,7 @@ from typing import Any, Final
 from pamrs.findings._entry import Entry, told
 
 __all__ = [
+    "HEALTHY",
     "VERDICTS",
     "BlockMismatch",
     "BlockVerdict",
@@ -30,6 +31,8 @@ __all__ = [
 ]
 
 VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+HEALTHY: Final = VERDICTS[:2]
+"""Verdicts, and hypotheses, by which no physics is missing."""
 """Allowed verdicts."""
 
 

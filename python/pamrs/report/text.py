@@ -8,6 +8,7 @@ from typing import Any, TypeGuard
 
 from pamrs.effects import EFFECTS
 from pamrs.findings import (
+    HEALTHY,
     BlockVerdict,
     BudgetTerm,
     EffectFound,
@@ -18,7 +19,6 @@ from pamrs.findings import (
 )
 
 __all__ = [
-    "HEALTHY",
     "blocks_label",
     "budget_sentence",
     "budgets",
@@ -62,9 +62,6 @@ _LABELS = {
 SETTLED = 0.9
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
 settled, `VerdictSettings.settled`)."""
-
-HEALTHY = ("none", "parameters")
-"""Hypotheses by which no physics is missing."""
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DISPLAY = {

@@ -4,7 +4,7 @@ Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
 `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
 `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
-`case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of`, `HEALTHY` (verdicts).
+`case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from pamrs.diagnosis.evidence._candidates import (
     without_autocorrelation,
 )
 from pamrs.diagnosis.evidence._verdicts import (
-    HEALTHY,
     Judged,
     case_ambiguity,
     case_probabilities,
@@ -45,7 +44,6 @@ from pamrs.diagnosis.evidence._weighing import (
 )
 
 __all__ = [
-    "HEALTHY",
     "Attempts",
     "Candidate",
     "Group",

@@ -417,24 +417,38 @@ class Attempts:
         """Effects beside other values of some parameters, which are freed from their tolerance;
         None where that cannot be run.
         """
-        effects = tuple(start.effect for start in starts)
-        free, held, forms = parts_of(starts)
         try:
-            found = fit(
-                self.inner,
-                self.nominal,
-                effects,
-                free,
-                self.autocorrelation(warm),
-                fixed=held,
-                warm=warm,
-                freed=names,
-                evaluations=self.settings.fit.effect_evaluations,
-                forms=forms,
-            )
-            return replace(self.judged(effects, found), wrong=names)
+            return self._gone_on(starts, warm, names, self.settings.fit.effect_evaluations)
         except SimulationError:
             return None  # it leaves the range in which the model holds
+
+    def _gone_on(
+        self,
+        starts: list[Start],
+        warm: Fit,
+        wrong: tuple[str, ...],
+        evaluations: int,
+        share: float | None = None,
+    ) -> Candidate:
+        """Effects fitted on from a fit, with the sensitivities of every parameter where it is and
+        some parameters freed.
+        """
+        effects = tuple(start.effect for start in starts)
+        free, held, forms = parts_of(starts)
+        found = fit(
+            self.inner,
+            self.nominal,
+            effects,
+            free,
+            self.autocorrelation(warm),
+            fixed=held,
+            warm=warm,
+            freed=wrong,
+            evaluations=evaluations,
+            share=share,
+            forms=forms,
+        )
+        return replace(self.judged(effects, found), wrong=wrong)
 
     def united(self, candidates: list[Candidate]) -> Fit | None:
         """One fit with everything that some hypotheses name, each for a block of its own; None
@@ -480,26 +494,19 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        free, held, forms = parts_of([self.start_of(found, effect) for effect in candidate.effects])
-        autocorrelation = self.autocorrelation(found)
+        settings = self.settings.fit
+        starts = [self.start_of(found, effect) for effect in candidate.effects]
         try:
-            best = fit(
-                self.inner,
-                self.nominal,
-                candidate.effects,
-                free,
-                autocorrelation,
-                fixed=held,
-                warm=found,
-                freed=candidate.wrong,
-                evaluations=self.settings.fit.polish_evaluations,
-                share=self.settings.fit.final_step_share,
-                forms=forms,
+            polished = self._gone_on(
+                starts,
+                found,
+                candidate.wrong,
+                settings.polish_evaluations,
+                settings.final_step_share,
             )
-            judged = self.judged(candidate.effects, best)
-            return replace(judged, gain=candidate.gain, wrong=candidate.wrong)
         except SimulationError:
             return candidate
+        return replace(polished, gain=candidate.gain)
 
 
 def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:

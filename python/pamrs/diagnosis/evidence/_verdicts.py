@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
 from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
+from pamrs.findings import HEALTHY
 
 __all__ = [
     "Judged",
@@ -25,7 +26,6 @@ __all__ = [
     "symptoms_of",
 ]
 
-HEALTHY = ("none", "parameters")
 WITHOUT_NAME = (*HEALTHY, "unlisted")
 """Hypotheses that name nothing."""
 

@@ -143,27 +143,20 @@ def weigh(
         return {"unlisted": 1.0}
     start = candidates[0]
     evidence = settings.evidence
+    odd = {c: unlikely(c, ranging or {}, evidence) for c in named}
     trusted = {
-        c: _trusted(
-            c,
-            start,
-            suspects if own is None else own[c],
-            most,
-            seconds,
-            unlikely(c, ranging or {}, evidence),
-            evidence,
-        )
+        c: _trusted(c, start, suspects if own is None else own[c], most, seconds, odd[c], evidence)
+        for c in named
+    }
+    against = {
+        c: evidence.standing_price * stands(c, seconds)
+        + evidence.unseen_price * _unseen(c, seconds, evidence)
+        + odd[c]
         for c in named
     }
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {
-            c: _score(c, start, suspects, granted, settings)
-            - evidence.standing_price * stands(c, seconds)
-            - evidence.unseen_price * _unseen(c, seconds, evidence)
-            - unlikely(c, ranging or {}, evidence)
-            for c in named
-        }
+        scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
         scores = _beside_values(scores, evidence)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}

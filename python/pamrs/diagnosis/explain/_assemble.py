@@ -11,7 +11,6 @@ import numpy as np
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
-    HEALTHY,
     Candidate,
     Group,
     Judged,
@@ -54,6 +53,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSet
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.errors import SimulationError
 from pamrs.findings import (
+    HEALTHY,
     BlockResidual,
     ChannelError,
     EffectFound,

@@ -7,12 +7,12 @@ from __future__ import annotations
 import contextlib
 import itertools
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import HEALTHY, Judged, is_parameter
+from pamrs.diagnosis.evidence import Judged, is_parameter
 from pamrs.diagnosis.fit import Problem, depends
 from pamrs.diagnosis.next_experiment import (
     Experiment,
@@ -29,7 +29,7 @@ from pamrs.diagnosis.next_experiment import (
 from pamrs.diagnosis.prepare import Block, Prepared
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.findings import NextExperiment, PairExperiment
+from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
 from pamrs.rig import Rig
 from pamrs.simulation import regulators_of
 
@@ -125,6 +125,8 @@ class _Question:
         What there is already.
     problem : Problem
         Any of them, for its settings.
+    made : dict of str to (Experiment or None)
+        What the library made for this rig so far, by kind.
     """
 
     nominal: Rig
@@ -132,6 +134,7 @@ class _Question:
     blocks: list[Block]
     recordings: list[Prepared]
     problem: Problem
+    made: dict[str, Experiment | None] = field(default_factory=dict)
 
     @property
     def noise(self) -> dict[str, float]:
@@ -165,14 +168,18 @@ class _Question:
         for this rig.
         """
         telling = _telling(block, self.nominal)
+        if telling.kind not in self.made:
+            self.made[telling.kind] = self._make(telling.kind)
+        made = self.made[telling.kind]
+        return telling.text if made is None else made.text, telling.shows, made
+
+    def _make(self, kind: str) -> Experiment | None:
+        """The experiment of a kind; None where the library makes none for this rig."""
         records = [p.recording for p in self.recordings]
         settings = self.problem.settings.next_experiment
-        pool: list[Experiment] = []
         with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
-            pool = experiments_of(self.nominal, records, settings, {telling.kind})
-        if pool:
-            return pool[0].text, telling.shows, pool[0]
-        return telling.text, telling.shows, None
+            return next(iter(experiments_of(self.nominal, records, settings, {kind})), None)
+        return None
 
 
 def next_experiment(

@@ -349,8 +349,15 @@ def apart(outcome: Outcome, i: int, j: int, *, nested: bool = False) -> tuple[st
     That is the smaller of both ways; where the one is a case of the other (``nested``), and can
     miss nothing, the larger.
     """
-    both = (outcome.left[pair].largest for pair in ((i, j), (j, i)))
-    key, size = (max if nested else min)(both, key=lambda found: found[1])
+    both = (_largest(outcome, *pair) for pair in ((i, j), (j, i)))
+    return (max if nested else min)(both, key=lambda found: found[1])
+
+
+def _largest(outcome: Outcome, i: int, j: int) -> tuple[str, float]:
+    """The channel in which hypothesis j misses most of what hypothesis i predicts, and how much
+    [noise levels].
+    """
+    key, size = outcome.left[i, j].largest
     return next(b.channel for b in outcome.problem.blocks if b.name == key[0]), size
 
 
@@ -371,10 +378,8 @@ def _pairs(
         outcome = ranked(alone, [0.5, 0.5], resolution)[0]
         (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
         _, size = apart(outcome, i, j, nested=_nested(first, second))
-        sensor = f", with one more channel: {_plain(outcome.sensor)}" if outcome.sensor else ""
-        what = outcome.experiment.text
         text = (
-            f"{what[:1].upper()}{what[1:]}{sensor}. If it is {spoken(one)}, a model with "
+            f"{_told(outcome)}. If it is {spoken(one)}, a model with "
             f"{spoken(other)} then misses the {_missed(outcome, i, j)}; the other way round it "
             f"misses the {_missed(outcome, j, i)}."
         )
@@ -384,9 +389,15 @@ def _pairs(
 
 def _missed(outcome: Outcome, i: int, j: int) -> str:
     """What hypothesis j misses of what hypothesis i predicts, in words."""
-    key, size = outcome.left[i, j].largest
-    channel = next(b.channel for b in outcome.problem.blocks if b.name == key[0])
+    channel, size = _largest(outcome, i, j)
     return f"{_plain(channel)} by {size:.2g} times the noise level"
+
+
+def _told(outcome: Outcome) -> str:
+    """What to record, and with which further sensor, in words."""
+    text = outcome.experiment.text
+    sensor = f", with one more channel: {_plain(outcome.sensor)}" if outcome.sensor else ""
+    return f"{text[:1].upper()}{text[1:]}{sensor}"
 
 
 def _plain(channel: str) -> str:
@@ -481,7 +492,11 @@ def experiments_of(
     return library(rig, settings, sample_time=step, highest=limit, only=only)
 
 
-_HEALTHY = {"none": "nothing missing", "parameters": "parameters inside their tolerances"}
+_WITHOUT_NAME = {
+    "none": "nothing missing",
+    "parameters": "parameters inside their tolerances",
+    "unlisted": "something that is not listed",
+}
 """Hypotheses without a name, in words."""
 
 
@@ -491,8 +506,7 @@ def spoken(label: str) -> str:
     def told(part: str) -> str:
         if part in EFFECTS:
             return EFFECTS[part].name
-        words = {**_HEALTHY, "unlisted": "something that is not listed"}
-        return words.get(part, f"another value of {part}")
+        return _WITHOUT_NAME.get(part, f"another value of {part}")
 
     return " with ".join(told(part) for part in label.split("+"))
 
@@ -500,15 +514,13 @@ def spoken(label: str) -> str:
 def _text(
     best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float, hopeless: float
 ) -> str:
-    said = best.experiment.text[:1].upper() + best.experiment.text[1:]
-    if best.sensor:
-        said += f", with one more channel: {best.sensor.replace('_', ' ')}"
     # of the leading pair: what the second one cannot explain of what the first one does
     j = min(range(1, len(hypotheses)), key=lambda k: (-round(hypotheses[k][2], 2), k))
-    said += (
-        f". If it is {spoken(hypotheses[0][0])}, a model with {spoken(hypotheses[j][0])} then "
-        f"misses the {_missed(best, 0, j)}, whatever its parameters. The "
-        f"expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of uncertainty."
+    said = (
+        f"{_told(best)}. If it is {spoken(hypotheses[0][0])}, a model with "
+        f"{spoken(hypotheses[j][0])} then misses the {_missed(best, 0, j)}, whatever its "
+        f"parameters. The expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of "
+        "uncertainty."
     )
     if best.bits < hopeless * uncertainty:
         said += " No standard experiment does better with these channels: consider another sensor."

@@ -106,8 +106,8 @@ def noise_levels(
         The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`): excess inside
         it is none.
     """
-    found = {}
-    settings = problem.settings
+    found: dict[Key, NoiseLevel] = {}
+    settings, known = problem.settings, stated or {}
     for prepared in problem.recordings:
         rng = np.random.default_rng([settings.seed, crc32(prepared.recording.name.encode())])
         for block in problem.blocks:
@@ -141,8 +141,8 @@ def noise_levels(
                 float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
             )
             noise = base.noise**2 * white + drives
-            error = _stated_variance(block, base, prepared, stated or {})
-            error += _carried_variance(block, core, base, prepared, stated or {}, rng)
+            error = _stated_variance(block, base, prepared, known)
+            error += _carried_variance(block, core, base, prepared, known, rng)
             found[block.name, prepared.recording.name] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
                 math.sqrt(noise + error),

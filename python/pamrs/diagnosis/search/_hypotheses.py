@@ -283,12 +283,7 @@ def _hypotheses(
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)
     if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
-        return [
-            start,
-            *singles,
-            *_beside_wrong(trial, singles, tell),
-            *mistaken,
-        ]
+        return [start, *singles, *_beside_wrong(trial, singles, tell), *mistaken]
     pairs = _pairs(trial, screened, start, singles, tell)
     for effect, beside in _beside(trial, screened, start, singles, transient):
         tell(f"looking for {effect} beside {beside.effects[0]}")

@@ -112,21 +112,15 @@ def freed(
         for found in (baseline, first)
         for names in suspected(found, trial.inner.blocks, settings)
     ]
-    gains = _predicted_gain(
-        trial.inner, trial.nominal, baseline, list(dict.fromkeys(suspects)), trial.white
-    )
-    ranked = sorted(
-        (n for n, gain in gains.items() if gain > settings.least_predicted_gain),
-        key=lambda n: -gains[n],
-    )
+    gains = _promising(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
     # the linear model says little of what is far away: each parameter at its wall is fitted,
     # whatever its predicted gain beside others
     least = settings.pair_share * max(gains.values(), default=0.0)
-    pairs = [names for names in ranked if len(names) > 1 and gains[names] > least][
+    pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
         : settings.most_pairs
     ]
     found = []
-    sets = [names for names in ranked if len(names) == 1 or names in pairs]
+    sets = [names for names in gains if len(names) == 1 or names in pairs]
     for names, candidate in _tried(trial, sets, baseline, say).items():
         if candidate is not None and all(
             abs(candidate.fit.moved[name]) > walls for name in names
@@ -150,9 +144,19 @@ def strained_parameters(trial: Attempts, found: Fit) -> list[str]:
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in found.moved.items() if abs(moved) >= settings.far_tolerances
     ]
-    gains = _predicted_gain(trial.inner, trial.nominal, found, far, trial.autocorrelation(found))
-    likely = [names for names in far if gains.get(names, 0.0) > settings.least_predicted_gain]
-    return [n for (n,) in sorted(likely, key=lambda names: -gains[names])][: settings.most_beside]
+    gains = _promising(trial, found, far, trial.autocorrelation(found))
+    return [name for (name,) in gains][: settings.most_beside]
+
+
+def _promising(
+    trial: Attempts, found: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
+) -> dict[tuple[str, ...], float]:
+    """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
+    chi-square, the largest first.
+    """
+    least = trial.settings.wrong_parameters.least_predicted_gain
+    gains = _predicted_gain(trial.inner, trial.nominal, found, sets, inflation)
+    return {n: gains[n] for n in sorted(gains, key=lambda n: -gains[n]) if gains[n] > least}
 
 
 def _tried(
