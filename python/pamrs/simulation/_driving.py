@@ -23,6 +23,7 @@ __all__ = [
     "Signals",
     "has_frame",
     "initial_values",
+    "inputs_of",
     "keywords",
     "regulators_of",
     "sensor_zero",
@@ -85,7 +86,7 @@ def signals_of(
         If a signal is missing, not taken by the rig, of another length or outside its range; the
         message names it.
     """
-    inputs = Inputs(rig)
+    inputs = inputs_of(rig)
     given = inputs.named(
         valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
     )
@@ -123,8 +124,8 @@ class Inputs:
         self._ranges: dict[str, tuple[float, float, str]] = {}
         self._load = rig.tables("load").get("", {})
         self._ambient = float(rig.tables("gas")[""]["ambient_pressure"])
-        # One valve and nothing else that must be given: what most loops answer.
-        self._only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
+        #: Name of the one valve where nothing else must be given: what most loops answer.
+        self.only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
 
     def named(
         self,
@@ -167,12 +168,12 @@ class Inputs:
         :func:`signals_of`.
         """
         if (
-            self._only is not None
+            self.only is not None
             and isinstance(valve_command, float)
             and math.isfinite(valve_command)
             and supply_command is length is pressure is None
         ):
-            return {self._only: valve_command}
+            return {self.only: valve_command}
         given = self.named(
             valve_command=valve_command,
             supply_command=supply_command,
@@ -231,6 +232,16 @@ class Inputs:
                     "supply_command is given, which only a supply takes that is a regulator "
                     '([supply] kind = "regulator")'
                 )
+
+
+def inputs_of(rig: Rig) -> Inputs:
+    """What a rig takes, kept with it: a second run does not look it up again."""
+    cached: Any = rig.__dict__.get("_inputs")
+    if cached is None:
+        cached = Inputs(rig)
+        object.__setattr__(rig, "_inputs", cached)
+    inputs: Inputs = cached
+    return inputs
 
 
 def keywords(answer: Any) -> dict[str, Any]:
@@ -329,7 +340,8 @@ def _signal(
             f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row"
         )
     low, high, allowed = allowed_range
-    bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
-    if bad.size:
+    least, most = float(signal.min()), float(signal.max())
+    if not (low <= least and most <= high and math.isfinite(least) and math.isfinite(most)):
+        bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
         raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]:g} is not allowed: {allowed}")
     return np.ascontiguousarray(signal)

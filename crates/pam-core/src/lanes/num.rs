@@ -8,36 +8,37 @@ use pulp::bytemuck;
 use pulp::Simd;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// Vector registers that hold a number: while one waits for a result the other is worked on.
-const REGISTERS: usize = 2;
+/// Vector registers that hold a number of many plants: while one waits for a result the other is
+/// worked on. A plant alone has one.
+pub(super) const PAIR: usize = 2;
 /// Lanes at most.
-pub(super) const MOST_LANES: usize = 8 * REGISTERS;
+pub(super) const MOST_LANES: usize = 8 * PAIR;
 
 /// How many plants there are side by side.
 #[inline(always)]
-pub(super) const fn side_by_side<S: Simd>() -> usize {
-    S::F64_LANES * REGISTERS
+pub(super) const fn side_by_side<S: Simd, const R: usize>() -> usize {
+    S::F64_LANES * R
 }
 
-/// One number of each lane.
+/// One number of each lane, in `R` registers.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Num<S: Simd> {
+pub(super) struct Num<S: Simd, const R: usize> {
     simd: S,
-    lanes: [S::f64s; REGISTERS],
+    lanes: [S::f64s; R],
 }
 
 /// Yes or no for each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Mask<S: Simd> {
+pub(super) struct Mask<S: Simd, const R: usize> {
     simd: S,
-    lanes: [S::m64s; REGISTERS],
+    lanes: [S::m64s; R],
 }
 
-impl<S: Simd> Num<S> {
+impl<S: Simd, const R: usize> Num<S, R> {
     /// The same number in each lane.
     #[inline(always)]
     pub fn splat(simd: S, value: f64) -> Self {
-        Self { simd, lanes: [simd.splat_f64s(value); REGISTERS] }
+        Self { simd, lanes: [simd.splat_f64s(value); R] }
     }
 
     /// A number for each lane; as many as there are lanes.
@@ -83,8 +84,8 @@ impl<S: Simd> Num<S> {
     }
 
     #[inline(always)]
-    fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S> {
-        let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); REGISTERS];
+    fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S, R> {
+        let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); R];
         for (mask, (mine, other)) in lanes.iter_mut().zip(self.lanes.into_iter().zip(other.lanes)) {
             *mask = of(self.simd, mine, other);
         }
@@ -93,13 +94,13 @@ impl<S: Simd> Num<S> {
 
     /// Where this is less.
     #[inline(always)]
-    pub fn less(self, other: Self) -> Mask<S> {
+    pub fn less(self, other: Self) -> Mask<S, R> {
         self.compare(other, |simd, a, b| simd.less_than_f64s(a, b))
     }
 
     /// Where this is at most the other.
     #[inline(always)]
-    pub fn at_most(self, other: Self) -> Mask<S> {
+    pub fn at_most(self, other: Self) -> Mask<S, R> {
         self.compare(other, |simd, a, b| simd.less_than_or_equal_f64s(a, b))
     }
 
@@ -235,7 +236,7 @@ const EXPONENTIAL: [f64; 14] = {
     terms
 };
 
-impl<S: Simd> Mask<S> {
+impl<S: Simd, const R: usize> Mask<S, R> {
     /// Whether it holds in no lane.
     #[inline(always)]
     pub fn nowhere(self) -> bool {
@@ -244,9 +245,9 @@ impl<S: Simd> Mask<S> {
 
     /// One number where it holds, another where it does not.
     #[inline(always)]
-    pub fn select(self, yes: Num<S>, no: Num<S>) -> Num<S> {
+    pub fn select(self, yes: Num<S, R>, no: Num<S, R>) -> Num<S, R> {
         let mut chosen = no;
-        for k in 0..REGISTERS {
+        for k in 0..R {
             chosen.lanes[k] = self.simd.select_f64s(self.lanes[k], yes.lanes[k], no.lanes[k]);
         }
         chosen
@@ -255,7 +256,7 @@ impl<S: Simd> Mask<S> {
 
 macro_rules! operator {
     ($trait:ident, $name:ident, $lanes:ident) => {
-        impl<S: Simd> $trait for Num<S> {
+        impl<S: Simd, const R: usize> $trait for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -264,7 +265,7 @@ macro_rules! operator {
             }
         }
 
-        impl<S: Simd> $trait<f64> for Num<S> {
+        impl<S: Simd, const R: usize> $trait<f64> for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -280,7 +281,7 @@ operator!(Sub, sub, sub_f64s);
 operator!(Mul, mul, mul_f64s);
 operator!(Div, div, div_f64s);
 
-impl<S: Simd> Neg for Num<S> {
+impl<S: Simd, const R: usize> Neg for Num<S, R> {
     type Output = Self;
 
     #[inline(always)]
@@ -289,7 +290,7 @@ impl<S: Simd> Neg for Num<S> {
     }
 }
 
-impl<S: Simd> AddAssign for Num<S> {
+impl<S: Simd, const R: usize> AddAssign for Num<S, R> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;

@@ -9,50 +9,50 @@ use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig};
 use pulp::Simd;
 
 #[derive(Clone, Copy)]
-struct Valve<S: Simd> {
+struct Valve<S: Simd, const R: usize> {
     from: Node,
     to: usize,
     /// Discharge area of the opening that is open [m2].
-    area: Num<S>,
+    area: Num<S, R>,
     /// Lanes in which the chamber is filled.
-    fills: Mask<S>,
+    fills: Mask<S, R>,
     /// In no lane anything is open.
     shut: bool,
 }
 
-enum Passage<S: Simd> {
-    Orifice(Num<S>),
-    Tube(Tube<S>),
+enum Passage<S: Simd, const R: usize> {
+    Orifice(Num<S, R>),
+    Tube(Tube<S, R>),
 }
 
 /// Values of the parameters of each lane, and room for what the equations write down.
-pub(super) struct Lanes<'a, S: Simd> {
+pub(super) struct Lanes<'a, S: Simd, const R: usize> {
     simd: S,
     rig: &'a Rig,
     plan: &'a Plan,
     layout: Layout,
-    supplies: Vec<Supply<S>>,
+    supplies: Vec<Supply<S, R>>,
     /// Set pressure of each supply [Pa, absolute].
-    pub set_pressure: Vec<Num<S>>,
-    fixed_volume: Vec<Num<S>>,
-    alphas: Vec<[Num<S>; 3]>,
-    valves: Vec<Valve<S>>,
-    lines: Vec<Passage<S>>,
-    scales: Vec<Num<S>>,
-    body: Body<S>,
+    pub set_pressure: Vec<Num<S, R>>,
+    fixed_volume: Vec<Num<S, R>>,
+    alphas: Vec<[Num<S, R>; 3]>,
+    valves: Vec<Valve<S, R>>,
+    lines: Vec<Passage<S, R>>,
+    scales: Vec<Num<S, R>>,
+    body: Body<S, R>,
     /// Masses and sums of the balance are wanted.
     sums: bool,
-    volume: Vec<Num<S>>,
-    volume_rate: Vec<Num<S>>,
-    inflow: Vec<Num<S>>,
-    outflow: Vec<Num<S>>,
-    drawn: Vec<Num<S>>,
-    torque: Vec<Num<S>>,
-    vented: Num<S>,
-    muscle_work: Num<S>,
+    volume: Vec<Num<S, R>>,
+    volume_rate: Vec<Num<S, R>>,
+    inflow: Vec<Num<S, R>>,
+    outflow: Vec<Num<S, R>>,
+    drawn: Vec<Num<S, R>>,
+    torque: Vec<Num<S, R>>,
+    vented: Num<S, R>,
+    muscle_work: Num<S, R>,
 }
 
-impl<'a, S: Simd> Lanes<'a, S> {
+impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
     /// One lane for each plant of a rig that the plan is for, one at least; the lanes that are left
     /// over are as the last of them.
     pub fn new(simd: S, plan: &'a Plan, plants: &[&Plant<'a, f64>], sums: bool) -> Self {
@@ -64,7 +64,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
             for (lane, value) in values.iter_mut().enumerate() {
                 *value = of(plants[lane.min(plants.len() - 1)]);
             }
-            Num::load(simd, &values[..side_by_side::<S>()])
+            Num::load(simd, &values[..side_by_side::<S, R>()])
         };
         let supplies = (0..first.supplies.len()).map(|k| supply(k, first, &each)).collect();
         let lines = (0..first.lines.len()).map(|k| passage(k, first, &each)).collect();
@@ -121,7 +121,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
     }
 
     #[inline(always)]
-    fn pressure_at(&self, node: Node, state: &[Num<S>]) -> Num<S> {
+    fn pressure_at(&self, node: Node, state: &[Num<S, R>]) -> Num<S, R> {
         match node {
             Node::Ambient => Num::splat(self.simd, self.rig.gas.ambient_pressure),
             Node::Supply(k) => state[self.layout.supply(k)],
@@ -129,10 +129,11 @@ impl<'a, S: Simd> Lanes<'a, S> {
         }
     }
 
-    /// Time derivative of the state.
+    /// Time derivative of the state; what each plant has columns of is worked out in registers of
+    /// some width.
     #[inline(always)]
-    pub fn rates(&mut self, state: &[Num<S>], out: &mut [Num<S>]) {
-        self.mechanics(state);
+    pub fn rates<W: Simd>(&mut self, wide: W, state: &[Num<S, R>], out: &mut [Num<S, R>]) {
+        self.mechanics(wide, state);
         self.flows(state);
         self.gas_rates(state, out);
         let layout = self.layout;
@@ -145,7 +146,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
     }
 
     #[inline(always)]
-    fn mechanics(&mut self, state: &[Num<S>]) {
+    fn mechanics<W: Simd>(&mut self, wide: W, state: &[Num<S, R>]) {
         let zero = Num::splat(self.simd, 0.0);
         self.volume.copy_from_slice(&self.fixed_volume);
         self.volume_rate.fill(zero);
@@ -159,7 +160,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
             let gauge = state[self.layout.pressure(group.chamber)] - ambient;
             let scale = self.scales[k];
             let [gas, elastic, offset, volume, slope, gas_work, elastic_work, offset_work] =
-                curves.eval(self.simd, angle, self.sums);
+                curves.eval(wide, angle, self.sums);
             self.torque[group.coordinate] += gauge * gas + scale * (gauge * elastic + offset);
             self.volume[group.chamber] += volume;
             self.volume_rate[group.chamber] += slope * rate;
@@ -171,7 +172,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
     }
 
     #[inline(always)]
-    fn flows(&mut self, state: &[Num<S>]) {
+    fn flows(&mut self, state: &[Num<S, R>]) {
         let zero = Num::splat(self.simd, 0.0);
         self.inflow.fill(zero);
         self.outflow.fill(zero);
@@ -204,7 +205,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
 
     /// A mass flow along the arrow; what goes against it goes out of its end.
     #[inline(always)]
-    fn pass(&mut self, from: Node, to: Node, flow: Num<S>) {
+    fn pass(&mut self, from: Node, to: Node, flow: Num<S, R>) {
         let zero = flow.constant(0.0);
         let (along, against) = (flow.or_above(zero), (-flow).or_above(zero));
         self.exchange(from, along, against, flow);
@@ -213,7 +214,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
 
     /// What leaves a node, what comes to it, and the difference.
     #[inline(always)]
-    fn exchange(&mut self, node: Node, leaves: Num<S>, comes: Num<S>, net: Num<S>) {
+    fn exchange(&mut self, node: Node, leaves: Num<S, R>, comes: Num<S, R>, net: Num<S, R>) {
         match node {
             Node::Ambient => self.vented = self.vented - net,
             Node::Supply(k) => self.drawn[k] += net,
@@ -225,7 +226,7 @@ impl<'a, S: Simd> Lanes<'a, S> {
     }
 
     #[inline(always)]
-    fn gas_rates(&self, state: &[Num<S>], out: &mut [Num<S>]) {
+    fn gas_rates(&self, state: &[Num<S, R>], out: &mut [Num<S, R>]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
         for (k, supply) in self.supplies.iter().enumerate() {
@@ -245,12 +246,15 @@ impl<'a, S: Simd> Lanes<'a, S> {
 
     /// Rates of the sums of [`crate::plant::BALANCE`].
     #[inline(always)]
-    fn balances(&self, state: &[Num<S>], out: &mut [Num<S>]) {
+    fn balances(&self, state: &[Num<S, R>], out: &mut [Num<S, R>]) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
         let zero = Num::splat(self.simd, 0.0);
         let (mut drawn, mut exergy, mut vented) = (zero, zero, self.vented);
         for (k, flow) in self.drawn.iter().enumerate() {
+            if zero.less(flow.abs()).nowhere() {
+                continue; // the logarithm is dear
+            }
             let mut taken = *flow;
             if matches!(self.supplies[k], Supply::Regulator { .. }) {
                 // A regulator relieves to the ambient what it takes back.
@@ -268,9 +272,9 @@ impl<'a, S: Simd> Lanes<'a, S> {
     }
 }
 
-type Each<'e, 'a, S> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S>;
+type Each<'e, 'a, S, const R: usize> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S, R>;
 
-fn supply<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Supply<S> {
+fn supply<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Supply<S, R> {
     let of = |number: fn(&OneSupply<f64>) -> f64| each(&|p| number(&p.supplies[k]));
     match first.supplies[k] {
         OneSupply::Constant => Supply::Constant,
@@ -293,7 +297,7 @@ fn supply<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) 
     }
 }
 
-fn passage<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Passage<S> {
+fn passage<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Passage<S, R> {
     let of = |number: fn(&Line<f64>) -> f64| each(&|p| number(&p.lines[k]));
     match first.lines[k] {
         Line::Orifice(_) => Passage::Orifice(of(|line| match line {
@@ -314,7 +318,7 @@ fn passage<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>)
 }
 
 /// One coordinate. A plan is for no other bodies: in their place stands what is no number.
-fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Body<S> {
+fn body<'a, S: Simd, const R: usize>(first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Body<S, R> {
     let (turns, coulomb_speed, stops) = match &first.body {
         OneBody::OneLink(arm, stops) => (true, arm.coulomb_speed, *stops),
         OneBody::Mass(load, stops) => (false, load.coulomb_speed, *stops),

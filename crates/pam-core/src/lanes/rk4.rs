@@ -5,22 +5,28 @@ use super::rates::Lanes;
 use pulp::Simd;
 
 /// The classical Runge-Kutta method over lanes.
-pub(super) struct Rk4<S: Simd> {
-    stage: Vec<Num<S>>,
-    rate: Vec<Num<S>>,
-    sum: Vec<Num<S>>,
+pub(super) struct Rk4<S: Simd, const R: usize> {
+    stage: Vec<Num<S, R>>,
+    rate: Vec<Num<S, R>>,
+    sum: Vec<Num<S, R>>,
     /// Rates that were asked for since the start.
     pub evaluations: u64,
 }
 
-impl<S: Simd> Rk4<S> {
-    pub fn new(state: &[Num<S>]) -> Self {
+impl<S: Simd, const R: usize> Rk4<S, R> {
+    pub fn new(state: &[Num<S, R>]) -> Self {
         let zeros = || state.iter().map(|value| value.constant(0.0)).collect::<Vec<_>>();
         Self { stage: zeros(), rate: zeros(), sum: zeros(), evaluations: 0 }
     }
 
     #[inline(always)]
-    pub fn step(&mut self, lanes: &mut Lanes<'_, S>, state: &mut [Num<S>], step: f64) {
+    pub fn step<W: Simd>(
+        &mut self,
+        wide: W,
+        lanes: &mut Lanes<'_, S, R>,
+        state: &mut [Num<S, R>],
+        step: f64,
+    ) {
         // The rates stand here once: they are much code, and compiled for each kind of register.
         // No slope of the last step is left: a lane that was put back would keep what is no number.
         for (sum, slope) in self.sum.iter_mut().zip(&mut self.rate) {
@@ -30,7 +36,7 @@ impl<S: Simd> Rk4<S> {
             for ((stage, start), slope) in self.stage.iter_mut().zip(&*state).zip(&self.rate) {
                 *stage = *start + *slope * (fraction * step);
             }
-            lanes.rates(&self.stage, &mut self.rate);
+            lanes.rates(wide, &self.stage, &mut self.rate);
             self.evaluations += 1;
             for (sum, slope) in self.sum.iter_mut().zip(&self.rate) {
                 *sum += *slope * weight;

@@ -46,28 +46,31 @@ pub struct Event {
 /// inside) and each flow.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
-    /// Distance beyond the lower and the upper stop.
-    beyond: Vec<[f64; 2]>,
-    /// Critical less actual pressure ratio: positive when choked.
-    choke: Vec<f64>,
+    /// Distance beyond the lower and the upper stop of each coordinate; then critical less actual
+    /// pressure ratio of each flow: positive when choked.
+    margins: Vec<f64>,
+    /// How many of them are of stops.
+    stops: usize,
 }
 
 impl Watch {
     pub fn look(&mut self, plant: &Plant<'_, f64>, state: &[f64], controls: &Controls<f64>) {
         let rig = plant.rig();
-        self.beyond.clear();
-        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
+        let wiring = &rig.wiring;
+        self.stops = 2 * wiring.coordinates.len();
+        self.margins.resize(self.stops + wiring.valves.len() + wiring.lines.len(), 0.0);
+        let (beyond, choke) = self.margins.split_at_mut(self.stops);
+        for (k, (out, coordinate)) in
+            beyond.chunks_exact_mut(2).zip(&wiring.coordinates).enumerate()
+        {
             let x = state[rig.layout.angle(k)];
             let inside = [f64::NEG_INFINITY; 2];
-            self.beyond
-                .push(coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]));
+            let margins = coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]);
+            out.copy_from_slice(&margins);
         }
-        self.choke.clear();
-        self.choke.extend(plant.ratios(state, controls).map(|(ratio, critical)| critical - ratio));
-    }
-
-    fn margins(&self) -> impl Iterator<Item = f64> + '_ {
-        self.beyond.iter().flatten().copied().chain(self.choke.iter().copied())
+        for (out, (ratio, critical)) in choke.iter_mut().zip(plant.ratios(state, controls)) {
+            *out = critical - ratio;
+        }
     }
 
     /// Events of what is true now and was not (or the reverse) by `flags`, which are brought up to
@@ -80,13 +83,13 @@ impl Watch {
         flags: &mut [bool],
         out: &mut Vec<Event>,
     ) {
-        for (k, (margin, flag)) in self.margins().zip(flags.iter_mut()).enumerate() {
-            let now = margin > 0.0;
+        for (k, (margin, flag)) in self.margins.iter().zip(flags.iter_mut()).enumerate() {
+            let now = *margin > 0.0;
             if now == *flag {
                 continue;
             }
             *flag = now;
-            let back = before.and_then(|(b, dt)| Some((b.margins().nth(k)?, dt)));
+            let back = before.and_then(|(b, dt)| Some((*b.margins.get(k)?, dt)));
             let share = back.map_or(0.0, |(was, dt)| {
                 // Where the straight line between the two crosses zero; a jump counts at its end.
                 let span = margin - was;
@@ -106,7 +109,7 @@ impl Watch {
 
     fn kind(&self, k: usize, now: bool) -> Kind {
         let upper = k % 2 == 1;
-        match (k < 2 * self.beyond.len(), now) {
+        match (k < self.stops, now) {
             (true, true) => Kind::StopReached(upper),
             (true, false) => Kind::StopLeft(upper),
             (false, true) => Kind::Choked,
@@ -115,7 +118,7 @@ impl Watch {
     }
 
     fn block(&self, rig: &Rig, k: usize) -> String {
-        let stops = 2 * self.beyond.len();
+        let stops = self.stops;
         if k < stops {
             return rig.names.coordinates.get(k / 2).cloned().unwrap_or_default();
         }
