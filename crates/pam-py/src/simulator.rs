@@ -13,7 +13,7 @@ use pam_core::simulate::run::OwnedRun;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
+use pyo3::types::{PyDict, PyFloat, PyString};
 
 /// Do something without the interpreter that looks at Ctrl-C now and then.
 pub fn watched(
@@ -83,10 +83,12 @@ pub struct Simulator {
     /// Whether a call is advancing it.
     busy: AtomicBool,
     /// Gone while a call uses it; another thread that calls meanwhile makes its own.
-    work: Mutex<Option<Work>>,
+    work: Mutex<Option<Box<Work>>>,
     names: Vec<Py<PyString>>,
     /// A sample to be copied: its entries stand where they belong.
     sample: Py<PyDict>,
+    /// One valve, and nothing else that must be given.
+    lone: bool,
 }
 
 impl Simulator {
@@ -94,7 +96,7 @@ impl Simulator {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn work(&self) -> MutexGuard<'_, Option<Work>> {
+    fn work(&self) -> MutexGuard<'_, Option<Box<Work>>> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -120,12 +122,12 @@ impl Simulator {
         let kept = self.work().take();
         let mut work = match kept {
             Some(work) => work,
-            None => Work {
+            None => Box::new(Work {
                 run: OwnedRun::new(Arc::clone(&self.rig)).map_err(|e| error(py, &e))?,
                 out: Trajectory::new(&self.rig, 1),
                 progress: Progress::default(),
                 drive: Drive::idle(&self.rig),
-            },
+            }),
         };
         let done = act(&mut work);
         work.out.channels.iter_mut().for_each(Vec::clear);
@@ -192,6 +194,8 @@ impl Simulator {
         let names: Vec<Py<PyString>> = (rig.names().channels.iter())
             .map(|(name, _)| PyString::intern(py, name).unbind())
             .collect();
+        let spec = rig.spec();
+        let lone = spec.valves.len() == 1 && !spec.load.as_ref().is_some_and(|l| l.is_frame());
         let sample = PyDict::new(py);
         names.iter().try_for_each(|name| sample.set_item(name, f64::NAN))?;
         Ok(Self {
@@ -202,6 +206,7 @@ impl Simulator {
             work: Mutex::new(None),
             names,
             sample: sample.unbind(),
+            lone,
         })
     }
 
@@ -268,18 +273,24 @@ impl Simulator {
         })
     }
 
-    /// Hold a finite command of the first input for one sample, the other inputs being left to
-    /// themselves: the sample as numbers by name, and what happened on the way, if anything.
+    /// Hold a command of the only valve for one sample, the other inputs being left to themselves:
+    /// the sample as numbers by name, and what happened on the way, if anything. None, and nothing
+    /// is done, for a rig that takes other commands and for what is no finite float.
     fn step<'py>(
         &self,
         py: Python<'py>,
-        command: f64,
-    ) -> PyResult<(Bound<'py, PyDict>, Option<Vec<EventRow>>)> {
+        command: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<(Bound<'py, PyDict>, Option<Vec<EventRow>>)>> {
+        let Ok(command) = command.cast::<PyFloat>() else { return Ok(None) };
+        let command = command.value();
+        if !(self.lone && command.is_finite()) {
+            return Ok(None);
+        }
         self.with_work(py, |Work { run, out, progress, drive }| {
             drive.command(0, command);
             self.held(py, 1, drive, run, progress, out)?;
             let happened = if out.events.is_empty() { None } else { Some(events(out)) };
-            Ok((self.last(py, out)?, happened))
+            Ok(Some((self.last(py, out)?, happened)))
         })
     }
 

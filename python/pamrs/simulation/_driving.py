@@ -124,8 +124,8 @@ class Inputs:
         self._ranges: dict[str, tuple[float, float, str]] = {}
         self._load = rig.tables("load").get("", {})
         self._ambient = float(rig.tables("gas")[""]["ambient_pressure"])
-        #: Name of the one valve where nothing else must be given: what most loops answer.
-        self.only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
+        # One valve and nothing else that must be given: what most loops answer.
+        self._only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
 
     def named(
         self,
@@ -168,12 +168,12 @@ class Inputs:
         :func:`signals_of`.
         """
         if (
-            self.only is not None
+            self._only is not None
             and isinstance(valve_command, float)
             and math.isfinite(valve_command)
             and supply_command is length is pressure is None
         ):
-            return {self.only: valve_command}
+            return {self._only: valve_command}
         given = self.named(
             valve_command=valve_command,
             supply_command=supply_command,

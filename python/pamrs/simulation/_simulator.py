@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from math import isfinite
 from typing import Any
 
 import numpy as np
@@ -75,7 +74,6 @@ class Simulator:
         self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
         self._inputs = inputs_of(rig)
-        self._lone = self._inputs.only is not None
         self.events: list[Event] = []
         """What happened since the start or the last :meth:`reset` or :meth:`restore`, see
         :class:`pamrs.simulation.Event`."""
@@ -172,17 +170,14 @@ class Simulator:
             If the state leaves the range in which the model holds; the simulator then stays at the
             last good sample.
         """
-        if (
-            self._lone
-            and isinstance(valve_command, float)
-            and isfinite(valve_command)
-            and supply_command is length is pressure is None
-        ):
-            sample, events = self._core.step(valve_command)
-        else:
-            sample, events = self._core.hold(
+        done = None
+        if supply_command is length is pressure is None:
+            done = self._core.step(valve_command)
+        if done is None:
+            done = self._core.hold(
                 1, self._inputs.numbers(valve_command, supply_command, length, pressure)
             )
+        sample, events = done
         if events:
             self.events += [Event(*event) for event in events]
         return sample

@@ -9,14 +9,13 @@ use pulp::Simd;
 
 const NODES: usize = 19;
 
-/// Flow through orifices of one gas, `r^(1/gamma)` as a polynomial over the subsonic ratios.
+/// Flow through orifices of one gas. `psi^2/(1 - r)` is a polynomial over the subsonic ratios.
 #[derive(Debug, Clone)]
 pub(super) struct Orifice {
     critical_ratio: f64,
     middle: f64,
     per_half_width: f64,
-    power: [f64; NODES],
-    exponent: f64,
+    curve: [f64; NODES],
     choked: f64,
     laminar: f64,
     factor: f64,
@@ -26,14 +25,20 @@ impl Orifice {
     pub fn new(gas: &Gas) -> Self {
         let low = gas.critical_ratio();
         let (middle, half) = (0.5 * (LAMINAR_RATIO + low), 0.5 * (LAMINAR_RATIO - low));
-        let node = |j: usize| [(middle + half * lobatto(j, NODES - 1)).powf(1.0 / gas.gamma)];
-        let power = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
+        // psi^2 = s (s - r) gamma/(gamma - 1) with s = r^(1/gamma); the difference without loss.
+        let node = |j: usize| {
+            let ratio = middle + half * lobatto(j, NODES - 1);
+            let log = (ratio - 1.0).ln_1p();
+            let power = (log / gas.gamma).exp();
+            let difference = ratio * (log * (1.0 / gas.gamma - 1.0)).exp_m1();
+            [power * difference * (gas.gamma / (gas.gamma - 1.0)) / (1.0 - ratio)]
+        };
+        let curve = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
         Self {
             critical_ratio: low,
             middle,
             per_half_width: 1.0 / half,
-            power,
-            exponent: gas.gamma / (gas.gamma - 1.0),
+            curve,
             choked: gas.psi(0.0),
             laminar: gas.psi(LAMINAR_RATIO) / (1.0 - LAMINAR_RATIO),
             factor: gas.choked_flow(1.0, 1.0) / gas.psi(0.0),
@@ -58,8 +63,8 @@ impl Orifice {
         let subsonic = ratio
             .or_above(ratio.constant(self.critical_ratio))
             .or_below(ratio.constant(LAMINAR_RATIO));
-        let s = ((subsonic - self.middle) * self.per_half_width).polynomial(&self.power);
-        let curved = (s * (s - subsonic) * self.exponent).sqrt();
+        let place = (subsonic - self.middle) * self.per_half_width;
+        let curved = ((-subsonic + 1.0) * place.polynomial(&self.curve)).sqrt();
         let straight = (-ratio + 1.0) * self.laminar;
         let open = ratio.at_most(ratio.constant(LAMINAR_RATIO)).select(curved, straight);
         ratio.at_most(ratio.constant(self.critical_ratio)).select(choked, open)

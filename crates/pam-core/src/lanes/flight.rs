@@ -183,7 +183,7 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
                 *value = gauge + rig.gas.ambient_pressure;
             }
             regulator += usize::from(regulated);
-            self.lanes.set_pressure[k] = Num::load(self.simd, values);
+            self.lanes.set(k, values);
         }
     }
 
@@ -219,7 +219,7 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
         let (mut low, mut high) = (self.state[angle], self.state[angle]);
         let step = self.timing.step();
         for _ in 0..self.timing.substeps {
-            self.method.step(wide, &mut self.lanes, &mut self.state, step);
+            self.method.step(wide, self.lanes.shape, &mut self.lanes, &mut self.state, step);
             low = self.state[angle].or_below(low);
             high = self.state[angle].or_above(high);
         }

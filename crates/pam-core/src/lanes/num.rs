@@ -134,10 +134,22 @@ impl<S: Simd, const R: usize> Num<S, R> {
         (self + WHOLE) - WHOLE
     }
 
-    /// A polynomial, its coefficients from the lowest power on: even and odd powers in two chains.
+    /// A polynomial, its coefficients from the lowest power on: even and odd powers in two chains,
+    /// in four where it is long, since each chain waits for itself.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
+        const LONG: usize = 16;
         let square = self * self;
+        if N >= LONG {
+            let fourth = square * square;
+            let mut chains = [self.constant(0.0); 4];
+            for power in (0..N).rev() {
+                let chain = &mut chains[power % 4];
+                *chain = *chain * fourth + coefficients[power];
+            }
+            let [first, second, third, last] = chains;
+            return (first + third * square) + (second + last * square) * self;
+        }
         let (mut even, mut odd) = (self.constant(0.0), self.constant(0.0));
         for power in (0..N).rev() {
             let chain = if power % 2 == 0 { &mut even } else { &mut odd };

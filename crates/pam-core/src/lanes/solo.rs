@@ -3,7 +3,7 @@
 
 use super::flight::opening;
 use super::num::Num;
-use super::rates::Lanes;
+use super::rates::{Lanes, Shape};
 use super::rk4::Rk4;
 use super::Plan;
 use crate::plant::{Controls, Plant};
@@ -47,8 +47,8 @@ impl<'a> Solo<'a> {
         for (k, spool) in controls.spool.iter().enumerate() {
             self.lanes.open(k, &[opening(plant, k, *spool)]);
         }
-        for (own, set) in self.lanes.set_pressure.iter_mut().zip(&controls.set_pressure) {
-            *own = Num::splat(Scalar, *set);
+        for (k, set) in controls.set_pressure.iter().enumerate() {
+            self.lanes.set(k, &[*set]);
         }
         let stayed = Arch::new().dispatch(Advance { solo: self, plant, state, steps, look });
         stayed && self.holds(plant, state)
@@ -78,13 +78,25 @@ impl<L: FnMut(usize, &[f64])> WithSimd for Advance<'_, '_, '_, L> {
 
     #[inline(always)]
     fn with_simd<W: Simd>(self, wide: W) -> bool {
+        // Compiled once for the shape of most rigs, and once for all others.
+        match self.solo.lanes.shape {
+            Shape::SMALL => self.steps(wide, Shape::SMALL),
+            shape => self.steps(wide, shape),
+        }
+    }
+}
+
+impl<L: FnMut(usize, &[f64])> Advance<'_, '_, '_, L> {
+    #[inline(always)]
+    fn steps<W: Simd>(self, wide: W, shape: Shape) -> bool {
         let Self { solo, plant, state, steps: (count, step), mut look } = self;
         let angle = plant.rig().layout.angle(0);
+        let state = &mut state[..shape.states()];
         for (own, value) in solo.state.iter_mut().zip(&*state) {
             *own = Num::splat(Scalar, *value);
         }
         for k in 0..count {
-            solo.method.step(wide, &mut solo.lanes, &mut solo.state, step);
+            solo.method.step(wide, shape, &mut solo.lanes, &mut solo.state, step);
             for (value, own) in state.iter_mut().zip(&solo.state) {
                 *value = own.numbers()[0];
             }

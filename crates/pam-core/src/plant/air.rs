@@ -196,16 +196,13 @@ impl<S: Scalar> Scratch<S> {
 }
 
 impl Plant<'_, f64> {
-    /// Pressure ratio (1 where nothing can flow) and critical ratio of each valve and line.
-    pub(crate) fn ratios<'b>(
-        &'b self,
-        state: &'b [f64],
-        controls: &'b Controls<f64>,
-    ) -> impl Iterator<Item = (f64, f64)> + 'b {
+    /// Critical less actual pressure ratio of each valve and line, 1 where nothing can flow.
+    pub(crate) fn choked(&self, state: &[f64], controls: &Controls<f64>, out: &mut [f64]) {
         let gas = &self.rig.gas;
         let ratio = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+        let (of_valves, of_lines) = out.split_at_mut(self.valves.len());
         let valves = self.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
-        let valves = valves.map(move |((unit, valve), spool)| {
+        for (((unit, valve), spool), out) in valves.zip(of_valves) {
             let here = state[self.layout.pressure(unit.to)];
             let other = if *spool > 0.0 {
                 self.pressure_at(unit.from, state)
@@ -213,16 +210,16 @@ impl Plant<'_, f64> {
                 gas.ambient_pressure
             };
             let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
-            (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
-        });
-        let lines = self.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
+            *out = gas.critical_ratio() - if open { ratio(here, other) } else { 1.0 };
+        }
+        for ((unit, line), out) in self.wiring.lines.iter().zip(&self.lines).zip(of_lines) {
             let critical = match line {
                 Line::Orifice(_) => gas.critical_ratio(),
                 Line::Tube(tube) => tube.critical_ratio(),
             };
-            (ratio(self.pressure_at(unit.from, state), self.pressure_at(unit.to, state)), critical)
-        });
-        valves.chain(lines)
+            let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
+            *out = critical - ratio(from, to);
+        }
     }
 
     /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by

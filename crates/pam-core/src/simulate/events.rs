@@ -68,9 +68,7 @@ impl Watch {
             let margins = coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]);
             out.copy_from_slice(&margins);
         }
-        for (out, (ratio, critical)) in choke.iter_mut().zip(plant.ratios(state, controls)) {
-            *out = critical - ratio;
-        }
+        plant.choked(state, controls, choke);
     }
 
     /// Events of what is true now and was not (or the reverse) by `flags`, which are brought up to
