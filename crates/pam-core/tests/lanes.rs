@@ -174,7 +174,12 @@ fn numbers_of_a_run_are_those_of_its_samples() {
 }
 
 /// A run of a rig, by the equations of the lanes where it can be or by those of the blocks.
-fn lone(rig: &Rig, run: &mut Run<'_>, signals: &[(String, Vec<f64>)], start: &Initial) -> Trajectory {
+fn lone(
+    rig: &Rig,
+    run: &mut Run<'_>,
+    signals: &[(String, Vec<f64>)],
+    start: &Initial,
+) -> Trajectory {
     let signals: Vec<(&str, &[f64])> =
         signals.iter().map(|(name, values)| (name.as_str(), &values[..])).collect();
     let drive = Drive::new(rig, ROWS, &signals).unwrap();

@@ -47,7 +47,12 @@ impl Orifice {
 
     /// Mass flow [kg/s] from `upstream` to `downstream`, as [`Gas::mass_flow`].
     #[inline(always)]
-    pub fn mass_flow<S: Simd, const R: usize>(&self, area: Num<S, R>, upstream: Num<S, R>, downstream: Num<S, R>) -> Num<S, R> {
+    pub fn mass_flow<S: Simd, const R: usize>(
+        &self,
+        area: Num<S, R>,
+        upstream: Num<S, R>,
+        downstream: Num<S, R>,
+    ) -> Num<S, R> {
         let high = upstream.or_above(downstream);
         let ratio = upstream.or_below(downstream) / high;
         let flow = area * high * self.psi(ratio) * self.factor;
@@ -113,7 +118,12 @@ pub(super) enum Supply<S: Simd, const R: usize> {
 
 impl<S: Simd, const R: usize> Supply<S, R> {
     #[inline(always)]
-    pub fn pressure_rate(&self, pressure: Num<S, R>, outflow: Num<S, R>, set: Num<S, R>) -> Num<S, R> {
+    pub fn pressure_rate(
+        &self,
+        pressure: Num<S, R>,
+        outflow: Num<S, R>,
+        set: Num<S, R>,
+    ) -> Num<S, R> {
         match self {
             Self::Tank(stiffness) => -(outflow * *stiffness),
             Self::Constant => pressure.constant(0.0),
@@ -160,7 +170,11 @@ impl<S: Simd, const R: usize> Body<S, R> {
 
 /// Torque of the stops [N m], which never pull.
 #[inline(always)]
-fn stop_torque<S: Simd, const R: usize>(stops: &Stops, angle: Num<S, R>, rate: Num<S, R>) -> Num<S, R> {
+fn stop_torque<S: Simd, const R: usize>(
+    stops: &Stops,
+    angle: Num<S, R>,
+    rate: Num<S, R>,
+) -> Num<S, R> {
     let zero = angle.constant(0.0);
     let (low, high) = (angle.constant(stops.min_angle), angle.constant(stops.max_angle));
     let damping = rate * stops.damping;

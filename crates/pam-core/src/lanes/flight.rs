@@ -217,9 +217,9 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     fn sample<W: Simd>(&mut self, wide: W) {
         let angle = self.runs.runs[0].stepper.plant.rig().layout.angle(0);
         let (mut low, mut high) = (self.state[angle], self.state[angle]);
-        let step = self.timing.step();
+        let (shape, step) = (self.lanes.shape.of_any_size(), self.timing.step());
         for _ in 0..self.timing.substeps {
-            self.method.step(wide, self.lanes.shape, &mut self.lanes, &mut self.state, step);
+            self.method.step(wide, shape, &mut self.lanes, &mut self.state, step);
             low = self.state[angle].or_below(low);
             high = self.state[angle].or_above(high);
         }

@@ -191,6 +191,21 @@ impl<S: Simd, const R: usize> Num<S, R> {
         whole * LN_2_HIGH + (logarithm + whole * LN_2_LOW)
     }
 
+    /// Natural logarithm of this over some unit, that of a number near it being known.
+    #[inline(always)]
+    pub fn ln_near(self, near: Self, log: Self, unit: f64) -> Self {
+        /// Up to here the next term of the series, `2 s^7/7`, is below 1e-21.
+        const NEAR: f64 = 1e-3;
+        let s = (self - near) / (self + near);
+        let square = s * s;
+        let short = log + s * ((square * (2.0 / 5.0) + 2.0 / 3.0) * square + 2.0);
+        let far = self.constant(NEAR).at_most(s.abs());
+        if far.nowhere() {
+            return short;
+        }
+        far.select((self / unit).ln(), short)
+    }
+
     /// Hyperbolic tangent of numbers, to 1e-14 absolutely; what is not a number counts as positive.
     #[inline(always)]
     pub fn tanh(self) -> Self {

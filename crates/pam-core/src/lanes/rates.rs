@@ -33,6 +33,8 @@ enum Passage<S: Simd, const R: usize> {
 pub(super) struct Shape {
     layout: Layout,
     sums: bool,
+    /// It is [`Self::SMALL`], and the compiler is to know it.
+    small: bool,
 }
 
 impl Shape {
@@ -41,7 +43,19 @@ impl Shape {
     pub const SMALL: Self = Self {
         layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
         sums: true,
+        small: true,
     };
+
+    /// Whether there are as many blocks as in [`Self::SMALL`].
+    pub fn is_small(self) -> bool {
+        Self { small: true, ..self } == Self::SMALL
+    }
+
+    /// The same where the compiler is to know nothing.
+    #[inline(always)]
+    pub fn of_any_size(self) -> Self {
+        Self { small: false, ..self }
+    }
 
     /// Length of the state.
     #[inline(always)]
@@ -55,7 +69,7 @@ impl Shape {
 
     #[inline(always)]
     fn gas(self, k: usize) -> usize {
-        if self.layout.gases == 1 {
+        if self.small {
             0
         } else {
             k
@@ -64,7 +78,7 @@ impl Shape {
 
     #[inline(always)]
     fn supply(self, k: usize) -> usize {
-        if self.layout.supplies == 1 {
+        if self.small {
             0
         } else {
             k
@@ -83,6 +97,8 @@ struct Plants<'a, S: Simd, const R: usize> {
     alphas: Vec<[Num<S, R>; 3]>,
     valves: Vec<Valve<S, R>>,
     lines: Vec<Passage<S, R>>,
+    /// Something may flow out of a supply in some lane.
+    feeding: bool,
     scales: Vec<Num<S, R>>,
     /// Groups that come before all others of their chamber.
     first: Vec<bool>,
@@ -105,6 +121,8 @@ pub(super) struct Lanes<'a, S: Simd, const R: usize> {
     pub shape: Shape,
     plants: Plants<'a, S, R>,
     room: Room<Vec<Num<S, R>>>,
+    /// Pressure of each supply where the step began, and the logarithm of it over the ambient one.
+    logs: Vec<[Num<S, R>; 2]>,
 }
 
 impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
@@ -121,8 +139,10 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
             }
             Num::load(simd, &values[..side_by_side::<S, R>()])
         };
-        let supplies = (0..first_plant.supplies.len()).map(|k| supply(k, first_plant, &each)).collect();
-        let lines = (0..first_plant.lines.len()).map(|k| passage(k, first_plant, &each)).collect();
+        let supplies =
+            (0..first_plant.supplies.len()).map(|k| supply(k, first_plant, &each)).collect();
+        let lines: Vec<_> =
+            (0..first_plant.lines.len()).map(|k| passage(k, first_plant, &each)).collect();
         let wiring = &rig.wiring;
         let valves = wiring.valves.iter().map(|valve| Valve {
             from: valve.from,
@@ -152,14 +172,15 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
             given: zeros(layout.supplies),
         };
         let groups = wiring.groups.iter().enumerate();
-        let first = groups
-            .map(|(k, group)| wiring.groups[..k].iter().all(|g| g.chamber != group.chamber));
+        let first =
+            groups.map(|(k, group)| wiring.groups[..k].iter().all(|g| g.chamber != group.chamber));
         let plants = Plants {
             supplies,
             set_pressure: zeros(layout.supplies),
             fixed_volume,
             alphas: alphas.collect(),
             valves: valves.collect(),
+            feeding: !lines.is_empty(),
             lines,
             scales: (0..wiring.groups.len()).map(|k| each(&|p| p.scales[k])).collect(),
             first: first.collect(),
@@ -168,7 +189,8 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
             rig,
             plan,
         };
-        Self { shape: Shape { layout, sums }, plants, room }
+        let logs = vec![[zero; 2]; layout.supplies];
+        Self { shape: Shape { layout, sums, small: false }, plants, room, logs }
     }
 
     /// Openings of a valve over the sample that comes [m2], above zero where the chamber is filled,
@@ -180,6 +202,8 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
         valve.area = signed.abs();
         valve.some_fill = areas.iter().any(|a| *a > 0.0);
         valve.some_vent = areas.iter().any(|a| *a < 0.0);
+        let lines = !self.plants.lines.is_empty();
+        self.plants.feeding = lines || self.plants.valves.iter().any(|valve| valve.some_fill);
     }
 
     /// Set pressure of a supply over the sample that comes [Pa, absolute].
@@ -197,10 +221,11 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
         state: &[Num<S, R>],
         out: Slopes<'_, S, R>,
     ) {
-        let Self { plants, room, .. } = self;
-        if shape == Shape::SMALL {
+        let Self { plants, room, logs, .. } = self;
+        if shape.small {
             let zero = Num::splat(plants.simd, 0.0);
-            let [mut volume, mut volume_rate, mut inflow] = [[plants.fixed_volume[0]], [zero], [zero]];
+            let [mut volume, mut volume_rate, mut inflow] =
+                [[plants.fixed_volume[0]], [zero], [zero]];
             let [mut outflow, mut drawn, mut given] = [[zero], [zero], [zero]];
             let room = Room {
                 volume: &mut volume[..],
@@ -210,7 +235,7 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
                 drawn: &mut drawn[..],
                 given: &mut given[..],
             };
-            plants.rates(wide, shape, state, room, out);
+            plants.rates(wide, shape, state, room, &mut logs[..1], out);
             return;
         }
         let room = Room {
@@ -221,7 +246,7 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
             drawn: &mut room.drawn[..],
             given: &mut room.given[..],
         };
-        plants.rates(wide, shape, state, room, out);
+        plants.rates(wide, shape, state, room, logs, out);
     }
 }
 
@@ -244,6 +269,7 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         shape: Shape,
         state: &[Num<S, R>],
         mut here: Here<'_, S, R>,
+        logs: &mut [[Num<S, R>; 2]],
         mut out: Slopes<'_, S, R>,
     ) {
         let layout = shape.layout;
@@ -255,7 +281,8 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         out.set(layout.rate(0), self.body.acceleration(angle, rate, torque));
         if shape.sums {
             let work = (torque * rate).or_above(rate.constant(0.0));
-            self.balances(layout, state, here.given, vented, [muscle_work, work], out);
+            let work = [muscle_work, work];
+            self.balances(layout, state, here.given, vented, work, logs, out);
         }
     }
 
@@ -373,15 +400,16 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         given: &[Num<S, R>],
         mut vented: Num<S, R>,
         [muscle_work, work]: [Num<S, R>; 2],
+        logs: &mut [[Num<S, R>; 2]],
         mut out: Slopes<'_, S, R>,
     ) {
         let gas = &self.rig.gas;
         let rt = gas.gas_constant * gas.temperature;
         let zero = Num::splat(self.simd, 0.0);
         let (mut drawn, mut exergy) = (zero, zero);
-        for (k, flow) in given.iter().enumerate() {
-            if zero.less(flow.abs()).nowhere() {
-                continue; // the logarithm is dear
+        for (k, (flow, known)) in given.iter().zip(logs).enumerate() {
+            if !self.feeding {
+                break; // the logarithm is dear
             }
             let mut taken = *flow;
             if matches!(self.supplies[k], Supply::Regulator { .. }) {
@@ -391,8 +419,16 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
                 taken = back.select(zero, *flow);
             }
             drawn += taken;
-            let raised = state[layout.supply(k)] / gas.ambient_pressure;
-            exergy += raised.ln() * taken * rt;
+            let pressure = state[layout.supply(k)];
+            if out.first {
+                *known = [pressure, (pressure / gas.ambient_pressure).ln()];
+            }
+            let [before, log] = *known;
+            let log = match out.first {
+                true => log,
+                false => pressure.ln_near(before, log, gas.ambient_pressure),
+            };
+            exergy += log * taken * rt;
         }
         let sums = [drawn, vented, drawn * rt, exergy, muscle_work, work];
         for (k, sum) in sums.into_iter().enumerate() {
@@ -404,7 +440,14 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
 impl<S: Simd, const R: usize> Here<'_, S, R> {
     /// A mass flow along the arrow; what goes against it goes out of its end.
     #[inline(always)]
-    fn pass(&mut self, shape: Shape, from: Node, to: Node, flow: Num<S, R>, vented: &mut Num<S, R>) {
+    fn pass(
+        &mut self,
+        shape: Shape,
+        from: Node,
+        to: Node,
+        flow: Num<S, R>,
+        vented: &mut Num<S, R>,
+    ) {
         let zero = flow.constant(0.0);
         let (along, against) = (flow.or_above(zero), (-flow).or_above(zero));
         self.exchange(shape, from, [along, against, flow], vented);
@@ -433,7 +476,11 @@ impl<S: Simd, const R: usize> Here<'_, S, R> {
 
 type Each<'e, 'a, S, const R: usize> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S, R>;
 
-fn supply<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Supply<S, R> {
+fn supply<'a, S: Simd, const R: usize>(
+    k: usize,
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Supply<S, R> {
     let of = |number: fn(&OneSupply<f64>) -> f64| each(&|p| number(&p.supplies[k]));
     match first.supplies[k] {
         OneSupply::Constant => Supply::Constant,
@@ -456,7 +503,11 @@ fn supply<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: E
     }
 }
 
-fn passage<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Passage<S, R> {
+fn passage<'a, S: Simd, const R: usize>(
+    k: usize,
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Passage<S, R> {
     let of = |number: fn(&Line<f64>) -> f64| each(&|p| number(&p.lines[k]));
     match first.lines[k] {
         Line::Orifice(_) => Passage::Orifice(of(|line| match line {
@@ -477,7 +528,10 @@ fn passage<'a, S: Simd, const R: usize>(k: usize, first: &Plant<'a, f64>, each: 
 }
 
 /// One coordinate. A plan is for no other bodies: in their place stands what is no number.
-fn body<'a, S: Simd, const R: usize>(first: &Plant<'a, f64>, each: Each<'_, 'a, S, R>) -> Body<S, R> {
+fn body<'a, S: Simd, const R: usize>(
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Body<S, R> {
     let (turns, coulomb_speed, stops) = match &first.body {
         OneBody::OneLink(arm, stops) => (true, arm.coulomb_speed, *stops),
         OneBody::Mass(load, stops) => (false, load.coulomb_speed, *stops),

@@ -28,26 +28,40 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
         state: &mut Vec<Num<S, R>>,
         step: f64,
     ) {
+        // The rates stand here once: they are much code, compiled for each kind of register.
+        for k in 0..4 {
+            self.stage(wide, shape, lanes, state, step, k);
+        }
+        std::mem::swap(state, &mut self.stage);
+    }
+
+    /// One stage of four; the last one leaves the next state in [`Self::stage`].
+    #[inline(always)]
+    fn stage<W: Simd>(
+        &mut self,
+        wide: W,
+        shape: Shape,
+        lanes: &mut Lanes<'_, S, R>,
+        state: &[Num<S, R>],
+        step: f64,
+        k: usize,
+    ) {
         let Self { stage, next, sum, evaluations } = self;
         let states = shape.states();
-        // The rates stand here once: they are much code, and compiled for each kind of register.
-        for (k, weight) in [1.0, 2.0, 2.0, 1.0].into_iter().enumerate() {
-            let here = if k == 0 { &state[..states] } else { &stage[..states] };
-            let slopes = Slopes {
-                start: &state[..states],
-                sum: &mut sum[..states],
-                next: &mut next[..states],
-                weight,
-                ahead: if k == 2 { step } else { 0.5 * step },
-                whole: step / 6.0,
-                first: k == 0,
-                last: k == 3,
-            };
-            lanes.rates(wide, shape, here, slopes);
-            *evaluations += 1;
-            std::mem::swap(stage, next);
-        }
-        std::mem::swap(state, stage);
+        let slopes = Slopes {
+            start: &state[..states],
+            sum: &mut sum[..states],
+            next: &mut next[..states],
+            weight: if k == 0 || k == 3 { 1.0 } else { 2.0 },
+            ahead: if k == 2 { step } else { 0.5 * step },
+            whole: step / 6.0,
+            first: k == 0,
+            last: k == 3,
+        };
+        let here = if k == 0 { &state[..states] } else { &stage[..states] };
+        lanes.rates(wide, shape, here, slopes);
+        *evaluations += 1;
+        std::mem::swap(stage, next);
     }
 }
 
@@ -62,7 +76,9 @@ pub(super) struct Slopes<'s, S: Simd, const R: usize> {
     ahead: f64,
     /// Step by the sum of all weights [s].
     whole: f64,
-    first: bool,
+    /// Of the first stage.
+    pub first: bool,
+    /// Of the last one.
     last: bool,
 }
 

@@ -11,6 +11,18 @@ use pulp::{Arch, Scalar, Simd, WithSimd};
 
 type One = Num<Scalar, 1>;
 
+/// The state of a plant after a step.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen<'s>(&'s [One]);
+
+impl Seen<'_> {
+    /// The number at a place.
+    #[inline(always)]
+    pub fn at(&self, place: usize) -> f64 {
+        self.0[place].numbers()[0]
+    }
+}
+
 /// A plant in a lane of its own.
 pub(crate) struct Solo<'a> {
     plan: &'a Plan,
@@ -31,7 +43,7 @@ impl<'a> Solo<'a> {
     }
 
     /// Advance a state by some steps of a length [s] under held controls. `look` sees it after each
-    /// of them, with the number of the step. Whether it stayed where the lanes' curves, and the
+    /// of them, place by place, with the number of the step. Whether it stayed where the lanes' curves, and the
     /// model, hold; where it did not, it has to be advanced in another way.
     pub fn advance(
         &mut self,
@@ -39,7 +51,7 @@ impl<'a> Solo<'a> {
         state: &mut [f64],
         controls: &Controls<f64>,
         steps: (usize, f64),
-        look: impl FnMut(usize, &[f64]),
+        look: impl FnMut(usize, Seen<'_>),
     ) -> bool {
         if !self.holds(plant, state) {
             return false;
@@ -73,20 +85,20 @@ struct Advance<'s, 'p, 'a, L> {
     look: L,
 }
 
-impl<L: FnMut(usize, &[f64])> WithSimd for Advance<'_, '_, '_, L> {
+impl<L: FnMut(usize, Seen<'_>)> WithSimd for Advance<'_, '_, '_, L> {
     type Output = bool;
 
     #[inline(always)]
     fn with_simd<W: Simd>(self, wide: W) -> bool {
         // Compiled once for the shape of most rigs, and once for all others.
         match self.solo.lanes.shape {
-            Shape::SMALL => self.steps(wide, Shape::SMALL),
-            shape => self.steps(wide, shape),
+            shape if shape.is_small() => self.steps(wide, Shape::SMALL),
+            shape => self.steps(wide, shape.of_any_size()),
         }
     }
 }
 
-impl<L: FnMut(usize, &[f64])> Advance<'_, '_, '_, L> {
+impl<L: FnMut(usize, Seen<'_>)> Advance<'_, '_, '_, L> {
     #[inline(always)]
     fn steps<W: Simd>(self, wide: W, shape: Shape) -> bool {
         let Self { solo, plant, state, steps: (count, step), mut look } = self;
@@ -97,13 +109,14 @@ impl<L: FnMut(usize, &[f64])> Advance<'_, '_, '_, L> {
         }
         for k in 0..count {
             solo.method.step(wide, shape, &mut solo.lanes, &mut solo.state, step);
-            for (value, own) in state.iter_mut().zip(&solo.state) {
-                *value = own.numbers()[0];
-            }
-            if !solo.plan.contains(state[angle]) {
+            let seen = Seen(&solo.state);
+            if !solo.plan.contains(seen.at(angle)) {
                 return false;
             }
-            look(k, state);
+            look(k, seen);
+        }
+        for (value, own) in state.iter_mut().zip(&solo.state) {
+            *value = own.numbers()[0];
         }
         true
     }

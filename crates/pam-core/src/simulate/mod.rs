@@ -324,7 +324,8 @@ impl Progress {
     /// Bring the conditions of events up to date, of a state that was moved under these controls.
     pub(crate) fn look(&mut self, run: &mut Run<'_>, controls: &Controls<f64>) {
         let plant = &run.stepper.plant;
-        run.after.look(plant, &self.state, controls);
+        run.conditions.set(plant, controls);
+        run.after.look(&run.conditions, |place| self.state[place]);
         run.after.report(plant.rig(), None, 0.0, &mut self.flags, &mut Vec::new());
     }
 

@@ -4,7 +4,7 @@ use crate::lanes::Solo;
 use crate::plant::Rig;
 use crate::plant::{Controls, Plant, Simulated};
 use crate::simulate::drive::Drive;
-use crate::simulate::events::{Event, Watch};
+use crate::simulate::events::{Conditions, Event, Watch};
 use crate::simulate::{Progress, Stepper, Timing, STEPS_UNSEEN};
 use crate::Result;
 use self_cell::self_cell;
@@ -21,6 +21,7 @@ pub struct Run<'a> {
     pub(crate) simulated: Simulated,
     /// Places that are prescribed.
     places: Vec<usize>,
+    pub(crate) conditions: Conditions,
     pub(crate) before: Watch,
     pub(crate) after: Watch,
     /// The sample that is on its way.
@@ -56,6 +57,7 @@ impl<'a> Run<'a> {
             controls: plant.controls(|_| 0.0),
             stepper: Stepper::new(plant),
             places: Vec::new(),
+            conditions: Conditions::default(),
             before: Watch::default(),
             after: Watch::default(),
             next: Progress::default(),
@@ -74,9 +76,10 @@ impl<'a> Run<'a> {
     /// Take the sample that is on its way to its beginning, a time [s].
     #[inline]
     pub(crate) fn begin(&mut self, began: f64, events: &mut Vec<Event>) {
-        let Self { stepper, controls, before, next, .. } = self;
+        let Self { stepper, controls, conditions, before, next, .. } = self;
         stepper.begin(&next.state, controls, began);
-        before.look(&stepper.plant, &next.state, stepper.controls(controls, 0));
+        conditions.set(&stepper.plant, stepper.controls(controls, 0));
+        before.look(conditions, |place| next.state[place]);
         before.report(stepper.plant.rig(), None, began, &mut next.flags, events);
     }
 
@@ -110,12 +113,12 @@ impl<'a> Run<'a> {
         steps: Range<usize>,
         events: &mut Vec<Event>,
     ) -> bool {
-        let Self { stepper, solo, controls, before, after, next, .. } = self;
+        let Self { stepper, solo, controls, conditions, before, after, next, .. } = self;
         let (Some(solo), plant) = (solo, &stepper.plant) else { return false };
         let Progress { state, flags, .. } = next;
         let dt = timing.step();
-        solo.advance(plant, state, controls, (steps.len(), dt), |sub, state| {
-            after.look(plant, state, controls);
+        solo.advance(plant, state, controls, (steps.len(), dt), |sub, seen| {
+            after.look(conditions, |place| seen.at(place));
             let time = began + (steps.start + sub + 1) as f64 * dt;
             after.report(plant.rig(), Some((before, dt)), time, flags, events);
             std::mem::swap(before, after);
@@ -132,7 +135,7 @@ impl<'a> Run<'a> {
         sub: usize,
         events: &mut Vec<Event>,
     ) {
-        let Self { stepper, controls, simulated, before, after, next, .. } = self;
+        let Self { stepper, controls, conditions, simulated, before, after, next, .. } = self;
         let rig = stepper.plant.rig();
         let dt = timing.step();
         let from = began + sub as f64 * dt;
@@ -146,7 +149,8 @@ impl<'a> Run<'a> {
                 }
             }
         });
-        after.look(&stepper.plant, &next.state, stepper.controls(controls, 2));
+        conditions.set(&stepper.plant, stepper.controls(controls, 2));
+        after.look(conditions, |place| next.state[place]);
         let time = began + (sub + 1) as f64 * dt;
         after.report(rig, Some((before, dt)), time, &mut next.flags, events);
         std::mem::swap(before, after);
