@@ -61,6 +61,9 @@ pub fn initial(rig: &pam_core::Rig, given: &BTreeMap<String, f64>) -> pam_core::
     given.iter().try_fold(Initial::rest(rig), |start, (name, value)| start.with(rig, name, *value))
 }
 
+/// A sample as numbers by name, and what happened on the way to it, if anything.
+type Stepped<'py> = (Bound<'py, PyDict>, Option<Vec<EventRow>>);
+
 /// What a sample is worked out with, kept from one to the next.
 struct Work {
     run: OwnedRun,
@@ -280,7 +283,7 @@ impl Simulator {
         &self,
         py: Python<'py>,
         command: &Bound<'py, PyAny>,
-    ) -> PyResult<Option<(Bound<'py, PyDict>, Option<Vec<EventRow>>)>> {
+    ) -> PyResult<Option<Stepped<'py>>> {
         let Ok(command) = command.cast::<PyFloat>() else { return Ok(None) };
         let command = command.value();
         if !(self.lone && command.is_finite()) {

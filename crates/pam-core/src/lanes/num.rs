@@ -333,32 +333,40 @@ mod tests {
     struct Furthest;
 
     impl WithSimd for Furthest {
-        type Output = [f64; 3];
+        type Output = [f64; 4];
 
         #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) -> [f64; 3] {
-            let [mut sine, mut tangent, mut logarithm] = [0.0_f64; 3];
+        fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
+            let [mut sine, mut tangent, mut logarithm, mut near] = [0.0_f64; 4];
             for k in -4000..=4000 {
                 let x = f64::from(k) * 0.0025 + 1e-5;
-                let number = Num::splat(simd, x);
+                let number = Num::<S, PAIR>::splat(simd, x);
                 sine = sine.max((number.sin().numbers()[0] - x.sin()).abs());
-                let steep = Num::splat(simd, 3.0 * x);
+                let steep = Num::<S, PAIR>::splat(simd, 3.0 * x);
                 tangent = tangent.max((steep.tanh().numbers()[0] - (3.0 * x).tanh()).abs());
                 // From 5e-5 to 2e4, as a pressure over that of the room.
                 let ratio = x.exp();
-                let error = Num::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
+                let error = Num::<S, PAIR>::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
                 logarithm = logarithm.max(error.abs() / ratio.ln().abs().max(1.0));
+                // Of a number far from another one, and of one beside it.
+                for other in [2.5 * ratio, ratio * (1.0 + 1e-4 * x)] {
+                    let [here, log] = [ratio, ratio.ln()].map(|n| Num::<S, PAIR>::splat(simd, n));
+                    let found = Num::<S, PAIR>::splat(simd, other).ln_near(here, log, 1.0);
+                    let error = found.numbers()[0] - other.ln();
+                    near = near.max(error.abs() / other.ln().abs().max(1.0));
+                }
             }
-            [sine, tangent, logarithm]
+            [sine, tangent, logarithm, near]
         }
     }
 
     #[test]
     fn functions_are_those_of_the_standard_library() {
-        let [sine, tangent, logarithm] = Arch::new().dispatch(Furthest);
+        let [sine, tangent, logarithm, near] = Arch::new().dispatch(Furthest);
         assert!(sine < 4e-16, "{sine:e}");
         assert!(tangent < 1e-14, "{tangent:e}");
         assert!(logarithm < 4e-16, "{logarithm:e}");
+        assert!(near < 5e-16, "{near:e}");
     }
 
     #[test]

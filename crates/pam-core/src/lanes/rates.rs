@@ -281,8 +281,8 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         out.set(layout.rate(0), self.body.acceleration(angle, rate, torque));
         if shape.sums {
             let work = (torque * rate).or_above(rate.constant(0.0));
-            let work = [muscle_work, work];
-            self.balances(layout, state, here.given, vented, work, logs, out);
+            let summed = [vented, muscle_work, work];
+            self.balances(layout, state, here.given, summed, logs, out);
         }
     }
 
@@ -398,8 +398,7 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         layout: Layout,
         state: &[Num<S, R>],
         given: &[Num<S, R>],
-        mut vented: Num<S, R>,
-        [muscle_work, work]: [Num<S, R>; 2],
+        [mut vented, muscle_work, work]: [Num<S, R>; 3],
         logs: &mut [[Num<S, R>; 2]],
         mut out: Slopes<'_, S, R>,
     ) {
