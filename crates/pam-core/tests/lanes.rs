@@ -3,7 +3,9 @@
 mod rigs;
 
 use pam_core::lanes::{simulate as side_by_side, Outcome, Reduce, Reduction, Request, Signal};
-use pam_core::simulate::{simulate, Initial, Timing};
+use pam_core::simulate::drive::Drive;
+use pam_core::simulate::run::Run;
+use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::Rig;
 
 const ROWS: usize = 161;
@@ -167,6 +169,61 @@ fn numbers_of_a_run_are_those_of_its_samples() {
         ];
         for (found, wanted) in outcome.reduced.iter().zip(wanted) {
             assert!((found[plant] - wanted).abs() < 1e-12, "{} {wanted}", found[plant]);
+        }
+    }
+}
+
+/// A run of a rig, by the equations of the lanes where it can be or by those of the blocks.
+fn lone(
+    rig: &Rig,
+    run: &mut Run<'_>,
+    signals: &[(String, Vec<f64>)],
+    start: &Initial,
+) -> Trajectory {
+    let signals: Vec<(&str, &[f64])> =
+        signals.iter().map(|(name, values)| (name.as_str(), &values[..])).collect();
+    let drive = Drive::new(rig, ROWS, &signals).unwrap();
+    let timing = TIMING.stable(rig);
+    let (mut progress, mut out) =
+        (Progress::start(rig, start).unwrap(), Trajectory::new(rig, ROWS));
+    progress.observe_in(run, timing, &mut out).unwrap();
+    let held = 0..ROWS - 1;
+    progress.advance_in(run, timing, &drive, held, &mut out, &mut || Ok(())).unwrap();
+    out
+}
+
+/// States and events of a run in a lane of its own: bits of the lanes, events of the blocks' run.
+#[test]
+fn a_run_in_a_lane_of_its_own_is_the_run_by_the_blocks() {
+    for (name, rig) in one_link_rigs() {
+        let signals = commands(&rig);
+        // The second leaves the range of the curves on the way.
+        for rate in [0.0, 40.0] {
+            let (joint, _) =
+                rig.names().initial.iter().find(|(name, _)| name.contains("rate")).unwrap();
+            let start = Initial::rest(&rig).with(&rig, joint, rate).unwrap();
+            let [found, wanted] = [Run::alone(&rig), Run::new(&rig)]
+                .map(|run| lone(&rig, &mut run.unwrap(), &signals, &start));
+            let rates = [rate];
+            let mut request = request(&rig, 1, &signals, Vec::new());
+            request.initial = vec![(joint, &rates)];
+            let lane = run(&rig, &request);
+            let channels = found.channels.iter().zip(&wanted.channels).zip(&lane.recorded);
+            for (k, ((found, wanted), lane)) in channels.enumerate() {
+                let (channel, _) = &rig.names().channels[k];
+                assert_eq!(found, lane, "{name} {rate}: {channel}");
+                let size = wanted.iter().fold(1e-6_f64, |size, value| size.max(value.abs()));
+                for (found, wanted) in found.iter().zip(wanted) {
+                    let error = (found - wanted).abs() / size;
+                    assert!(error < 1e-7, "{name} {rate}: {channel} {error:e}");
+                }
+            }
+            assert_eq!(found.events.len(), wanted.events.len(), "{name} {rate}");
+            assert!(!found.events.is_empty(), "{name} {rate}: nothing happened");
+            for (found, wanted) in found.events.iter().zip(&wanted.events) {
+                assert_eq!((found.kind, &found.block), (wanted.kind, &wanted.block));
+                assert!((found.time - wanted.time).abs() < 1e-7, "{found:?} {wanted:?}");
+            }
         }
     }
 }

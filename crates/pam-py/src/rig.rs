@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use crate::convert::{array, error, values};
-use crate::simulator::{channels, events, initial, run, EventRow};
+use crate::simulator::{channels, events, initial, watched, EventRow};
 use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::cut_chain::{closure_terms, predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::effects::EFFECTS;
 use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::drive::Drive;
+use pam_core::simulate::run::Run;
 use pam_core::simulate::{Progress, Timing, Trajectory};
 use pam_core::RigSpec;
 use pyo3::exceptions::PyRuntimeError;
@@ -164,7 +165,9 @@ impl Rig {
     }
 
     /// Simulate a number of rows under held signals; channels by name, and what happened on the
-    /// way.
+    /// way. `stepwise` is without the equations of the lanes.
+    #[pyo3(signature = (rows, signals, sample_time, step, start, stepwise=false))]
+    #[allow(clippy::too_many_arguments)]
     fn simulate<'py>(
         &self,
         py: Python<'py>,
@@ -173,19 +176,22 @@ impl Rig {
         sample_time: f64,
         step: f64,
         start: BTreeMap<String, f64>,
+        stepwise: bool,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
         let rig = &*self.inner;
         let signals = owned(&signals);
-        let begun = Timing::new(sample_time, step)
-            .and_then(|timing| {
-                let progress = Progress::start(rig, &initial(rig, &start)?)?;
-                Ok((timing.stable(rig), progress, Drive::new(rig, rows, &borrowed(&signals))?))
-            })
-            .map_err(|e| error(py, &e))?;
-        let (timing, mut progress, drive) = begun;
         let mut out = Trajectory::new(rig, rows);
-        progress.observe(rig, timing, &mut out).map_err(|e| error(py, &e))?;
-        run(py, rig, timing, &mut progress, &drive.part(0..rows.saturating_sub(1)), &mut out)?;
+        let begun = Timing::new(sample_time, step).and_then(|timing| {
+            let timing = timing.stable(rig);
+            let progress = Progress::start(rig, &initial(rig, &start)?)?;
+            let drive = Drive::new(rig, rows, &borrowed(&signals))?;
+            let mut run = if stepwise { Run::new(rig) } else { Run::alone(rig) }?;
+            progress.observe_in(&mut run, timing, &mut out)?;
+            Ok((timing, progress, drive, run))
+        });
+        let (timing, mut progress, drive, mut run) = begun.map_err(|e| error(py, &e))?;
+        let held = 0..rows.saturating_sub(1);
+        watched(py, |look| progress.advance_in(&mut run, timing, &drive, held, &mut out, look))?;
         let happened = events(&out);
         Ok((channels(py, rig, out)?, happened))
     }

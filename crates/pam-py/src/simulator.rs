@@ -1,5 +1,5 @@
-//! `_core.Simulator`: a simulation that goes on sample by sample, and the one way both it and
-//! `Rig.simulate` run.
+//! `_core.Simulator`: a simulation that goes on sample by sample, and what it shares with
+//! `Rig.simulate`.
 
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,19 +13,7 @@ use pam_core::simulate::run::OwnedRun;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
-use pyo3::types::{PyDict, PyString};
-
-/// Advance a progress without the interpreter, looking at Ctrl-C now and then.
-pub fn run(
-    py: Python<'_>,
-    rig: &pam_core::Rig,
-    timing: Timing,
-    progress: &mut Progress,
-    drive: &Drive<'_>,
-    out: &mut Trajectory,
-) -> PyResult<()> {
-    watched(py, |look| progress.advance_watched(rig, timing, drive, out, look))
-}
+use pyo3::types::{PyDict, PyFloat, PyString};
 
 /// Do something without the interpreter that looks at Ctrl-C now and then.
 pub fn watched(
@@ -73,11 +61,21 @@ pub fn initial(rig: &pam_core::Rig, given: &BTreeMap<String, f64>) -> pam_core::
     given.iter().try_fold(Initial::rest(rig), |start, (name, value)| start.with(rig, name, *value))
 }
 
+/// A sample as numbers by name, and what happened on the way to it, if anything.
+type Stepped<'py> = (Bound<'py, PyDict>, Option<Vec<EventRow>>);
+
 /// What a sample is worked out with, kept from one to the next.
 struct Work {
     run: OwnedRun,
     out: Trajectory,
+    /// Where the samples of a call stand until it is done.
+    progress: Progress,
+    /// One sample without commands.
+    drive: Drive<'static>,
 }
+
+/// RK4 steps that are not worth giving the interpreter to other threads meanwhile.
+const SHORT: usize = 16;
 
 /// A simulation of a rig that waits for its next command.
 #[pyclass(frozen, module = "pamrs._core")]
@@ -88,8 +86,12 @@ pub struct Simulator {
     /// Whether a call is advancing it.
     busy: AtomicBool,
     /// Gone while a call uses it; another thread that calls meanwhile makes its own.
-    work: Mutex<Option<Work>>,
+    work: Mutex<Option<Box<Work>>>,
     names: Vec<Py<PyString>>,
+    /// A sample to be copied: its entries stand where they belong.
+    sample: Py<PyDict>,
+    /// One valve, and nothing else that must be given.
+    lone: bool,
 }
 
 impl Simulator {
@@ -97,7 +99,7 @@ impl Simulator {
         self.progress.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn work(&self) -> MutexGuard<'_, Option<Work>> {
+    fn work(&self) -> MutexGuard<'_, Option<Box<Work>>> {
         self.work.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
@@ -118,26 +120,57 @@ impl Simulator {
     fn with_work<T>(
         &self,
         py: Python<'_>,
-        act: impl FnOnce(&mut OwnedRun, &mut Trajectory) -> PyResult<T>,
+        act: impl FnOnce(&mut Work) -> PyResult<T>,
     ) -> PyResult<T> {
         let kept = self.work().take();
         let mut work = match kept {
             Some(work) => work,
-            None => Work {
+            None => Box::new(Work {
                 run: OwnedRun::new(Arc::clone(&self.rig)).map_err(|e| error(py, &e))?,
                 out: Trajectory::new(&self.rig, 1),
-            },
+                progress: Progress::default(),
+                drive: Drive::idle(&self.rig),
+            }),
         };
-        let done = act(&mut work.run, &mut work.out);
+        let done = act(&mut work);
         work.out.channels.iter_mut().for_each(Vec::clear);
         work.out.events.clear();
         *self.work() = Some(work);
         done
     }
 
+    /// Hold the commands of a drive of one sample for some samples.
+    fn held(
+        &self,
+        py: Python<'_>,
+        samples: usize,
+        drive: &Drive<'_>,
+        run: &mut OwnedRun,
+        progress: &mut Progress,
+        out: &mut Trajectory,
+    ) -> PyResult<()> {
+        self.alone(|| {
+            progress.clone_from(&self.progress());
+            let mut hold = |look: &mut dyn FnMut() -> pam_core::Result<()>| {
+                run.with(|run| {
+                    (0..samples).try_for_each(|_| {
+                        progress.advance_in(run, self.timing, drive, 0..1, out, look)
+                    })
+                })
+            };
+            let done = if samples.saturating_mul(self.timing.substeps) <= SHORT {
+                hold(&mut || Ok(())).map_err(|e| error(py, &e))
+            } else {
+                watched(py, hold)
+            };
+            std::mem::swap(progress, &mut self.progress());
+            done
+        })
+    }
+
     /// The last sample of a trajectory, a number for each channel.
     fn last<'py>(&self, py: Python<'py>, out: &Trajectory) -> PyResult<Bound<'py, PyDict>> {
-        let sample = PyDict::new(py);
+        let sample = self.sample.bind(py).copy()?;
         for (name, values) in self.names.iter().zip(&out.channels) {
             if let Some(value) = values.last() {
                 sample.set_item(name, *value)?;
@@ -161,12 +194,13 @@ impl Simulator {
         let made = Timing::new(sample_time, step)
             .and_then(|t| Ok((t.stable(&rig), Progress::start(&rig, &initial(&rig, &start)?)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
-        let names = rig
-            .names()
-            .channels
-            .iter()
+        let names: Vec<Py<PyString>> = (rig.names().channels.iter())
             .map(|(name, _)| PyString::intern(py, name).unbind())
             .collect();
+        let spec = rig.spec();
+        let lone = spec.valves.len() == 1 && !spec.load.as_ref().is_some_and(|l| l.is_frame());
+        let sample = PyDict::new(py);
+        names.iter().try_for_each(|name| sample.set_item(name, f64::NAN))?;
         Ok(Self {
             rig,
             timing,
@@ -174,6 +208,8 @@ impl Simulator {
             busy: AtomicBool::new(false),
             work: Mutex::new(None),
             names,
+            sample: sample.unbind(),
+            lone,
         })
     }
 
@@ -189,11 +225,18 @@ impl Simulator {
         let drive =
             Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
         let mut out = Trajectory::new(&self.rig, samples);
-        self.alone(|| {
-            let mut progress = self.progress().clone();
-            let done = run(py, &self.rig, self.timing, &mut progress, &drive, &mut out);
-            *self.progress() = progress;
-            done
+        self.with_work(py, |work| {
+            let run = &mut work.run;
+            self.alone(|| {
+                let mut progress = self.progress().clone();
+                let done = watched(py, |look| {
+                    run.with(|run| {
+                        progress.advance_in(run, self.timing, &drive, 0..samples, &mut out, look)
+                    })
+                });
+                *self.progress() = progress;
+                done
+            })
         })?;
         let happened = events(&out);
         Ok((channels(py, &self.rig, out)?, happened))
@@ -219,19 +262,8 @@ impl Simulator {
             given.iter().map(|(name, value)| Ok((name.to_str()?, std::slice::from_ref(value))));
         let named = named.collect::<PyResult<Vec<_>>>()?;
         let drive = Drive::new(&self.rig, 1, &named).map_err(|e| error(py, &e))?;
-        self.with_work(py, |run, out| {
-            self.alone(|| {
-                let mut progress = self.progress().clone();
-                let done = watched(py, |look| {
-                    run.with(|run| {
-                        (0..samples).try_for_each(|_| {
-                            progress.advance_in(run, self.timing, &drive, 0..1, out, look)
-                        })
-                    })
-                });
-                *self.progress() = progress;
-                done
-            })?;
+        self.with_work(py, |Work { run, out, progress, .. }| {
+            self.held(py, samples, &drive, run, progress, out)?;
             if let Some(mut rows) = rows {
                 let mut rows = rows.as_array_mut();
                 for (mut row, values) in rows.outer_iter_mut().zip(&out.channels) {
@@ -244,9 +276,30 @@ impl Simulator {
         })
     }
 
+    /// Hold a command of the only valve for one sample, the other inputs being left to themselves:
+    /// the sample as numbers by name, and what happened on the way, if anything. None, and nothing
+    /// is done, for a rig that takes other commands and for what is no finite float.
+    fn step<'py>(
+        &self,
+        py: Python<'py>,
+        command: &Bound<'py, PyAny>,
+    ) -> PyResult<Option<Stepped<'py>>> {
+        let Ok(command) = command.cast::<PyFloat>() else { return Ok(None) };
+        let command = command.value();
+        if !(self.lone && command.is_finite()) {
+            return Ok(None);
+        }
+        self.with_work(py, |Work { run, out, progress, drive }| {
+            drive.command(0, command);
+            self.held(py, 1, drive, run, progress, out)?;
+            let happened = if out.events.is_empty() { None } else { Some(events(out)) };
+            Ok(Some((self.last(py, out)?, happened)))
+        })
+    }
+
     /// The present sample as numbers by name.
     fn observe<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        self.with_work(py, |run, out| {
+        self.with_work(py, |Work { run, out, .. }| {
             let progress = self.progress().clone();
             run.with(|run| progress.observe_in(run, self.timing, out))
                 .map_err(|e| error(py, &e))?;

@@ -32,7 +32,7 @@ __all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
 
 #: By the core and from the ports when they are needed; what a rig differs from by numbers only, and
 #: what was made of it.
-_MADE_AGAIN = ("_compiled", "_connected", "_origin", "_grown")
+_MADE_AGAIN = ("_compiled", "_connected", "_inputs", "_origin", "_grown")
 
 
 @dataclass(frozen=True, slots=True)

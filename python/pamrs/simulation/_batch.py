@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation._driving import Inputs, initial_values, keywords
+from pamrs.simulation._driving import initial_values, inputs_of, keywords
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
@@ -181,7 +181,7 @@ class Batch:
         self._first = self._core.states
 
     def _prepare(self) -> None:
-        self._inputs = Inputs(self.rigs[0])
+        self._inputs = inputs_of(self.rigs[0])
         core = core_rig(self.rigs[0])
         self._channels = tuple(core.channels)
         self._commands = tuple(core.inputs)

@@ -23,6 +23,7 @@ __all__ = [
     "Signals",
     "has_frame",
     "initial_values",
+    "inputs_of",
     "keywords",
     "regulators_of",
     "sensor_zero",
@@ -85,7 +86,7 @@ def signals_of(
         If a signal is missing, not taken by the rig, of another length or outside its range; the
         message names it.
     """
-    inputs = Inputs(rig)
+    inputs = inputs_of(rig)
     given = inputs.named(
         valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
     )
@@ -233,6 +234,16 @@ class Inputs:
                 )
 
 
+def inputs_of(rig: Rig) -> Inputs:
+    """What a rig takes, kept with it: a second run does not look it up again."""
+    cached: Any = rig.__dict__.get("_inputs")
+    if cached is None:
+        cached = Inputs(rig)
+        object.__setattr__(rig, "_inputs", cached)
+    inputs: Inputs = cached
+    return inputs
+
+
 def keywords(answer: Any) -> dict[str, Any]:
     """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
     known = ("valve_command", "supply_command", "length", "pressure")
@@ -329,7 +340,8 @@ def _signal(
             f"{name} has the shape {signal.shape}; {needed} is needed, one value for each row"
         )
     low, high, allowed = allowed_range
-    bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
-    if bad.size:
+    least, most = float(signal.min()), float(signal.max())
+    if not (low <= least and most <= high and math.isfinite(least) and math.isfinite(most)):
+        bad = np.flatnonzero(~((signal >= low) & (signal <= high) & np.isfinite(signal)))
         raise ParameterError(f"{name}[{bad[0]}] = {signal[bad[0]]:g} is not allowed: {allowed}")
     return np.ascontiguousarray(signal)

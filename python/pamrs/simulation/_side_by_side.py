@@ -12,7 +12,7 @@ from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
-from pamrs.simulation._driving import Inputs, initial_values
+from pamrs.simulation._driving import initial_values, inputs_of
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import MOST_NUMBERS, check_run, chosen_step, core_rig
 
@@ -112,7 +112,7 @@ def simulate_batch(
     ((500,), True)
     """
     check_run(rig, sample_time)
-    given = Inputs(rig).named(
+    given = inputs_of(rig).named(
         valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
     )
     signals = {name: _numbers(name, values) for name, values in given.items()}

@@ -437,7 +437,8 @@ def simulate(
         raise ParameterError(
             "duration is missing: a finite time >= 0 s is needed (or give valve_command)"
         )
-    check_rows(rig, count)
+    if count != rows:
+        check_rows(rig, count)
     start = initial_values(initial, rig)
     held = {
         name: signal

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation._driving import Inputs, Signals, initial_values, keywords, signals_of
+from pamrs.simulation._driving import Signals, initial_values, inputs_of, keywords, signals_of
 from pamrs.simulation._simulation import (
     Event,
     Simulation,
@@ -73,7 +73,7 @@ class Simulator:
         self.sample_time = float(sample_time)
         self._step = chosen_step(self.sample_time, step)
         self._initial = initial_values(initial, rig)
-        self._inputs = Inputs(rig)
+        self._inputs = inputs_of(rig)
         self.events: list[Event] = []
         """What happened since the start or the last :meth:`reset` or :meth:`restore`, see
         :class:`pamrs.simulation.Event`."""
@@ -170,9 +170,14 @@ class Simulator:
             If the state leaves the range in which the model holds; the simulator then stays at the
             last good sample.
         """
-        sample, events = self._core.hold(
-            1, self._inputs.numbers(valve_command, supply_command, length, pressure)
-        )
+        done = None
+        if supply_command is length is pressure is None:
+            done = self._core.step(valve_command)
+        if done is None:
+            done = self._core.hold(
+                1, self._inputs.numbers(valve_command, supply_command, length, pressure)
+            )
+        sample, events = done
         if events:
             self.events += [Event(*event) for event in events]
         return sample

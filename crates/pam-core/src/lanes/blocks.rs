@@ -9,14 +9,13 @@ use pulp::Simd;
 
 const NODES: usize = 19;
 
-/// Flow through orifices of one gas, `r^(1/gamma)` as a polynomial over the subsonic ratios.
+/// Flow through orifices of one gas. `psi^2/(1 - r)` is a polynomial over the subsonic ratios.
 #[derive(Debug, Clone)]
 pub(super) struct Orifice {
     critical_ratio: f64,
     middle: f64,
     per_half_width: f64,
-    power: [f64; NODES],
-    exponent: f64,
+    curve: [f64; NODES],
     choked: f64,
     laminar: f64,
     factor: f64,
@@ -26,14 +25,20 @@ impl Orifice {
     pub fn new(gas: &Gas) -> Self {
         let low = gas.critical_ratio();
         let (middle, half) = (0.5 * (LAMINAR_RATIO + low), 0.5 * (LAMINAR_RATIO - low));
-        let node = |j: usize| [(middle + half * lobatto(j, NODES - 1)).powf(1.0 / gas.gamma)];
-        let power = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
+        // psi^2 = s (s - r) gamma/(gamma - 1) with s = r^(1/gamma); the difference without loss.
+        let node = |j: usize| {
+            let ratio = middle + half * lobatto(j, NODES - 1);
+            let log = (ratio - 1.0).ln_1p();
+            let power = (log / gas.gamma).exp();
+            let difference = ratio * (log * (1.0 / gas.gamma - 1.0)).exp_m1();
+            [power * difference * (gas.gamma / (gas.gamma - 1.0)) / (1.0 - ratio)]
+        };
+        let curve = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
         Self {
             critical_ratio: low,
             middle,
             per_half_width: 1.0 / half,
-            power,
-            exponent: gas.gamma / (gas.gamma - 1.0),
+            curve,
             choked: gas.psi(0.0),
             laminar: gas.psi(LAMINAR_RATIO) / (1.0 - LAMINAR_RATIO),
             factor: gas.choked_flow(1.0, 1.0) / gas.psi(0.0),
@@ -42,7 +47,12 @@ impl Orifice {
 
     /// Mass flow [kg/s] from `upstream` to `downstream`, as [`Gas::mass_flow`].
     #[inline(always)]
-    pub fn mass_flow<S: Simd>(&self, area: Num<S>, upstream: Num<S>, downstream: Num<S>) -> Num<S> {
+    pub fn mass_flow<S: Simd, const R: usize>(
+        &self,
+        area: Num<S, R>,
+        upstream: Num<S, R>,
+        downstream: Num<S, R>,
+    ) -> Num<S, R> {
         let high = upstream.or_above(downstream);
         let ratio = upstream.or_below(downstream) / high;
         let flow = area * high * self.psi(ratio) * self.factor;
@@ -50,7 +60,7 @@ impl Orifice {
     }
 
     #[inline(always)]
-    fn psi<S: Simd>(&self, ratio: Num<S>) -> Num<S> {
+    fn psi<S: Simd, const R: usize>(&self, ratio: Num<S, R>) -> Num<S, R> {
         let choked = ratio.constant(self.choked);
         if ratio.constant(self.critical_ratio).less(ratio).nowhere() {
             return choked;
@@ -58,8 +68,8 @@ impl Orifice {
         let subsonic = ratio
             .or_above(ratio.constant(self.critical_ratio))
             .or_below(ratio.constant(LAMINAR_RATIO));
-        let s = ((subsonic - self.middle) * self.per_half_width).polynomial(&self.power);
-        let curved = (s * (s - subsonic) * self.exponent).sqrt();
+        let place = (subsonic - self.middle) * self.per_half_width;
+        let curved = ((-subsonic + 1.0) * place.polynomial(&self.curve)).sqrt();
         let straight = (-ratio + 1.0) * self.laminar;
         let open = ratio.at_most(ratio.constant(LAMINAR_RATIO)).select(curved, straight);
         ratio.at_most(ratio.constant(self.critical_ratio)).select(choked, open)
@@ -68,14 +78,14 @@ impl Orifice {
 
 /// A tube, as [`crate::blocks::tube::Tube`].
 #[derive(Clone, Copy)]
-pub(super) struct Tube<S: Simd> {
-    pub flow_factor: Num<S>,
-    pub critical_ratio: Num<S>,
+pub(super) struct Tube<S: Simd, const R: usize> {
+    pub flow_factor: Num<S, R>,
+    pub critical_ratio: Num<S, R>,
 }
 
-impl<S: Simd> Tube<S> {
+impl<S: Simd, const R: usize> Tube<S, R> {
     #[inline(always)]
-    pub fn mass_flow(&self, upstream: Num<S>, downstream: Num<S>) -> Num<S> {
+    pub fn mass_flow(&self, upstream: Num<S, R>, downstream: Num<S, R>) -> Num<S, R> {
         let high = upstream.or_above(downstream);
         let ratio = upstream.or_below(downstream) / high;
         let flow = self.flow_factor * high * self.psi(ratio);
@@ -83,7 +93,7 @@ impl<S: Simd> Tube<S> {
     }
 
     #[inline(always)]
-    fn psi(&self, ratio: Num<S>) -> Num<S> {
+    fn psi(&self, ratio: Num<S, R>) -> Num<S, R> {
         let edge = ratio.constant(LAMINAR_RATIO);
         let curved = ratio.or_above(self.critical_ratio).or_below(edge);
         let x = (curved - self.critical_ratio) / (-self.critical_ratio + 1.0);
@@ -96,19 +106,24 @@ impl<S: Simd> Tube<S> {
 
 /// Where the air comes from, as [`crate::blocks::supply::Supply`].
 #[derive(Clone, Copy)]
-pub(super) enum Supply<S: Simd> {
+pub(super) enum Supply<S: Simd, const R: usize> {
     /// Fall of the pressure per mass that leaves [Pa/kg].
-    Tank(Num<S>),
+    Tank(Num<S, R>),
     Constant,
     Regulator {
-        time_constant: Num<S>,
-        droop: Num<S>,
+        time_constant: Num<S, R>,
+        droop: Num<S, R>,
     },
 }
 
-impl<S: Simd> Supply<S> {
+impl<S: Simd, const R: usize> Supply<S, R> {
     #[inline(always)]
-    pub fn pressure_rate(&self, pressure: Num<S>, outflow: Num<S>, set: Num<S>) -> Num<S> {
+    pub fn pressure_rate(
+        &self,
+        pressure: Num<S, R>,
+        outflow: Num<S, R>,
+        set: Num<S, R>,
+    ) -> Num<S, R> {
         match self {
             Self::Tank(stiffness) => -(outflow * *stiffness),
             Self::Constant => pressure.constant(0.0),
@@ -122,15 +137,15 @@ impl<S: Simd> Supply<S> {
 /// What moves: an arm of one link, or a mass that hangs from the muscle (without inertia of its
 /// own, and always pulled straight down).
 #[derive(Clone, Copy)]
-pub(super) struct Body<S: Simd> {
+pub(super) struct Body<S: Simd, const R: usize> {
     /// One over the inertia [1/(kg m2)], or over the mass [1/kg].
-    pub mobility: Num<S>,
+    pub mobility: Num<S, R>,
     /// Torque of the weight where it pulls across [N m], or the weight itself [N].
-    pub weight: Num<S>,
+    pub weight: Num<S, R>,
     /// The weight follows the sine of the angle.
     pub turns: bool,
-    pub viscous: Num<S>,
-    pub coulomb: Num<S>,
+    pub viscous: Num<S, R>,
+    pub coulomb: Num<S, R>,
     /// Some lane has Coulomb friction.
     pub rubs: bool,
     /// One over the speed that Coulomb friction takes to turn [s/rad].
@@ -138,9 +153,9 @@ pub(super) struct Body<S: Simd> {
     pub stops: Option<Stops>,
 }
 
-impl<S: Simd> Body<S> {
+impl<S: Simd, const R: usize> Body<S, R> {
     #[inline(always)]
-    pub fn acceleration(&self, angle: Num<S>, rate: Num<S>, torque: Num<S>) -> Num<S> {
+    pub fn acceleration(&self, angle: Num<S, R>, rate: Num<S, R>, torque: Num<S, R>) -> Num<S, R> {
         let mut sum = torque - self.viscous * rate;
         if self.rubs {
             sum = sum - self.coulomb * (rate * self.coulomb_slope).tanh();
@@ -155,12 +170,16 @@ impl<S: Simd> Body<S> {
 
 /// Torque of the stops [N m], which never pull.
 #[inline(always)]
-fn stop_torque<S: Simd>(stops: &Stops, angle: Num<S>, rate: Num<S>) -> Num<S> {
+fn stop_torque<S: Simd, const R: usize>(
+    stops: &Stops,
+    angle: Num<S, R>,
+    rate: Num<S, R>,
+) -> Num<S, R> {
     let zero = angle.constant(0.0);
     let (low, high) = (angle.constant(stops.min_angle), angle.constant(stops.max_angle));
     let damping = rate * stops.damping;
     let up = ((low - angle) * stops.stiffness - damping).or_above(zero);
     let down = ((angle - high) * stops.stiffness + damping).or_above(zero);
-    let above: Mask<S> = high.less(angle);
+    let above: Mask<S, R> = high.less(angle);
     angle.less(low).select(up, above.select(-down, zero))
 }

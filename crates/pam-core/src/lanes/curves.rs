@@ -71,26 +71,25 @@ impl Curves {
         Some(Self { low, high, pieces, cells })
     }
 
-    /// The columns at an angle of each lane, those for the power only where they are asked for;
-    /// beyond the range its end.
+    /// The columns at an angle of each lane, worked out in registers of some width, those for the
+    /// power only where they are asked for; beyond the range its end.
     #[inline(always)]
-    pub fn eval<S: Simd>(&self, simd: S, at: Num<S>, power: bool) -> [Num<S>; COLUMNS] {
+    pub fn eval<W: Simd, S: Simd, const R: usize>(
+        &self,
+        wide: W,
+        at: Num<S, R>,
+        power: bool,
+    ) -> [Num<S, R>; COLUMNS] {
         let at = at.or_above(at.constant(self.low)).or_below(at.constant(self.high));
         let (cell, x) = self.place(at);
+        if side_by_side::<S, R>() == 1 {
+            let mut row = [0.0; COLUMNS];
+            self.row(wide, cell.numbers()[0], x.numbers()[0], &mut row);
+            return row.map(|column| at.constant(column));
+        }
         let mut rows = [0.0; COLUMNS * MOST_LANES];
-        let per_row = COLUMNS / S::F64_LANES;
-        let last = self.cells.len() / STRIDE - 1;
-        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(side_by_side::<S>()).enumerate() {
-            let cell = (cell.numbers()[lane].to_bits() as u32 as usize).min(last);
-            let powers = S::as_simd_f64s(&self.cells[cell * STRIDE..(cell + 1) * STRIDE]).0;
-            let x = simd.splat_f64s(x.numbers()[lane]);
-            for (k, out) in S::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
-                let mut sum = powers[DEGREE * per_row + k];
-                for power in (0..DEGREE).rev() {
-                    sum = simd.add_f64s(simd.mul_f64s(sum, x), powers[power * per_row + k]);
-                }
-                *out = sum;
-            }
+        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(side_by_side::<S, R>()).enumerate() {
+            self.row(wide, cell.numbers()[lane], x.numbers()[lane], row);
         }
         let mut columns = [at; COLUMNS];
         let wanted = if power { COLUMNS } else { SLOPE + 1 };
@@ -102,9 +101,26 @@ impl Curves {
         columns
     }
 
+    /// All columns at a place of one cell, see [`Self::place`].
+    #[inline(always)]
+    fn row<W: Simd>(&self, wide: W, cell: f64, x: f64, row: &mut [f64]) {
+        let per_row = COLUMNS / W::F64_LANES;
+        let last = self.cells.len() / STRIDE - 1;
+        let cell = (cell.to_bits() as u32 as usize).min(last);
+        let powers = W::as_simd_f64s(&self.cells[cell * STRIDE..(cell + 1) * STRIDE]).0;
+        let x = wide.splat_f64s(x);
+        for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
+            let mut sum = powers[DEGREE * per_row + k];
+            for power in (0..DEGREE).rev() {
+                sum = wide.add_f64s(wide.mul_f64s(sum, x), powers[power * per_row + k]);
+            }
+            *out = sum;
+        }
+    }
+
     /// Cell of each lane, in the last digits of a number, and the place in it from -1 to 1.
     #[inline(always)]
-    fn place<S: Simd>(&self, at: Num<S>) -> (Num<S>, Num<S>) {
+    fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
         let first = &self.pieces[0];
         let (mut start, mut scale) = (at.constant(first.start), at.constant(first.cells_per_unit));
         let (mut begin, mut last) = (at.constant(first.first), at.constant(first.last));

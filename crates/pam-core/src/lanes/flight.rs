@@ -3,7 +3,7 @@
 //! depends on its own state and commands only.
 
 use super::group::{Group, Rigs, Row, Runs, Spent};
-use super::num::{side_by_side, Num, MOST_LANES};
+use super::num::{side_by_side, Num, MOST_LANES, PAIR};
 use super::rates::Lanes;
 use super::reads::Reads;
 use super::rk4::Rk4;
@@ -28,24 +28,22 @@ pub(super) fn flights<'a>(
     rigs: &dyn Rigs<'a>,
     wanted: &[usize],
 ) -> Result<Vec<Box<dyn Group + 'a>>> {
-    let few = rows.len() <= FEW;
-    let fill = Fill { plan, rows, rigs, wanted };
     // A few rows have no use for wide registers.
-    if few {
-        fill.with_simd(Scalar)
-    } else {
-        Arch::new().dispatch(fill)
+    match rows.len() {
+        1 => Fill::<1> { plan, rows, rigs, wanted }.with_simd(Scalar),
+        ..=FEW => Fill::<PAIR> { plan, rows, rigs, wanted }.with_simd(Scalar),
+        _ => Arch::new().dispatch(Fill::<PAIR> { plan, rows, rigs, wanted }),
     }
 }
 
-struct Fill<'a, 'f> {
+struct Fill<'a, 'f, const R: usize> {
     plan: &'a Plan,
     rows: Vec<Row>,
     rigs: &'f dyn Rigs<'a>,
     wanted: &'f [usize],
 }
 
-impl<'a> WithSimd for Fill<'a, '_> {
+impl<'a, const R: usize> WithSimd for Fill<'a, '_, R> {
     type Output = Result<Vec<Box<dyn Group + 'a>>>;
 
     #[inline(always)]
@@ -54,25 +52,25 @@ impl<'a> WithSimd for Fill<'a, '_> {
         let (mut flights, mut rows): (Vec<Box<dyn Group + 'a>>, _) =
             (Vec::new(), rows.into_iter().peekable());
         while rows.peek().is_some() {
-            let some = rows.by_ref().take(side_by_side::<S>()).collect();
-            flights.push(Box::new(Flight::new(simd, plan, some, rigs, wanted)?));
+            let some = rows.by_ref().take(side_by_side::<S, R>()).collect();
+            flights.push(Box::new(Flight::<S, R>::new(simd, plan, some, rigs, wanted)?));
         }
         Ok(flights)
     }
 }
 
 /// Rows side by side, one at least, at most one for each lane.
-struct Flight<'a, S: Simd> {
+struct Flight<'a, S: Simd, const R: usize> {
     simd: S,
     plan: &'a Plan,
     timing: Timing,
     rows: Vec<Row>,
     runs: Runs<'a>,
-    lanes: Lanes<'a, S>,
-    state: Vec<Num<S>>,
+    lanes: Lanes<'a, S, R>,
+    state: Vec<Num<S, R>>,
     /// The state at the beginning of a sample.
-    before: Vec<Num<S>>,
-    method: Rk4<S>,
+    before: Vec<Num<S, R>>,
+    method: Rk4<S, R>,
     reads: Reads,
     /// Commands that are held: an input of all rows, then the next input.
     held: Vec<f64>,
@@ -85,7 +83,7 @@ struct Flight<'a, S: Simd> {
     spent: Spent,
 }
 
-impl<'a, S: Simd> Flight<'a, S> {
+impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     #[inline(always)]
     fn new(
         simd: S,
@@ -119,7 +117,7 @@ impl<'a, S: Simd> Flight<'a, S> {
             state,
             reads,
         };
-        (0..side_by_side::<S>()).for_each(|lane| flight.load(lane));
+        (0..side_by_side::<S, R>()).for_each(|lane| flight.load(lane));
         flight.away = flight.beyond();
         Ok(flight)
     }
@@ -162,14 +160,14 @@ impl<'a, S: Simd> Flight<'a, S> {
         }
         let rig = self.runs.runs[0].stepper.plant.rig();
         let mut values = [0.0; MOST_LANES];
-        let values = &mut values[..side_by_side::<S>()];
+        let values = &mut values[..side_by_side::<S, R>()];
         for (k, unit) in rig.wiring.valves.iter().enumerate() {
             for (lane, value) in values.iter_mut().enumerate() {
                 let row = lane.min(rows - 1);
-                let valve = &self.runs.of(row).stepper.plant.valves[k];
-                let spool: f64 =
-                    spool_position(self.held[k * rows + row], valve.null, unit.half_range);
-                *value = valve.area * unit.table.eval(spool.abs()) * spool.signum();
+                let plant = &self.runs.of(row).stepper.plant;
+                let null = plant.valves[k].null;
+                let spool = spool_position(self.held[k * rows + row], null, unit.half_range);
+                *value = opening(plant, k, spool);
             }
             self.lanes.open(k, values);
         }
@@ -185,13 +183,13 @@ impl<'a, S: Simd> Flight<'a, S> {
                 *value = gauge + rig.gas.ambient_pressure;
             }
             regulator += usize::from(regulated);
-            self.lanes.set_pressure[k] = Num::load(self.simd, values);
+            self.lanes.set(k, values);
         }
     }
 
     /// Hold the commands of each row for some samples.
     #[inline(always)]
-    fn fly(&mut self, samples: usize, drive: &Drive<'_>) {
+    fn fly<W: Simd>(&mut self, wide: W, samples: usize, drive: &Drive<'_>) {
         self.hold(drive);
         // What is prescribed is so to plants alone.
         let driven = drive.places().next().is_some();
@@ -207,7 +205,7 @@ impl<'a, S: Simd> Flight<'a, S> {
             let fly = was.iter().filter(|flies| **flies).count() as u64;
             if fly > 0 {
                 let before = self.method.evaluations;
-                self.sample();
+                self.sample(wide);
                 self.spent.evaluations += fly * (self.method.evaluations - before);
             }
             self.landed(&was, drive);
@@ -216,17 +214,17 @@ impl<'a, S: Simd> Flight<'a, S> {
 
     /// The steps of one sample, and which lanes they led beyond the curves.
     #[inline(always)]
-    fn sample(&mut self) {
+    fn sample<W: Simd>(&mut self, wide: W) {
         let angle = self.runs.runs[0].stepper.plant.rig().layout.angle(0);
         let (mut low, mut high) = (self.state[angle], self.state[angle]);
-        let step = self.timing.step();
+        let (shape, step) = (self.lanes.shape.of_any_size(), self.timing.step());
         for _ in 0..self.timing.substeps {
-            self.method.step(&mut self.lanes, &mut self.state, step);
+            self.method.step(wide, shape, &mut self.lanes, &mut self.state, step);
             low = self.state[angle].or_below(low);
             high = self.state[angle].or_above(high);
         }
         self.away = self.beyond();
-        for (lane, away) in self.away.iter_mut().enumerate().take(side_by_side::<S>()) {
+        for (lane, away) in self.away.iter_mut().enumerate().take(side_by_side::<S, R>()) {
             let (low, high) = (low.numbers()[lane], high.numbers()[lane]);
             *away |= !(self.plan.contains(low) && self.plan.contains(high));
         }
@@ -289,13 +287,19 @@ impl<'a, S: Simd> Flight<'a, S> {
     }
 }
 
-impl<S: Simd> Group for Flight<'_, S> {
+impl<S: Simd, const R: usize> Group for Flight<'_, S, R> {
     fn rows(&self) -> &[Row] {
         &self.rows
     }
 
     fn advance(&mut self, samples: usize, drive: &Drive<'_>) {
-        self.simd.vectorize(Advance { flight: self, samples, drive });
+        let simd = self.simd;
+        let advance = Advance { flight: self, samples, drive };
+        if side_by_side::<S, R>() == 1 {
+            Arch::new().dispatch(advance); // one plant has columns side by side
+        } else {
+            simd.vectorize(advance);
+        }
     }
 
     fn read(&mut self, out: &mut [f64]) {
@@ -332,18 +336,28 @@ impl<S: Simd> Group for Flight<'_, S> {
     }
 }
 
+/// Opening of a valve at a spool position [m2], below zero where it vents.
+#[inline(always)]
+pub(super) fn opening(plant: &Plant<'_, f64>, valve: usize, spool: f64) -> f64 {
+    if spool == 0.0 {
+        return 0.0; // neither, whatever its table begins with
+    }
+    let table = &plant.rig().wiring.valves[valve].table;
+    plant.valves[valve].area * table.eval(spool.abs()) * spool.signum()
+}
+
 /// A call that is compiled for the registers of the flight.
-struct Advance<'f, 'a, 'd, S: Simd> {
-    flight: &'f mut Flight<'a, S>,
+struct Advance<'f, 'a, 'd, S: Simd, const R: usize> {
+    flight: &'f mut Flight<'a, S, R>,
     samples: usize,
     drive: &'f Drive<'d>,
 }
 
-impl<S: Simd> WithSimd for Advance<'_, '_, '_, S> {
+impl<S: Simd, const R: usize> WithSimd for Advance<'_, '_, '_, S, R> {
     type Output = ();
 
     #[inline(always)]
-    fn with_simd<T: Simd>(self, _: T) {
-        self.flight.fly(self.samples, self.drive);
+    fn with_simd<W: Simd>(self, wide: W) {
+        self.flight.fly(wide, self.samples, self.drive);
     }
 }

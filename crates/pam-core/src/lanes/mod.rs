@@ -18,12 +18,14 @@ mod reduce;
 mod request;
 mod rk4;
 mod run;
+mod solo;
 mod steps;
 
 pub use group::Spent;
 pub use reduce::{Reduce, Reduction};
 pub use request::{Outcome, Request, Signal};
 pub use run::simulate;
+pub(crate) use solo::Solo;
 
 use self::blocks::Orifice;
 use self::curves::Curves;

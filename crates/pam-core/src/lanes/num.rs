@@ -8,36 +8,37 @@ use pulp::bytemuck;
 use pulp::Simd;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
-/// Vector registers that hold a number: while one waits for a result the other is worked on.
-const REGISTERS: usize = 2;
+/// Vector registers that hold a number of many plants: while one waits for a result the other is
+/// worked on. A plant alone has one.
+pub(super) const PAIR: usize = 2;
 /// Lanes at most.
-pub(super) const MOST_LANES: usize = 8 * REGISTERS;
+pub(super) const MOST_LANES: usize = 8 * PAIR;
 
 /// How many plants there are side by side.
 #[inline(always)]
-pub(super) const fn side_by_side<S: Simd>() -> usize {
-    S::F64_LANES * REGISTERS
+pub(super) const fn side_by_side<S: Simd, const R: usize>() -> usize {
+    S::F64_LANES * R
 }
 
-/// One number of each lane.
+/// One number of each lane, in `R` registers.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Num<S: Simd> {
+pub(super) struct Num<S: Simd, const R: usize> {
     simd: S,
-    lanes: [S::f64s; REGISTERS],
+    lanes: [S::f64s; R],
 }
 
 /// Yes or no for each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Mask<S: Simd> {
+pub(super) struct Mask<S: Simd, const R: usize> {
     simd: S,
-    lanes: [S::m64s; REGISTERS],
+    lanes: [S::m64s; R],
 }
 
-impl<S: Simd> Num<S> {
+impl<S: Simd, const R: usize> Num<S, R> {
     /// The same number in each lane.
     #[inline(always)]
     pub fn splat(simd: S, value: f64) -> Self {
-        Self { simd, lanes: [simd.splat_f64s(value); REGISTERS] }
+        Self { simd, lanes: [simd.splat_f64s(value); R] }
     }
 
     /// A number for each lane; as many as there are lanes.
@@ -83,8 +84,8 @@ impl<S: Simd> Num<S> {
     }
 
     #[inline(always)]
-    fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S> {
-        let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); REGISTERS];
+    fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S, R> {
+        let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); R];
         for (mask, (mine, other)) in lanes.iter_mut().zip(self.lanes.into_iter().zip(other.lanes)) {
             *mask = of(self.simd, mine, other);
         }
@@ -93,13 +94,13 @@ impl<S: Simd> Num<S> {
 
     /// Where this is less.
     #[inline(always)]
-    pub fn less(self, other: Self) -> Mask<S> {
+    pub fn less(self, other: Self) -> Mask<S, R> {
         self.compare(other, |simd, a, b| simd.less_than_f64s(a, b))
     }
 
     /// Where this is at most the other.
     #[inline(always)]
-    pub fn at_most(self, other: Self) -> Mask<S> {
+    pub fn at_most(self, other: Self) -> Mask<S, R> {
         self.compare(other, |simd, a, b| simd.less_than_or_equal_f64s(a, b))
     }
 
@@ -133,10 +134,22 @@ impl<S: Simd> Num<S> {
         (self + WHOLE) - WHOLE
     }
 
-    /// A polynomial, its coefficients from the lowest power on: even and odd powers in two chains.
+    /// A polynomial, its coefficients from the lowest power on: even and odd powers in two chains,
+    /// in four where it is long, since each chain waits for itself.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
+        const LONG: usize = 16;
         let square = self * self;
+        if N >= LONG {
+            let fourth = square * square;
+            let mut chains = [self.constant(0.0); 4];
+            for power in (0..N).rev() {
+                let chain = &mut chains[power % 4];
+                *chain = *chain * fourth + coefficients[power];
+            }
+            let [first, second, third, last] = chains;
+            return (first + third * square) + (second + last * square) * self;
+        }
         let (mut even, mut odd) = (self.constant(0.0), self.constant(0.0));
         for power in (0..N).rev() {
             let chain = if power % 2 == 0 { &mut even } else { &mut odd };
@@ -176,6 +189,21 @@ impl<S: Simd> Num<S> {
         let s = (rest - 1.0) / (rest + 1.0);
         let logarithm = s * (s * s).polynomial(&ARTANH);
         whole * LN_2_HIGH + (logarithm + whole * LN_2_LOW)
+    }
+
+    /// Natural logarithm of this over some unit, that of a number near it being known.
+    #[inline(always)]
+    pub fn ln_near(self, near: Self, log: Self, unit: f64) -> Self {
+        /// Up to here the next term of the series, `2 s^7/7`, is below 1e-21.
+        const NEAR: f64 = 1e-3;
+        let s = (self - near) / (self + near);
+        let square = s * s;
+        let short = log + s * ((square * (2.0 / 5.0) + 2.0 / 3.0) * square + 2.0);
+        let far = self.constant(NEAR).at_most(s.abs());
+        if far.nowhere() {
+            return short;
+        }
+        far.select((self / unit).ln(), short)
     }
 
     /// Hyperbolic tangent of numbers, to 1e-14 absolutely; what is not a number counts as positive.
@@ -235,7 +263,7 @@ const EXPONENTIAL: [f64; 14] = {
     terms
 };
 
-impl<S: Simd> Mask<S> {
+impl<S: Simd, const R: usize> Mask<S, R> {
     /// Whether it holds in no lane.
     #[inline(always)]
     pub fn nowhere(self) -> bool {
@@ -244,9 +272,9 @@ impl<S: Simd> Mask<S> {
 
     /// One number where it holds, another where it does not.
     #[inline(always)]
-    pub fn select(self, yes: Num<S>, no: Num<S>) -> Num<S> {
+    pub fn select(self, yes: Num<S, R>, no: Num<S, R>) -> Num<S, R> {
         let mut chosen = no;
-        for k in 0..REGISTERS {
+        for k in 0..R {
             chosen.lanes[k] = self.simd.select_f64s(self.lanes[k], yes.lanes[k], no.lanes[k]);
         }
         chosen
@@ -255,7 +283,7 @@ impl<S: Simd> Mask<S> {
 
 macro_rules! operator {
     ($trait:ident, $name:ident, $lanes:ident) => {
-        impl<S: Simd> $trait for Num<S> {
+        impl<S: Simd, const R: usize> $trait for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -264,7 +292,7 @@ macro_rules! operator {
             }
         }
 
-        impl<S: Simd> $trait<f64> for Num<S> {
+        impl<S: Simd, const R: usize> $trait<f64> for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -280,7 +308,7 @@ operator!(Sub, sub, sub_f64s);
 operator!(Mul, mul, mul_f64s);
 operator!(Div, div, div_f64s);
 
-impl<S: Simd> Neg for Num<S> {
+impl<S: Simd, const R: usize> Neg for Num<S, R> {
     type Output = Self;
 
     #[inline(always)]
@@ -289,7 +317,7 @@ impl<S: Simd> Neg for Num<S> {
     }
 }
 
-impl<S: Simd> AddAssign for Num<S> {
+impl<S: Simd, const R: usize> AddAssign for Num<S, R> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
@@ -305,32 +333,40 @@ mod tests {
     struct Furthest;
 
     impl WithSimd for Furthest {
-        type Output = [f64; 3];
+        type Output = [f64; 4];
 
         #[inline(always)]
-        fn with_simd<S: Simd>(self, simd: S) -> [f64; 3] {
-            let [mut sine, mut tangent, mut logarithm] = [0.0_f64; 3];
+        fn with_simd<S: Simd>(self, simd: S) -> [f64; 4] {
+            let [mut sine, mut tangent, mut logarithm, mut near] = [0.0_f64; 4];
             for k in -4000..=4000 {
                 let x = f64::from(k) * 0.0025 + 1e-5;
-                let number = Num::splat(simd, x);
+                let number = Num::<S, PAIR>::splat(simd, x);
                 sine = sine.max((number.sin().numbers()[0] - x.sin()).abs());
-                let steep = Num::splat(simd, 3.0 * x);
+                let steep = Num::<S, PAIR>::splat(simd, 3.0 * x);
                 tangent = tangent.max((steep.tanh().numbers()[0] - (3.0 * x).tanh()).abs());
                 // From 5e-5 to 2e4, as a pressure over that of the room.
                 let ratio = x.exp();
-                let error = Num::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
+                let error = Num::<S, PAIR>::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
                 logarithm = logarithm.max(error.abs() / ratio.ln().abs().max(1.0));
+                // Of a number far from another one, and of one beside it.
+                for other in [2.5 * ratio, ratio * (1.0 + 1e-4 * x)] {
+                    let [here, log] = [ratio, ratio.ln()].map(|n| Num::<S, PAIR>::splat(simd, n));
+                    let found = Num::<S, PAIR>::splat(simd, other).ln_near(here, log, 1.0);
+                    let error = found.numbers()[0] - other.ln();
+                    near = near.max(error.abs() / other.ln().abs().max(1.0));
+                }
             }
-            [sine, tangent, logarithm]
+            [sine, tangent, logarithm, near]
         }
     }
 
     #[test]
     fn functions_are_those_of_the_standard_library() {
-        let [sine, tangent, logarithm] = Arch::new().dispatch(Furthest);
+        let [sine, tangent, logarithm, near] = Arch::new().dispatch(Furthest);
         assert!(sine < 4e-16, "{sine:e}");
         assert!(tangent < 1e-14, "{tangent:e}");
         assert!(logarithm < 4e-16, "{logarithm:e}");
+        assert!(near < 5e-16, "{near:e}");
     }
 
     #[test]

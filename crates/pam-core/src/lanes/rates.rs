@@ -3,80 +3,156 @@
 
 use super::blocks::{Body, Supply, Tube};
 use super::num::{side_by_side, Mask, Num, MOST_LANES};
+use super::rk4::Slopes;
 use super::Plan;
 use crate::blocks::supply::Supply as OneSupply;
-use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig};
+use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE};
 use pulp::Simd;
 
 #[derive(Clone, Copy)]
-struct Valve<S: Simd> {
+struct Valve<S: Simd, const R: usize> {
     from: Node,
     to: usize,
     /// Discharge area of the opening that is open [m2].
-    area: Num<S>,
+    area: Num<S, R>,
     /// Lanes in which the chamber is filled.
-    fills: Mask<S>,
-    /// In no lane anything is open.
-    shut: bool,
+    fills: Mask<S, R>,
+    /// In some lane the chamber is filled.
+    some_fill: bool,
+    /// In some lane it is vented.
+    some_vent: bool,
 }
 
-enum Passage<S: Simd> {
-    Orifice(Num<S>),
-    Tube(Tube<S>),
+enum Passage<S: Simd, const R: usize> {
+    Orifice(Num<S, R>),
+    Tube(Tube<S, R>),
 }
 
-/// Values of the parameters of each lane, and room for what the equations write down.
-pub(super) struct Lanes<'a, S: Simd> {
+/// How many blocks the equations are for, and whether masses and sums of the balance are wanted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Shape {
+    layout: Layout,
+    sums: bool,
+    /// It is [`Self::SMALL`], and the compiler is to know it.
+    small: bool,
+}
+
+impl Shape {
+    /// One supply and one gas with sums. Where the compiler knows it, every place of the state is
+    /// known too: a plant alone would spend more on finding them than on its equations.
+    pub const SMALL: Self = Self {
+        layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
+        sums: true,
+        small: true,
+    };
+
+    /// Whether there are as many blocks as in [`Self::SMALL`].
+    pub fn is_small(self) -> bool {
+        Self { small: true, ..self } == Self::SMALL
+    }
+
+    /// The same where the compiler is to know nothing.
+    #[inline(always)]
+    pub fn of_any_size(self) -> Self {
+        Self { small: false, ..self }
+    }
+
+    /// Length of the state.
+    #[inline(always)]
+    pub fn states(self) -> usize {
+        if self.sums {
+            self.layout.balance(BALANCE.len())
+        } else {
+            self.layout.states()
+        }
+    }
+
+    #[inline(always)]
+    fn gas(self, k: usize) -> usize {
+        if self.small {
+            0
+        } else {
+            k
+        }
+    }
+
+    #[inline(always)]
+    fn supply(self, k: usize) -> usize {
+        if self.small {
+            0
+        } else {
+            k
+        }
+    }
+}
+
+/// Values of the parameters of each lane.
+struct Plants<'a, S: Simd, const R: usize> {
     simd: S,
     rig: &'a Rig,
     plan: &'a Plan,
-    layout: Layout,
-    supplies: Vec<Supply<S>>,
-    /// Set pressure of each supply [Pa, absolute].
-    pub set_pressure: Vec<Num<S>>,
-    fixed_volume: Vec<Num<S>>,
-    alphas: Vec<[Num<S>; 3]>,
-    valves: Vec<Valve<S>>,
-    lines: Vec<Passage<S>>,
-    scales: Vec<Num<S>>,
-    body: Body<S>,
-    /// Masses and sums of the balance are wanted.
-    sums: bool,
-    volume: Vec<Num<S>>,
-    volume_rate: Vec<Num<S>>,
-    inflow: Vec<Num<S>>,
-    outflow: Vec<Num<S>>,
-    drawn: Vec<Num<S>>,
-    torque: Vec<Num<S>>,
-    vented: Num<S>,
-    muscle_work: Num<S>,
+    supplies: Vec<Supply<S, R>>,
+    set_pressure: Vec<Num<S, R>>,
+    fixed_volume: Vec<Num<S, R>>,
+    alphas: Vec<[Num<S, R>; 3]>,
+    valves: Vec<Valve<S, R>>,
+    lines: Vec<Passage<S, R>>,
+    /// Something may flow out of a supply in some lane.
+    feeding: bool,
+    scales: Vec<Num<S, R>>,
+    /// Groups that come before all others of their chamber.
+    first: Vec<bool>,
+    body: Body<S, R>,
 }
 
-impl<'a, S: Simd> Lanes<'a, S> {
+/// Room for what the equations write down: of each gas its volume, the rate of it, what flows in
+/// and out; of each supply what is drawn, and the same while it is asked for.
+struct Room<T> {
+    volume: T,
+    volume_rate: T,
+    inflow: T,
+    outflow: T,
+    drawn: T,
+    given: T,
+}
+
+/// Plants side by side and room for their equations.
+pub(super) struct Lanes<'a, S: Simd, const R: usize> {
+    pub shape: Shape,
+    plants: Plants<'a, S, R>,
+    room: Room<Vec<Num<S, R>>>,
+    /// Pressure of each supply where the step began, and the logarithm of it over the ambient one.
+    logs: Vec<[Num<S, R>; 2]>,
+}
+
+impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
     /// One lane for each plant of a rig that the plan is for, one at least; the lanes that are left
     /// over are as the last of them.
     pub fn new(simd: S, plan: &'a Plan, plants: &[&Plant<'a, f64>], sums: bool) -> Self {
-        let first = plants[0];
-        let rig = first.rig();
+        let first_plant = plants[0];
+        let rig = first_plant.rig();
         let zero = Num::splat(simd, 0.0);
         let each = |of: &dyn Fn(&Plant<'a, f64>) -> f64| {
             let mut values = [0.0; MOST_LANES];
             for (lane, value) in values.iter_mut().enumerate() {
                 *value = of(plants[lane.min(plants.len() - 1)]);
             }
-            Num::load(simd, &values[..side_by_side::<S>()])
+            Num::load(simd, &values[..side_by_side::<S, R>()])
         };
-        let supplies = (0..first.supplies.len()).map(|k| supply(k, first, &each)).collect();
-        let lines = (0..first.lines.len()).map(|k| passage(k, first, &each)).collect();
+        let supplies =
+            (0..first_plant.supplies.len()).map(|k| supply(k, first_plant, &each)).collect();
+        let lines: Vec<_> =
+            (0..first_plant.lines.len()).map(|k| passage(k, first_plant, &each)).collect();
         let wiring = &rig.wiring;
         let valves = wiring.valves.iter().map(|valve| Valve {
             from: valve.from,
             to: valve.to,
             area: zero,
             fills: zero.less(zero),
-            shut: true,
+            some_fill: false,
+            some_vent: false,
         });
-        let alphas = (0..first.alphas.len()).map(|k| {
+        let alphas = (0..first_plant.alphas.len()).map(|k| {
             [
                 each(&|p| p.alphas[k].inflow),
                 each(&|p| p.alphas[k].outflow),
@@ -85,172 +161,255 @@ impl<'a, S: Simd> Lanes<'a, S> {
         });
         let layout = rig.layout;
         let zeros = |n: usize| vec![zero; n];
-        Self {
-            supplies,
-            set_pressure: zeros(layout.supplies),
-            fixed_volume: (0..layout.gases).map(|k| each(&|p| p.fixed_volume[k])).collect(),
-            alphas: alphas.collect(),
-            valves: valves.collect(),
-            lines,
-            scales: (0..wiring.groups.len()).map(|k| each(&|p| p.scales[k])).collect(),
-            body: body(first, &each),
-            sums,
-            volume: zeros(layout.gases),
+        let fixed_volume: Vec<Num<S, R>> =
+            (0..layout.gases).map(|k| each(&|p| p.fixed_volume[k])).collect();
+        let room = Room {
+            volume: fixed_volume.clone(),
             volume_rate: zeros(layout.gases),
             inflow: zeros(layout.gases),
             outflow: zeros(layout.gases),
             drawn: zeros(layout.supplies),
-            torque: zeros(layout.coordinates),
-            vented: zero,
-            muscle_work: zero,
+            given: zeros(layout.supplies),
+        };
+        let groups = wiring.groups.iter().enumerate();
+        let first =
+            groups.map(|(k, group)| wiring.groups[..k].iter().all(|g| g.chamber != group.chamber));
+        let plants = Plants {
+            supplies,
+            set_pressure: zeros(layout.supplies),
+            fixed_volume,
+            alphas: alphas.collect(),
+            valves: valves.collect(),
+            feeding: !lines.is_empty(),
+            lines,
+            scales: (0..wiring.groups.len()).map(|k| each(&|p| p.scales[k])).collect(),
+            first: first.collect(),
+            body: body(first_plant, &each),
             simd,
             rig,
             plan,
-            layout,
-        }
+        };
+        let logs = vec![[zero; 2]; layout.supplies];
+        Self { shape: Shape { layout, sums, small: false }, plants, room, logs }
     }
 
     /// Openings of a valve over the sample that comes [m2], above zero where the chamber is filled,
     /// below where it is vented.
     pub fn open(&mut self, valve: usize, areas: &[f64]) {
-        let signed = Num::load(self.simd, areas);
-        let valve = &mut self.valves[valve];
+        let signed = Num::load(self.plants.simd, areas);
+        let valve = &mut self.plants.valves[valve];
         valve.fills = signed.constant(0.0).less(signed);
         valve.area = signed.abs();
-        valve.shut = areas.iter().all(|a| *a == 0.0);
+        valve.some_fill = areas.iter().any(|a| *a > 0.0);
+        valve.some_vent = areas.iter().any(|a| *a < 0.0);
+        let lines = !self.plants.lines.is_empty();
+        self.plants.feeding = lines || self.plants.valves.iter().any(|valve| valve.some_fill);
     }
 
+    /// Set pressure of a supply over the sample that comes [Pa, absolute].
+    pub fn set(&mut self, supply: usize, pressures: &[f64]) {
+        self.plants.set_pressure[supply] = Num::load(self.plants.simd, pressures);
+    }
+
+    /// Time derivative of the state of plants of a shape, given to `out` place by place; what each
+    /// plant has columns of is worked out in registers of some width.
     #[inline(always)]
-    fn pressure_at(&self, node: Node, state: &[Num<S>]) -> Num<S> {
+    pub fn rates<W: Simd>(
+        &mut self,
+        wide: W,
+        shape: Shape,
+        state: &[Num<S, R>],
+        out: Slopes<'_, S, R>,
+    ) {
+        let Self { plants, room, logs, .. } = self;
+        if shape.small {
+            let zero = Num::splat(plants.simd, 0.0);
+            let [mut volume, mut volume_rate, mut inflow] =
+                [[plants.fixed_volume[0]], [zero], [zero]];
+            let [mut outflow, mut drawn, mut given] = [[zero], [zero], [zero]];
+            let room = Room {
+                volume: &mut volume[..],
+                volume_rate: &mut volume_rate[..],
+                inflow: &mut inflow[..],
+                outflow: &mut outflow[..],
+                drawn: &mut drawn[..],
+                given: &mut given[..],
+            };
+            plants.rates(wide, shape, state, room, &mut logs[..1], out);
+            return;
+        }
+        let room = Room {
+            volume: &mut room.volume[..],
+            volume_rate: &mut room.volume_rate[..],
+            inflow: &mut room.inflow[..],
+            outflow: &mut room.outflow[..],
+            drawn: &mut room.drawn[..],
+            given: &mut room.given[..],
+        };
+        plants.rates(wide, shape, state, room, logs, out);
+    }
+}
+
+type Here<'r, S, const R: usize> = Room<&'r mut [Num<S, R>]>;
+
+impl<S: Simd, const R: usize> Plants<'_, S, R> {
+    #[inline(always)]
+    fn pressure_at(&self, shape: Shape, node: Node, state: &[Num<S, R>]) -> Num<S, R> {
         match node {
             Node::Ambient => Num::splat(self.simd, self.rig.gas.ambient_pressure),
-            Node::Supply(k) => state[self.layout.supply(k)],
-            Node::Gas(k) => state[self.layout.pressure(k)],
+            Node::Supply(k) => state[shape.layout.supply(shape.supply(k))],
+            Node::Gas(k) => state[shape.layout.pressure(shape.gas(k))],
         }
     }
 
-    /// Time derivative of the state.
     #[inline(always)]
-    pub fn rates(&mut self, state: &[Num<S>], out: &mut [Num<S>]) {
-        self.mechanics(state);
-        self.flows(state);
-        self.gas_rates(state, out);
-        let layout = self.layout;
+    fn rates<W: Simd>(
+        &self,
+        wide: W,
+        shape: Shape,
+        state: &[Num<S, R>],
+        mut here: Here<'_, S, R>,
+        logs: &mut [[Num<S, R>; 2]],
+        mut out: Slopes<'_, S, R>,
+    ) {
+        let layout = shape.layout;
+        let (torque, muscle_work) = self.mechanics(wide, shape, state, &mut here);
+        let vented = self.flows(shape, state, &mut here);
+        self.gas_rates(shape, state, &mut here, &mut out);
         let (angle, rate) = (state[layout.angle(0)], state[layout.rate(0)]);
-        out[layout.angle(0)] = rate;
-        out[layout.rate(0)] = self.body.acceleration(angle, rate, self.torque[0]);
-        if self.sums {
-            self.balances(state, out);
+        out.set(layout.angle(0), rate);
+        out.set(layout.rate(0), self.body.acceleration(angle, rate, torque));
+        if shape.sums {
+            let work = (torque * rate).or_above(rate.constant(0.0));
+            let summed = [vented, muscle_work, work];
+            self.balances(layout, state, here.given, summed, logs, out);
         }
     }
 
+    /// Volumes and their rates; torque, and power of the muscles.
     #[inline(always)]
-    fn mechanics(&mut self, state: &[Num<S>]) {
+    fn mechanics<W: Simd>(
+        &self,
+        wide: W,
+        shape: Shape,
+        state: &[Num<S, R>],
+        here: &mut Here<'_, S, R>,
+    ) -> (Num<S, R>, Num<S, R>) {
         let zero = Num::splat(self.simd, 0.0);
-        self.volume.copy_from_slice(&self.fixed_volume);
-        self.volume_rate.fill(zero);
-        self.torque.fill(zero);
-        self.muscle_work = zero;
+        let (mut torque, mut work) = (zero, zero);
         let ambient = self.rig.gas.ambient_pressure;
-        for (k, (group, curves)) in self.rig.wiring.groups.iter().zip(&self.plan.curves).enumerate()
-        {
-            let angle = state[self.layout.angle(group.coordinate)];
-            let rate = state[self.layout.rate(group.coordinate)];
-            let gauge = state[self.layout.pressure(group.chamber)] - ambient;
-            let scale = self.scales[k];
-            let [gas, elastic, offset, volume, slope, gas_work, elastic_work, offset_work] =
-                curves.eval(self.simd, angle, self.sums);
-            self.torque[group.coordinate] += gauge * gas + scale * (gauge * elastic + offset);
-            self.volume[group.chamber] += volume;
-            self.volume_rate[group.chamber] += slope * rate;
-            if self.sums {
-                let pull = gauge * gas_work + scale * (gauge * elastic_work + offset_work);
-                self.muscle_work += pull * rate;
+        // A plan has one coordinate.
+        let (angle, rate) = (state[shape.layout.angle(0)], state[shape.layout.rate(0)]);
+        let groups = self.rig.wiring.groups.iter().zip(&self.plan.curves);
+        for ((group, curves), (scale, first)) in groups.zip(self.scales.iter().zip(&self.first)) {
+            let (gas, scale) = (shape.gas(group.chamber), *scale);
+            let gauge = state[shape.layout.pressure(gas)] - ambient;
+            let [pull, elastic, offset, volume, slope, pull_work, elastic_work, offset_work] =
+                curves.eval(wide, angle, shape.sums);
+            torque += gauge * pull + scale * (gauge * elastic + offset);
+            if shape.sums {
+                let pull = gauge * pull_work + scale * (gauge * elastic_work + offset_work);
+                work += pull * rate;
             }
+            let (before, moved) = match first {
+                true => (self.fixed_volume[gas], zero),
+                false => (here.volume[gas], here.volume_rate[gas]),
+            };
+            here.volume[gas] = before + volume;
+            here.volume_rate[gas] = moved + slope * rate;
         }
+        (torque, work)
     }
 
+    /// What flows into and out of each gas and out of each supply, which were at zero; what is
+    /// vented.
     #[inline(always)]
-    fn flows(&mut self, state: &[Num<S>]) {
+    fn flows(&self, shape: Shape, state: &[Num<S, R>], here: &mut Here<'_, S, R>) -> Num<S, R> {
         let zero = Num::splat(self.simd, 0.0);
-        self.inflow.fill(zero);
-        self.outflow.fill(zero);
-        self.drawn.fill(zero);
-        self.vented = zero;
+        let mut vented = zero;
         let ambient = Num::splat(self.simd, self.rig.gas.ambient_pressure);
-        for k in 0..self.valves.len() {
-            let Valve { from, to, area, fills, shut } = self.valves[k];
-            if shut {
+        for Valve { from, to, area, fills, some_fill, some_vent } in &self.valves {
+            if !(*some_fill || *some_vent) {
                 continue;
             }
-            let chamber = state[self.layout.pressure(to)];
-            let upstream = fills.select(self.pressure_at(from, state), chamber);
+            let chamber = state[shape.layout.pressure(shape.gas(*to))];
+            let upstream = fills.select(self.pressure_at(shape, *from, state), chamber);
             let downstream = fills.select(chamber, ambient);
-            let flow = self.plan.orifice.mass_flow(area, upstream, downstream);
-            let (filling, venting) = (fills.select(flow, zero), fills.select(zero, flow));
-            self.pass(from, Node::Gas(to), filling);
-            self.pass(Node::Gas(to), Node::Ambient, venting);
+            let flow = self.plan.orifice.mass_flow(*area, upstream, downstream);
+            if *some_fill {
+                let filling = fills.select(flow, zero);
+                here.pass(shape, *from, Node::Gas(*to), filling, &mut vented);
+            }
+            if *some_vent {
+                let venting = fills.select(zero, flow);
+                here.pass(shape, Node::Gas(*to), Node::Ambient, venting, &mut vented);
+            }
         }
-        for k in 0..self.lines.len() {
-            let unit = &self.rig.wiring.lines[k];
-            let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
-            let flow = match &self.lines[k] {
+        for (unit, line) in self.rig.wiring.lines.iter().zip(&self.lines) {
+            let from = self.pressure_at(shape, unit.from, state);
+            let to = self.pressure_at(shape, unit.to, state);
+            let flow = match line {
                 Passage::Orifice(area) => self.plan.orifice.mass_flow(*area, from, to),
                 Passage::Tube(tube) => tube.mass_flow(from, to),
             };
-            self.pass(unit.from, unit.to, flow);
+            here.pass(shape, unit.from, unit.to, flow, &mut vented);
         }
+        vented
     }
 
-    /// A mass flow along the arrow; what goes against it goes out of its end.
+    /// Rates of pressures and masses; the flows go back to zero.
     #[inline(always)]
-    fn pass(&mut self, from: Node, to: Node, flow: Num<S>) {
-        let zero = flow.constant(0.0);
-        let (along, against) = (flow.or_above(zero), (-flow).or_above(zero));
-        self.exchange(from, along, against, flow);
-        self.exchange(to, against, along, -flow);
-    }
-
-    /// What leaves a node, what comes to it, and the difference.
-    #[inline(always)]
-    fn exchange(&mut self, node: Node, leaves: Num<S>, comes: Num<S>, net: Num<S>) {
-        match node {
-            Node::Ambient => self.vented = self.vented - net,
-            Node::Supply(k) => self.drawn[k] += net,
-            Node::Gas(k) => {
-                self.outflow[k] += leaves;
-                self.inflow[k] += comes;
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn gas_rates(&self, state: &[Num<S>], out: &mut [Num<S>]) {
-        let (gas, layout) = (&self.rig.gas, &self.layout);
+    fn gas_rates(
+        &self,
+        shape: Shape,
+        state: &[Num<S, R>],
+        here: &mut Here<'_, S, R>,
+        out: &mut Slopes<'_, S, R>,
+    ) {
+        let (gas, layout) = (&self.rig.gas, shape.layout);
+        let zero = Num::splat(self.simd, 0.0);
         let rt = gas.gas_constant * gas.temperature;
-        for (k, supply) in self.supplies.iter().enumerate() {
+        for k in 0..layout.supplies {
             let pressure = state[layout.supply(k)];
-            out[layout.supply(k)] =
-                supply.pressure_rate(pressure, self.drawn[k], self.set_pressure[k]);
+            here.given[k] = std::mem::replace(&mut here.drawn[k], zero);
+            let set = self.set_pressure[k];
+            let rate = self.supplies[k].pressure_rate(pressure, here.given[k], set);
+            out.set(layout.supply(k), rate);
         }
         for k in 0..layout.gases {
-            let [inflow, outflow, volume] = self.alphas[k];
+            let [alpha_in, alpha_out, alpha] = self.alphas[k];
             let pressure = state[layout.pressure(k)];
-            out[layout.mass(k)] = self.inflow[k] - self.outflow[k];
-            out[layout.pressure(k)] = ((inflow * self.inflow[k] - outflow * self.outflow[k]) * rt
-                - volume * pressure * self.volume_rate[k])
-                / self.volume[k];
+            let inflow = std::mem::replace(&mut here.inflow[k], zero);
+            let outflow = std::mem::replace(&mut here.outflow[k], zero);
+            out.gather(layout.mass(k), inflow - outflow);
+            // The volume is known before the flows.
+            let per_volume = here.volume[k].constant(1.0) / here.volume[k];
+            let rate = ((alpha_in * inflow - alpha_out * outflow) * rt
+                - alpha * pressure * here.volume_rate[k])
+                * per_volume;
+            out.set(layout.pressure(k), rate);
         }
     }
 
     /// Rates of the sums of [`crate::plant::BALANCE`].
     #[inline(always)]
-    fn balances(&self, state: &[Num<S>], out: &mut [Num<S>]) {
-        let (gas, layout) = (&self.rig.gas, &self.layout);
+    fn balances(
+        &self,
+        layout: Layout,
+        state: &[Num<S, R>],
+        given: &[Num<S, R>],
+        [mut vented, muscle_work, work]: [Num<S, R>; 3],
+        logs: &mut [[Num<S, R>; 2]],
+        mut out: Slopes<'_, S, R>,
+    ) {
+        let gas = &self.rig.gas;
         let rt = gas.gas_constant * gas.temperature;
         let zero = Num::splat(self.simd, 0.0);
-        let (mut drawn, mut exergy, mut vented) = (zero, zero, self.vented);
-        for (k, flow) in self.drawn.iter().enumerate() {
+        let (mut drawn, mut exergy) = (zero, zero);
+        for (k, (flow, known)) in given.iter().zip(logs).enumerate() {
+            if !self.feeding {
+                break; // the logarithm is dear
+            }
             let mut taken = *flow;
             if matches!(self.supplies[k], Supply::Regulator { .. }) {
                 // A regulator relieves to the ambient what it takes back.
@@ -259,18 +418,68 @@ impl<'a, S: Simd> Lanes<'a, S> {
                 taken = back.select(zero, *flow);
             }
             drawn += taken;
-            let raised = state[layout.supply(k)] / gas.ambient_pressure;
-            exergy += raised.ln() * taken * rt;
+            let pressure = state[layout.supply(k)];
+            if out.first {
+                *known = [pressure, (pressure / gas.ambient_pressure).ln()];
+            }
+            let [before, log] = *known;
+            let log = match out.first {
+                true => log,
+                false => pressure.ln_near(before, log, gas.ambient_pressure),
+            };
+            exergy += log * taken * rt;
         }
-        let power = self.torque[0] * state[layout.rate(0)];
-        let sums = [drawn, vented, drawn * rt, exergy, self.muscle_work, power.or_above(zero)];
-        out[layout.states()..].copy_from_slice(&sums);
+        let sums = [drawn, vented, drawn * rt, exergy, muscle_work, work];
+        for (k, sum) in sums.into_iter().enumerate() {
+            out.gather(layout.balance(k), sum);
+        }
     }
 }
 
-type Each<'e, 'a, S> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S>;
+impl<S: Simd, const R: usize> Here<'_, S, R> {
+    /// A mass flow along the arrow; what goes against it goes out of its end.
+    #[inline(always)]
+    fn pass(
+        &mut self,
+        shape: Shape,
+        from: Node,
+        to: Node,
+        flow: Num<S, R>,
+        vented: &mut Num<S, R>,
+    ) {
+        let zero = flow.constant(0.0);
+        let (along, against) = (flow.or_above(zero), (-flow).or_above(zero));
+        self.exchange(shape, from, [along, against, flow], vented);
+        self.exchange(shape, to, [against, along, -flow], vented);
+    }
 
-fn supply<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Supply<S> {
+    /// What leaves a node, what comes to it, and the difference.
+    #[inline(always)]
+    fn exchange(
+        &mut self,
+        shape: Shape,
+        node: Node,
+        [leaves, comes, net]: [Num<S, R>; 3],
+        vented: &mut Num<S, R>,
+    ) {
+        match node {
+            Node::Ambient => *vented = *vented - net,
+            Node::Supply(k) => self.drawn[shape.supply(k)] += net,
+            Node::Gas(k) => {
+                self.outflow[shape.gas(k)] += leaves;
+                self.inflow[shape.gas(k)] += comes;
+            }
+        }
+    }
+}
+
+type Each<'e, 'a, S, const R: usize> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S, R>;
+
+fn supply<'a, S: Simd, const R: usize>(
+    k: usize,
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Supply<S, R> {
     let of = |number: fn(&OneSupply<f64>) -> f64| each(&|p| number(&p.supplies[k]));
     match first.supplies[k] {
         OneSupply::Constant => Supply::Constant,
@@ -293,7 +502,11 @@ fn supply<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) 
     }
 }
 
-fn passage<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Passage<S> {
+fn passage<'a, S: Simd, const R: usize>(
+    k: usize,
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Passage<S, R> {
     let of = |number: fn(&Line<f64>) -> f64| each(&|p| number(&p.lines[k]));
     match first.lines[k] {
         Line::Orifice(_) => Passage::Orifice(of(|line| match line {
@@ -314,7 +527,10 @@ fn passage<'a, S: Simd>(k: usize, first: &Plant<'a, f64>, each: Each<'_, 'a, S>)
 }
 
 /// One coordinate. A plan is for no other bodies: in their place stands what is no number.
-fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Body<S> {
+fn body<'a, S: Simd, const R: usize>(
+    first: &Plant<'a, f64>,
+    each: Each<'_, 'a, S, R>,
+) -> Body<S, R> {
     let (turns, coulomb_speed, stops) = match &first.body {
         OneBody::OneLink(arm, stops) => (true, arm.coulomb_speed, *stops),
         OneBody::Mass(load, stops) => (false, load.coulomb_speed, *stops),
@@ -326,7 +542,9 @@ fn body<'a, S: Simd>(first: &Plant<'a, f64>, each: Each<'_, 'a, S>) -> Body<S> {
             let weight = (arm.first_moment + arm.payload * arm.length) * arm.gravity;
             [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb]
         }
-        OneBody::Mass(load, _) => [load.mass, load.mass * load.gravity, load.viscous, load.coulomb],
+        OneBody::Mass(load, _) => {
+            [1.0 / load.mass, load.mass * load.gravity, load.viscous, load.coulomb]
+        }
         _ => [f64::NAN; 4],
     };
     let coulomb = of(numbers, 3);

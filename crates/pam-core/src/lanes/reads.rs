@@ -34,7 +34,12 @@ impl Reads {
 
     /// Write down every wanted channel of all plants, then the next channel.
     #[inline(always)]
-    pub fn write<S: Simd>(&mut self, state: &[Num<S>], runs: &mut Runs<'_>, out: &mut [f64]) {
+    pub fn write<S: Simd, const R: usize>(
+        &mut self,
+        state: &[Num<S, R>],
+        runs: &mut Runs<'_>,
+        out: &mut [f64],
+    ) {
         let plants = runs.run_of.len();
         for (out, read) in out.chunks_exact_mut(plants).zip(&self.reads) {
             if let Read::State { place, sign, more } = read {

@@ -7,6 +7,13 @@ use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberSta
 use crate::effects::Extremes;
 use crate::scalar::{constant, Scalar};
 
+/// A pressure [Pa, absolute]: one of the states, by its place, or one that stays.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Pressure {
+    At(usize),
+    Held(f64),
+}
+
 impl<S: Scalar> Plant<'_, S> {
     #[inline]
     pub(super) fn pressure_at(&self, node: Node, state: &[S]) -> S {
@@ -196,31 +203,29 @@ impl<S: Scalar> Scratch<S> {
 }
 
 impl Plant<'_, f64> {
-    /// Pressure ratio (1 where nothing can flow) and critical ratio of each valve and line.
-    pub(crate) fn ratios<'b>(
+    /// Pressures at both ends of each valve (none where it is shut) and line, and the ratio of them
+    /// at which its flow becomes choked.
+    pub(crate) fn passages<'b>(
         &'b self,
-        state: &'b [f64],
         controls: &'b Controls<f64>,
-    ) -> impl Iterator<Item = (f64, f64)> + 'b {
+    ) -> impl Iterator<Item = (Option<(Pressure, Pressure)>, f64)> + 'b {
         let gas = &self.rig.gas;
-        let ratio = |a: f64, b: f64| a.min(b) / a.max(b).max(f64::MIN_POSITIVE);
+        let pressure = |node: Node| {
+            node.place(&self.layout).map_or(Pressure::Held(gas.ambient_pressure), Pressure::At)
+        };
         let valves = self.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
         let valves = valves.map(move |((unit, valve), spool)| {
-            let here = state[self.layout.pressure(unit.to)];
-            let other = if *spool > 0.0 {
-                self.pressure_at(unit.from, state)
-            } else {
-                gas.ambient_pressure
-            };
+            let other = if *spool > 0.0 { unit.from } else { Node::Ambient };
             let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
-            (if open { ratio(here, other) } else { 1.0 }, gas.critical_ratio())
+            let ends = open.then(|| (pressure(Node::Gas(unit.to)), pressure(other)));
+            (ends, gas.critical_ratio())
         });
         let lines = self.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
             let critical = match line {
                 Line::Orifice(_) => gas.critical_ratio(),
                 Line::Tube(tube) => tube.critical_ratio(),
             };
-            (ratio(self.pressure_at(unit.from, state), self.pressure_at(unit.to, state)), critical)
+            (Some((pressure(unit.from), pressure(unit.to))), critical)
         });
         valves.chain(lines)
     }

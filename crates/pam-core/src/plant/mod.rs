@@ -17,6 +17,7 @@ mod views;
 mod wiring;
 mod wiring_motion;
 
+pub(crate) use air::Pressure;
 pub(crate) use body::Body as OneBody;
 pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
 pub use linear::{LinearModel, Side};

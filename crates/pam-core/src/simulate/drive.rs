@@ -55,6 +55,20 @@ impl<'a> Drive<'a> {
         Ok(Self { samples, commands, prescribed })
     }
 
+    /// One sample of a rig that nobody commands: valves at 0 V, regulators at their own pressures.
+    #[must_use]
+    pub fn idle(rig: &Rig) -> Drive<'static> {
+        let valves = rig.spec().valves.len();
+        let own = |k| if k < valves { 0.0 } else { set_pressure(rig, k) };
+        let commands = (0..rig.names.inputs.len()).map(|k| Cow::Owned(vec![own(k)])).collect();
+        Drive { samples: 1, commands, prescribed: Vec::new() }
+    }
+
+    /// Another command of an input in every sample, a finite number.
+    pub fn command(&mut self, input: usize, value: f64) {
+        self.commands[input].to_mut().fill(value);
+    }
+
     /// Samples.
     #[must_use]
     pub fn samples(&self) -> usize {
@@ -105,6 +119,11 @@ impl<'a> Drive<'a> {
         for ((_, own), (_, values)) in self.prescribed.iter_mut().zip(&other.prescribed) {
             own.to_mut()[row] = values[sample];
         }
+    }
+
+    /// Whether anything is prescribed.
+    pub(crate) fn prescribes(&self) -> bool {
+        !self.prescribed.is_empty()
     }
 
     pub(crate) fn places(&self) -> impl Iterator<Item = usize> + '_ {

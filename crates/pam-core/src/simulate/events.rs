@@ -2,7 +2,7 @@
 
 use crate::description::dotted;
 use crate::plant::Rig;
-use crate::plant::{Controls, Plant};
+use crate::plant::{Controls, Plant, Pressure};
 
 /// What happened.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,36 +42,90 @@ pub struct Event {
     pub block: String,
 }
 
-/// Conditions at one instant, for each coordinate (how far beyond its nearest stop, negative
-/// inside) and each flow.
+/// What an event's condition is found from.
+#[derive(Debug, Clone, Copy)]
+enum Condition {
+    /// Nothing that changes.
+    Still(f64),
+    /// How far a coordinate is below its lower stop: place among the states and limit.
+    Below(usize, f64),
+    /// The same above its upper stop.
+    Above(usize, f64),
+    /// Critical less actual ratio of two pressures: positive when choked.
+    Flow(Pressure, Pressure, f64),
+}
+
+impl Condition {
+    #[inline]
+    fn margin(self, at: &impl Fn(usize) -> f64) -> f64 {
+        let pressure = |pressure: Pressure| match pressure {
+            Pressure::At(place) => at(place),
+            Pressure::Held(value) => value,
+        };
+        match self {
+            Self::Still(margin) => margin,
+            Self::Below(place, limit) => limit - at(place),
+            Self::Above(place, limit) => at(place) - limit,
+            Self::Flow(one, other, critical) => {
+                let (a, b) = (pressure(one), pressure(other));
+                let (low, high) = if a < b { (a, b) } else { (b, a) };
+                critical - low / high.max(f64::MIN_POSITIVE)
+            }
+        }
+    }
+}
+
+/// The conditions of events under some controls: both stops of each coordinate, then each flow.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Conditions {
+    each: Vec<Condition>,
+    /// How many of them are of stops.
+    stops: usize,
+}
+
+impl Conditions {
+    /// Those of a plant under other controls.
+    pub fn set(&mut self, plant: &Plant<'_, f64>, controls: &Controls<f64>) {
+        let rig = plant.rig();
+        self.each.clear();
+        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
+            let place = rig.layout.angle(k);
+            match coordinate.stops {
+                None => self.each.extend([Condition::Still(f64::NEG_INFINITY); 2]),
+                Some(stops) => {
+                    self.each.push(Condition::Below(place, stops.min_angle));
+                    self.each.push(Condition::Above(place, stops.max_angle));
+                }
+            }
+        }
+        self.stops = self.each.len();
+        self.each.extend(plant.passages(controls).map(|(ends, critical)| match ends {
+            Some((one, other)) => Condition::Flow(one, other, critical),
+            None => Condition::Still(critical - 1.0),
+        }));
+    }
+}
+
+/// Conditions at one instant: how far beyond what ends them, negative inside.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
-    /// Distance beyond the lower and the upper stop.
-    beyond: Vec<[f64; 2]>,
-    /// Critical less actual pressure ratio: positive when choked.
-    choke: Vec<f64>,
+    margins: Vec<f64>,
+    /// How many of them are of stops.
+    stops: usize,
 }
 
 impl Watch {
-    pub fn look(&mut self, plant: &Plant<'_, f64>, state: &[f64], controls: &Controls<f64>) {
-        let rig = plant.rig();
-        self.beyond.clear();
-        for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
-            let x = state[rig.layout.angle(k)];
-            let inside = [f64::NEG_INFINITY; 2];
-            self.beyond
-                .push(coordinate.stops.map_or(inside, |s| [s.min_angle - x, x - s.max_angle]));
-        }
-        self.choke.clear();
-        self.choke.extend(plant.ratios(state, controls).map(|(ratio, critical)| critical - ratio));
-    }
-
-    fn margins(&self) -> impl Iterator<Item = f64> + '_ {
-        self.beyond.iter().flatten().copied().chain(self.choke.iter().copied())
+    /// Look at a state, place by place.
+    #[inline]
+    pub fn look(&mut self, conditions: &Conditions, at: impl Fn(usize) -> f64) {
+        self.stops = conditions.stops;
+        self.margins.clear();
+        self.margins.extend(conditions.each.iter().map(|condition| condition.margin(&at)));
     }
 
     /// Events of what is true now and was not (or the reverse) by `flags`, which are brought up to
     /// date. `before` are the conditions a time `dt` earlier.
+    #[inline]
     pub fn report(
         &self,
         rig: &Rig,
@@ -80,13 +134,13 @@ impl Watch {
         flags: &mut [bool],
         out: &mut Vec<Event>,
     ) {
-        for (k, (margin, flag)) in self.margins().zip(flags.iter_mut()).enumerate() {
-            let now = margin > 0.0;
+        for (k, (margin, flag)) in self.margins.iter().zip(flags.iter_mut()).enumerate() {
+            let now = *margin > 0.0;
             if now == *flag {
                 continue;
             }
             *flag = now;
-            let back = before.and_then(|(b, dt)| Some((b.margins().nth(k)?, dt)));
+            let back = before.and_then(|(b, dt)| Some((*b.margins.get(k)?, dt)));
             let share = back.map_or(0.0, |(was, dt)| {
                 // Where the straight line between the two crosses zero; a jump counts at its end.
                 let span = margin - was;
@@ -106,7 +160,7 @@ impl Watch {
 
     fn kind(&self, k: usize, now: bool) -> Kind {
         let upper = k % 2 == 1;
-        match (k < 2 * self.beyond.len(), now) {
+        match (k < self.stops, now) {
             (true, true) => Kind::StopReached(upper),
             (true, false) => Kind::StopLeft(upper),
             (false, true) => Kind::Choked,
@@ -115,7 +169,7 @@ impl Watch {
     }
 
     fn block(&self, rig: &Rig, k: usize) -> String {
-        let stops = 2 * self.beyond.len();
+        let stops = self.stops;
         if k < stops {
             return rig.names.coordinates.get(k / 2).cloned().unwrap_or_default();
         }

@@ -74,7 +74,7 @@ impl Timing {
 }
 
 /// Steps between two looks outside: some ten milliseconds of a large rig.
-const STEPS_UNSEEN: usize = 8_000;
+pub(crate) const STEPS_UNSEEN: usize = 8_000;
 /// Rows that room is made for at once.
 const MOST_ROOM: usize = 65_536;
 
@@ -324,7 +324,8 @@ impl Progress {
     /// Bring the conditions of events up to date, of a state that was moved under these controls.
     pub(crate) fn look(&mut self, run: &mut Run<'_>, controls: &Controls<f64>) {
         let plant = &run.stepper.plant;
-        run.after.look(plant, &self.state, controls);
+        run.conditions.set(plant, controls);
+        run.after.look(&run.conditions, |place| self.state[place]);
         run.after.report(plant.rig(), None, 0.0, &mut self.flags, &mut Vec::new());
     }
 
@@ -431,6 +432,19 @@ impl Progress {
         out: &mut Trajectory,
     ) -> Result<()> {
         self.check(plant, timing)?;
+        self.seen(plant, scratch, timing, out);
+        Ok(())
+    }
+
+    /// Append this sample, which is in the model's range, to a trajectory.
+    #[inline]
+    fn seen(
+        &self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        timing: Timing,
+        out: &mut Trajectory,
+    ) {
         plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
         if self.kept > 0 {
             let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
@@ -445,7 +459,6 @@ impl Progress {
                 }
             }
         }
-        Ok(())
     }
 
     /// Note the commands and the pressures of a sample, and forget what nobody asks for any more.
@@ -548,40 +561,85 @@ impl Progress {
         out: &mut Trajectory,
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
-        let rig = run.stepper.plant.rig();
-        let mut controls = run.stepper.plant.controls(|input| drive.commands[input][k]);
-        run.next.clone_from(self);
         let happened = out.events.len();
-        let ends = drive.ends(rig, &self.state, k);
-        let began = self.samples as f64 * timing.sample_time;
-        if self.kept > 0 {
-            run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
-            controls = run.next.skewed(&run.stepper.plant, began, timing);
-        }
-        run.begin(&controls, began, &mut out.events);
-        for sub in 0..timing.substeps {
-            if self.kept > 0 {
-                let from = began + sub as f64 * timing.step();
-                controls = run.next.skewed(&run.stepper.plant, from, timing);
-            }
-            run.step(&controls, &ends, timing, began, sub, &mut out.events);
-            run.unseen += 1;
-            if run.unseen >= STEPS_UNSEEN {
-                run.unseen = 0;
-                look()?;
-            }
+        run.stepper.plant.command(|input| drive.commands[input][k], &mut run.controls);
+        let flown = !drive.prescribes() && self.flown(run, timing, out, look)?;
+        if !flown {
+            out.events.truncate(happened);
+            self.stepped(run, timing, drive, k, out, look)?;
         }
         let Run { stepper, next, .. } = run;
-        for (place, ..) in &ends {
-            held_mass(&stepper.plant, *place, &mut next.state);
-        }
         // Within a step they were found block by block.
         if let Some(new) = out.events.get_mut(happened..) {
             new.sort_by(|a, b| a.time.total_cmp(&b.time));
         }
         next.samples += 1;
-        next.observed(&stepper.plant, &mut stepper.scratch, timing, out)?;
+        if !flown {
+            next.check(&stepper.plant, timing)?; // what flew was looked at
+        }
+        next.seen(&stepper.plant, &mut stepper.scratch, timing, out);
         std::mem::swap(self, next);
+        Ok(())
+    }
+}
+
+impl Progress {
+    /// The steps of a sample under the commands of a run, in its faster way; whether they are done.
+    #[inline]
+    fn flown(
+        &self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<bool> {
+        if !run.flies() {
+            return Ok(false);
+        }
+        run.next.clone_from(self);
+        let began = self.samples as f64 * timing.sample_time;
+        run.begin(began, &mut out.events);
+        for from in (0..timing.substeps).step_by(STEPS_UNSEEN) {
+            let steps = from..timing.substeps.min(from + STEPS_UNSEEN);
+            let taken = steps.len();
+            if !run.fly(timing, began, steps, &mut out.events) {
+                return Ok(false);
+            }
+            run.seen(taken, look)?;
+        }
+        Ok(true)
+    }
+
+    /// The steps of a sample of a drive under the commands of a run, one by one.
+    fn stepped(
+        &self,
+        run: &mut Run<'_>,
+        timing: Timing,
+        drive: &Drive<'_>,
+        k: usize,
+        out: &mut Trajectory,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        run.next.clone_from(self);
+        let ends = drive.ends(run.stepper.plant.rig(), &self.state, k);
+        let began = self.samples as f64 * timing.sample_time;
+        if self.kept > 0 {
+            run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
+            run.controls = run.next.skewed(&run.stepper.plant, began, timing);
+        }
+        run.begin(began, &mut out.events);
+        for sub in 0..timing.substeps {
+            if self.kept > 0 {
+                let from = began + sub as f64 * timing.step();
+                run.controls = run.next.skewed(&run.stepper.plant, from, timing);
+            }
+            run.step(&ends, timing, began, sub, &mut out.events);
+            run.seen(1, look)?;
+        }
+        let Run { stepper, next, .. } = run;
+        for (place, ..) in &ends {
+            held_mass(&stepper.plant, *place, &mut next.state);
+        }
         Ok(())
     }
 }

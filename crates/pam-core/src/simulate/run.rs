@@ -1,26 +1,33 @@
 //! What the samples of one rig need on the way, kept from one to the next.
 
+use crate::lanes::Solo;
 use crate::plant::Rig;
 use crate::plant::{Controls, Plant, Simulated};
 use crate::simulate::drive::Drive;
-use crate::simulate::events::{Event, Watch};
-use crate::simulate::{Progress, Stepper, Timing};
+use crate::simulate::events::{Conditions, Event, Watch};
+use crate::simulate::{Progress, Stepper, Timing, STEPS_UNSEEN};
 use crate::Result;
 use self_cell::self_cell;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// What samples of one rig need on the way and do not depend on: made once, whatever runs with it.
 pub struct Run<'a> {
     pub(crate) stepper: Stepper<'a, f64>,
+    /// The faster way to take a sample, for runs that have it.
+    solo: Option<Solo<'a>>,
+    /// Commands of the sample that is on its way.
+    pub(crate) controls: Controls<f64>,
     pub(crate) simulated: Simulated,
     /// Places that are prescribed.
     places: Vec<usize>,
+    pub(crate) conditions: Conditions,
     pub(crate) before: Watch,
     pub(crate) after: Watch,
     /// The sample that is on its way.
     pub(crate) next: Progress,
     /// Steps since the last look outside.
-    pub(crate) unseen: usize,
+    unseen: usize,
 }
 
 impl<'a> Run<'a> {
@@ -32,12 +39,25 @@ impl<'a> Run<'a> {
         Ok(Self::of(Plant::new(rig, rig.parameters().lift(), true)?))
     }
 
+    /// Room for a rig that is run alone: by the equations of the lanes where it can be.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn alone(rig: &'a Rig) -> Result<Self> {
+        let mut run = Self::new(rig)?;
+        run.solo = Solo::new(&run.stepper.plant);
+        Ok(run)
+    }
+
     /// Room for a plant.
     pub(crate) fn of(plant: Plant<'a, f64>) -> Self {
         Self {
             simulated: Simulated::all_but(plant.rig(), &[]),
+            solo: None,
+            controls: plant.controls(|_| 0.0),
             stepper: Stepper::new(plant),
             places: Vec::new(),
+            conditions: Conditions::default(),
             before: Watch::default(),
             after: Watch::default(),
             next: Progress::default(),
@@ -55,25 +75,67 @@ impl<'a> Run<'a> {
 
     /// Take the sample that is on its way to its beginning, a time [s].
     #[inline]
-    pub(crate) fn begin(&mut self, controls: &Controls<f64>, began: f64, events: &mut Vec<Event>) {
-        let Self { stepper, before, next, .. } = self;
+    pub(crate) fn begin(&mut self, began: f64, events: &mut Vec<Event>) {
+        let Self { stepper, controls, conditions, before, next, .. } = self;
         stepper.begin(&next.state, controls, began);
-        before.look(&stepper.plant, &next.state, stepper.controls(controls, 0));
+        conditions.set(&stepper.plant, stepper.controls(controls, 0));
+        before.look(conditions, |place| next.state[place]);
         before.report(stepper.plant.rig(), None, began, &mut next.flags, events);
+    }
+
+    /// Whether it has the faster way.
+    pub(crate) fn flies(&self) -> bool {
+        self.solo.is_some()
+    }
+
+    /// Count steps, and look outside now and then.
+    #[inline]
+    pub(crate) fn seen(
+        &mut self,
+        steps: usize,
+        look: &mut dyn FnMut() -> Result<()>,
+    ) -> Result<()> {
+        self.unseen += steps;
+        if self.unseen < STEPS_UNSEEN {
+            return Ok(());
+        }
+        self.unseen = 0;
+        look()
+    }
+
+    /// Steps of a sample that began at a time [s] and the events within them, in the faster way.
+    /// Whether they are done: where not, the sample has to begin anew.
+    #[inline]
+    pub(crate) fn fly(
+        &mut self,
+        timing: Timing,
+        began: f64,
+        steps: Range<usize>,
+        events: &mut Vec<Event>,
+    ) -> bool {
+        let Self { stepper, solo, controls, conditions, before, after, next, .. } = self;
+        let (Some(solo), plant) = (solo, &stepper.plant) else { return false };
+        let Progress { state, flags, .. } = next;
+        let dt = timing.step();
+        solo.advance(plant, state, controls, (steps.len(), dt), |sub, seen| {
+            after.look(conditions, |place| seen.at(place));
+            let time = began + (steps.start + sub + 1) as f64 * dt;
+            after.report(plant.rig(), Some((before, dt)), time, flags, events);
+            std::mem::swap(before, after);
+        })
     }
 
     /// One integration step of a sample that began at a time [s], and the events within it.
     #[inline]
     pub(crate) fn step(
         &mut self,
-        controls: &Controls<f64>,
         ends: &[(usize, f64, f64)],
         timing: Timing,
         began: f64,
         sub: usize,
         events: &mut Vec<Event>,
     ) {
-        let Self { stepper, simulated, before, after, next, .. } = self;
+        let Self { stepper, controls, conditions, simulated, before, after, next, .. } = self;
         let rig = stepper.plant.rig();
         let dt = timing.step();
         let from = began + sub as f64 * dt;
@@ -87,7 +149,8 @@ impl<'a> Run<'a> {
                 }
             }
         });
-        after.look(&stepper.plant, &next.state, stepper.controls(controls, 2));
+        conditions.set(&stepper.plant, stepper.controls(controls, 2));
+        after.look(conditions, |place| next.state[place]);
         let time = began + (sub + 1) as f64 * dt;
         after.report(rig, Some((before, dt)), time, &mut next.flags, events);
         std::mem::swap(before, after);
@@ -109,9 +172,9 @@ impl OwnedRun {
     /// Room for a rig.
     ///
     /// # Errors
-    /// As [`Run::new`].
+    /// As [`Run::alone`].
     pub fn new(rig: Arc<Rig>) -> Result<Self> {
-        Ok(Self(Held::try_new(rig, |rig| Run::new(rig))?))
+        Ok(Self(Held::try_new(rig, |rig| Run::alone(rig))?))
     }
 
     /// Do something with the run.
