@@ -74,6 +74,9 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
     assert all(error["after"] < error["before"] for error in wrong["held_out"].values())
     assert found.effects == []
     assert found.probabilities[name] > 0.9
+    # the excess is the wrong value's, not that of parameters that bend inside their tolerances
+    (share,) = (t.share for t in found.budget if t.id == name and t.block == wrong["block"])
+    assert share > 0.85
     assert name.replace(".", " ").replace("_", " ") in found.headline
     assert found.text.startswith("The rig file is wrong")
     jsonschema.validate(json.loads(found.to_json()), schema())

@@ -215,11 +215,21 @@ def _inside(key: dict[str, Any], told: _Told) -> tuple[bool, ...]:
 
 
 def _shares(key: dict[str, Any], result: dict[str, Any]) -> tuple[bool, ...]:
-    """Whether the budget gives each true term its share within 15 points; nothing without one."""
+    """Whether the budget gives each true term its share within 15 points; nothing without one.
+
+    True shares are of what is left beside parameters inside their tolerances, and so are those
+    that are compared with them.
+    """
     budget = result.get("budget")
     if not budget:
         return ()
     found = []
+
+    def wrong(block: str) -> float:
+        own = [b for b in budget if place([str(b.get("block", ""))]) == {block}]
+        kept = sum(_number(b.get("share")) or 0.0 for b in own if b.get("kind") == "parameters")
+        return 1.0 - kept
+
     for term in key["terms"]:
         if term["kind"] == "model_error" or term.get("share") is None:
             continue
@@ -228,7 +238,9 @@ def _shares(key: dict[str, Any], result: dict[str, Any]) -> tuple[bool, ...]:
             for b in budget
             if b.get("id") == term["id"] and place([str(b.get("block", ""))]) == {term["block"]}
         ]
-        found.append(abs(sum(told) - float(term["share"])) <= POINTS)
+        whole = wrong(term["block"])
+        share = sum(told) / whole if whole > 0.0 else 0.0
+        found.append(abs(share - float(term["share"])) <= POINTS)
     return tuple(found)
 
 

@@ -315,7 +315,8 @@ class BudgetTerm(Entry):
         Form of the effect where it is not the usual one.
     share : float
         Share of the excess variance over the noise (of the nominal model, without the effects that
-        it holds) that the term takes, after all terms before it; negative where it makes the
+        it holds) that the term takes with its values in the final model: the mean of what it takes
+        after all terms before it and of what it takes before them; negative where it makes the
         prediction worse.
     interval : list of two floats
         95 % interval of the share.
@@ -336,7 +337,10 @@ class BudgetTerm(Entry):
     id: str
     form: str
     share: float = field(
-        metadata=told("of the nominal model's excess variance over the noise, after earlier terms")
+        metadata=told(
+            "of the nominal model's excess variance over the noise, taken with and without the "
+            "other terms"
+        )
     )
     interval: list[float] = field(metadata=told("95 % interval of the share", kind="pair"))
     probability: float | None = field(metadata=told("of the name", kind="probability"))

@@ -43,6 +43,7 @@ from pamrs.diagnosis.fit import (
     form_in,
     known_parameters,
     residuals,
+    spread_over_pieces,
     with_effects_of,
     with_known,
 )
@@ -108,7 +109,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
-    terms = budget(judged, held, out_found, noise_level, nominal, models.final)
+    terms = budget(judged, held, out_found, noise_level, nominal, models.final, models.events)
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
     runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)
@@ -220,12 +221,13 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     """The rig at every stage, from the verdicts of the groups."""
     starts = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
     baseline = _merged(nominal, starts)
+    starts = _widened(fitted, judged, starts)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         return _Models(
             judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline
         )
     wanted = [_model_of(j, start) for j, start in zip(judged, starts, strict=True)]
-    chosen = _settled(nominal, fitted, judged, wanted)
+    chosen = _widened(fitted, judged, _settled(nominal, fitted, judged, wanted))
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)
@@ -414,6 +416,16 @@ def _settled(
                     forms=forms,
                 )
                 found[k] = replace(candidate, fit=again)
+    return found
+
+
+def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+    """The fits of the groups with standard deviations that hold for residuals that are no noise."""
+    found = []
+    for j, candidate in zip(judged, chosen, strict=True):
+        own = replace(problem, blocks=j.group.blocks)
+        std = spread_over_pieces(own, candidate.fit)
+        found.append(replace(candidate, fit=replace(candidate.fit, std=std)))
     return found
 
 

@@ -4,15 +4,16 @@ takes, and what stays unexplained.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import replace
+import itertools
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, is_parameter, significant
-from pamrs.diagnosis.fit import Key, Problem, acts_in, form_in, residuals
+from pamrs.diagnosis.fit import Events, Key, Problem, acts_in, form_in, residuals
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -25,8 +26,19 @@ __all__ = ["budget"]
 
 Array = NDArray[np.float64]
 Stages = dict[str, dict[Key, Residual]]
-Stage = tuple[str, str, Excess]
-"""Kind of a term, its id, and what the block keeps with it and with all terms before it."""
+Residuals = dict[Key, Residual]
+
+
+@dataclass(frozen=True)
+class _Step:
+    """A term of a group: its kind and id, what the blocks keep with it and all terms before it; and
+    what they keep without and with it, after the terms before it, and after those behind it.
+    """
+
+    kind: str
+    name: str
+    now: Residuals
+    drops: tuple[tuple[Residuals, Residuals], ...]
 
 
 def budget(
@@ -36,8 +48,14 @@ def budget(
     noise_level: dict[Key, NoiseLevel],
     nominal: Rig,
     final: Rig,
+    events: Events | None = None,
 ) -> list[BudgetTerm]:
     """The budget of every block whose nominal model leaves more than noise.
+
+    All terms have the values of the final model, those of the parameters as well: parameters that
+    were fitted without an effect take up what is the effect's. What a term takes depends on what
+    is there already; a share is the mean of what it takes after all terms before it, and of what
+    it takes after all those behind it.
 
     Parameters
     ----------
@@ -51,6 +69,8 @@ def budget(
         Noise by block and recording.
     nominal, final : Rig
         The nominal model, and that with everything that was found.
+    events : Events, optional
+        What happened in single recordings.
 
     Returns
     -------
@@ -62,11 +82,10 @@ def budget(
     terms: list[BudgetTerm] = []
     bare = _without_held(problem, nominal, found["before"])
     for one in judged:
-        # what is left out again, term by term, where several are named
-        partial = _without(one, problem, final)
+        steps = _steps(one, problem, found, nominal, final, events)
         for block in one.group.blocks:
 
-            def kept(residual: dict[Key, Residual], block: Block = block) -> Excess:
+            def kept(residual: Residuals, block: Block = block) -> Excess:
                 return excess(
                     block, problem.recordings, residual, noise_level, problem.settings.noise
                 )
@@ -75,16 +94,86 @@ def budget(
             before = kept(acting[0][1])
             if not significant(before):
                 continue
-            stages: list[Stage] = [("held", name, kept(r)) for name, r in acting[1:]]
-            stages += [("parameters", "", kept(found["refit"]))]
-            stages += [(_kind(name), name, kept(residual)) for name, residual in partial[:-1]]
-            last = partial[-1][0] if partial else ""
-            form = one.verdict == "unlisted" and one.group.closure is not None
-            if last or form:
-                kind = "form" if form else _kind(last)
-                stages.append((kind, last, kept(found["after"])))
+            held = [
+                _Step("held", name, now, ((was, now),))
+                for (_, was), (name, now) in itertools.pairwise(acting)
+            ]
+            stages = [
+                _Stage(s.kind, s.name, kept(s.now), [(kept(a), kept(b)) for a, b in s.drops])
+                for s in (*held, *steps)
+            ]
             terms += _terms(block, before, stages, one, final, problem.settings)
     return terms
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """A term of one block: as in `_Step`, against its noise."""
+
+    kind: str
+    name: str
+    now: Excess
+    drops: list[tuple[Excess, Excess]]
+
+
+def _steps(
+    judged: Judged,
+    problem: Problem,
+    found: Stages,
+    nominal: Rig,
+    final: Rig,
+    events: Events | None,
+) -> list[_Step]:
+    """The terms of a group beside what the nominal model holds."""
+    names = _in_order(judged)
+    if not names:
+        refit = _Step("parameters", "", found["refit"], ((found["before"], found["refit"]),))
+        if judged.verdict != "unlisted" or judged.group.closure is None:
+            return [refit]
+        after = found["after"]
+        return [refit, _Step("form", "", after, ((found["refit"], after),))]
+    own = replace(problem, blocks=judged.group.blocks)
+    every = ("", *names)
+
+    def kept(present: tuple[str, ...]) -> Residuals:
+        if not present or present == every:
+            return found["after" if present else "before"]
+        happened = events if events is not None and events.effect in present else None
+        return residuals(own, _with_only(present, every, nominal, final), (), happened)
+
+    try:
+        forward = [kept(every[:n]) for n in range(len(every) + 1)]
+    except SimulationError:  # a part of the model leaves its range: it is said as a whole
+        now = found["after"]
+        return [_Step(_kind(names[0]), names[0], now, ((found["before"], now),))]
+    try:
+        backward = [kept(every[n:]) for n in range(len(every) + 1)]
+    except SimulationError:
+        backward = []
+    steps = []
+    for n, name in enumerate(every):
+        drops = [(forward[n], forward[n + 1])]
+        if backward:
+            drops.append((backward[n + 1], backward[n]))
+        kind = _kind(name) if name else "parameters"
+        steps.append(_Step(kind, name, forward[n + 1], tuple(drops)))
+    return steps
+
+
+def _with_only(present: tuple[str, ...], every: tuple[str, ...], nominal: Rig, final: Rig) -> Rig:
+    """The final model with some of its terms: parameters inside their tolerances under an empty
+    name, wrong ones joined by ``+``, effects.
+    """
+    rig = final
+    wrong: dict[str, bool] = {}
+    for name in every:
+        if name and is_parameter(name):
+            wrong |= dict.fromkeys(name.split("+"), name in present)
+        elif name and name not in present:
+            rig = rig.without_effect(name)
+    there = "" in present
+    back = {n: p.value for n, p in nominal.parameters.items() if not wrong.get(n, there)}
+    return rig.with_parameters(back)
 
 
 def _without_held(
@@ -111,40 +200,24 @@ def _kind(name: str) -> str:
     return "wrong_parameter" if is_parameter(name) else "effect"
 
 
-def _without(judged: Judged, problem: Problem, final: Rig) -> list[tuple[str, dict[Key, Residual]]]:
-    """What is named, that which leaves least by itself first, each with the residuals of the model
-    that has it and those before it; of the last one, which is the whole model, none.
-    """
-    names = _in_order(judged)
-    own = replace(problem, blocks=judged.group.blocks)
-    out: list[tuple[str, dict[Key, Residual]]] = []
-    for count, name in enumerate(names[:-1], 1):
-        rig = final
-        for later in names[count:]:
-            rig = rig.without_effect(later)
-        try:
-            out.append((name, residuals(own, rig)))
-        except SimulationError:  # it is said together with the next one
-            continue
-    return [*out, *((name, {}) for name in names[-1:])]
-
-
 def _in_order(judged: Judged) -> list[str]:
-    """Names of a group, the one that leaves least by itself first; wrong parameters in one."""
-    if judged.wrong:
-        return ["+".join(judged.wrong)]
+    """Names of a group: wrong parameters in one, then effects, the one that leaves least by itself
+    first.
+    """
     alone = {
         c.effects[0]: sum(e.ratio for e in c.held_out.values())
         for c in judged.group.candidates
         if len(c.effects) == 1
     }
-    return sorted(judged.named, key=lambda name: alone.get(name, np.inf))
+    wrong = ["+".join(judged.wrong)] if judged.wrong else []
+    effects = [name for name in judged.named if name in EFFECTS]
+    return [*wrong, *sorted(effects, key=lambda name: alone.get(name, np.inf))]
 
 
 def _terms(
     block: Block,
     before: Excess,
-    stages: list[Stage],
+    stages: list[_Stage],
     judged: Judged,
     final: Rig,
     settings: DiagnosisSettings,
@@ -154,13 +227,14 @@ def _terms(
     rng = np.random.default_rng(settings.seed)
     draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
     was = before
-    for kind, name, now in stages:
-        share, interval = _share(before, was, now, counts, draws)
-        named = name and kind != "held"
+    for stage in stages:
+        name, now = stage.name, stage.now
+        share, interval = _share(before, stage.drops, counts, draws)
+        named = name and stage.kind != "held"
         chance = judged.probabilities.get(name, judged.probability(name)) if named else None
         yield BudgetTerm(
             block=block.name,
-            kind=kind,
+            kind=stage.kind,
             id=name,
             form=form_in(final, name),
             share=share,
@@ -173,7 +247,7 @@ def _terms(
             parameters=_values(name, judged),
         )
         was = now
-    share, interval = _share(before, was, None, counts, draws)
+    share, interval = _share(before, [(was, None)], counts, draws)
     yield BudgetTerm(
         block=block.name,
         kind="unexplained",
@@ -207,18 +281,20 @@ def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
 
 
 def _share(
-    before: Excess, was: Excess, now: Excess | None, counts: Array, draws: Array
+    before: Excess, drops: Sequence[tuple[Excess, Excess | None]], counts: Array, draws: Array
 ) -> tuple[float, list[float]]:
-    """Share of the nominal model's excess variance that a step takes (the rest, where there is no
-    next one), and its interval of 95 % by a Bayesian bootstrap over the pieces of the recordings:
-    ``counts`` are the bins in each, ``draws`` as many weighted anew.
+    """Share of the nominal model's excess variance that a step takes, the mean of several drops (to
+    the noise, where there is no next step), and its interval of 95 % by a Bayesian bootstrap over
+    the pieces of the recordings: ``counts`` are the bins in each, ``draws`` as many weighted anew.
     """
-    first, upper, lower = (
-        np.array([r for r, _ in e.pieces]) if e is not None else np.ones(counts.size)
-        for e in (before, was, now)
-    )
+
+    def ratios(one: Excess | None) -> Array:
+        return np.array([r for r, _ in one.pieces]) if one is not None else np.ones(counts.size)
+
+    first = ratios(before)
+    taken = np.mean([ratios(upper) - ratios(lower) for upper, lower in drops], axis=0)
     excess_of = np.maximum(draws @ (first - 1.0), 1e-12)
-    shares = draws @ (upper - lower) / excess_of
+    shares = draws @ taken / excess_of
     whole = max(float(counts @ (first - 1.0)), 1e-12)
     low, high = np.quantile(shares, [0.025, 0.975])
-    return float(counts @ (upper - lower)) / whole, [float(low), float(high)]
+    return float(counts @ taken) / whole, [float(low), float(high)]

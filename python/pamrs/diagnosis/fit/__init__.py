@@ -7,7 +7,7 @@ the fit of an effect begins); `form_in`, `with_effects_of` (effects of a rig and
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
 `depends`, `fits` (where effects act); `holdable`, `without_passing`, `named_entries`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
-parameters).
+parameters); `spread_over_pieces` (standard deviations that hold for coloured residuals).
 """
 
 from __future__ import annotations
@@ -35,6 +35,7 @@ from pamrs.diagnosis.fit._held import (
     without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._spread import spread_over_pieces
 from pamrs.diagnosis.fit._starts import CHOSEN, Start, form_in, starts_of, with_effects_of
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
@@ -63,6 +64,7 @@ __all__ = [
     "look_for_events",
     "named_entries",
     "residuals",
+    "spread_over_pieces",
     "stacked",
     "starts_of",
     "with_effects_of",

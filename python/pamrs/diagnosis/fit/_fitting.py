@@ -125,6 +125,8 @@ class Fit:
         What happens in single recordings.
     freed : tuple of str
         Baseline parameters that no prior holds.
+    inflation : dict of str to float
+        Variance of each block's binned residual relative to white noise, by which it was weighted.
     """
 
     effects: tuple[str, ...]
@@ -139,6 +141,7 @@ class Fit:
     scales: dict[str, float] = field(default_factory=dict)
     events: Events | None = None
     freed: tuple[str, ...] = ()
+    inflation: dict[str, float] = field(default_factory=dict)
 
     @property
     def held_by_prior(self) -> dict[str, float]:
@@ -528,6 +531,7 @@ def fit(
         scales,
         events,
         loose,
+        dict(inflation),
     )
 
 
