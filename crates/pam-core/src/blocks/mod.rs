@@ -5,6 +5,7 @@ pub mod arm;
 pub mod chamber;
 pub mod gas;
 pub mod joint;
+pub mod pipe;
 pub mod supply;
 pub mod tube;
 pub mod valve;

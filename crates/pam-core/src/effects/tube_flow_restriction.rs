@@ -2,8 +2,9 @@
 //! that the model leaves out.
 //!
 //! Valve and tube in series without volume between them: the pressure at the node is that at which
-//! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`, the tube by ISO 6358 with its sonic
-//! conductance and a critical ratio of 0.3. The node is found by Newton steps inside a bracket; one
+//! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`. `iso_6358`: the tube has a sonic
+//! conductance and a critical ratio of 0.3. `pipe`: isothermal flow through a long pipe, laminar at
+//! small flows and turbulent at large ones ([`crate::blocks::pipe`]; Shapiro 1953). The node is found by Newton steps inside a bracket; one
 //! more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
 //! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014);
 //! Eckersten, "Simplified flow calculations for pneumatic components", 1975. A conductance of
@@ -18,10 +19,33 @@
 
 use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role, Use};
 use crate::blocks::gas::Gas;
+use crate::blocks::pipe::Pipe;
 use crate::blocks::tube::Tube;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 use num_dual::Dual64;
+
+const CONDUCTANCE: EffectParameter =
+    EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
+        .starts(&[1.2e-8])
+        .off(1.0)
+        .role(Use::Size)
+        .restricts()
+        .like("valve.discharge_area_max");
+
+const TAP: EffectParameter = EffectParameter::new("tap", "1", 0.0, 1.0, 0.0)
+    .starts(&[0.0, 1.0])
+    .role(Use::Choice)
+    .needed_in(&["arm"]);
+
+const ISO_6358: Form = Form {
+    name: "iso_6358",
+    parameters: &[CONDUCTANCE, TAP],
+    states: &[EffectState { name: "reading", role: Role::Keeps }],
+    integrates: false,
+    ports: &[Port::Passage],
+    make: made_by!(make),
+};
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -30,26 +54,20 @@ pub const INFO: EffectInfo = EffectInfo {
     at: "valve",
     at_rest: &[AtRest::Set("tap", 0.0)],
     acts_in: &["supply", "chamber", "arm"],
-    source: "ISO 6358-3; Eckersten (1975)",
-    forms: &[Form {
-        name: "iso_6358",
-        parameters: &[
-            EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
-                .starts(&[1.2e-8])
-                .off(1.0)
-                .role(Use::Size)
-                .restricts()
-                .like("valve.discharge_area_max"),
-            EffectParameter::new("tap", "1", 0.0, 1.0, 0.0)
-                .starts(&[0.0, 1.0])
-                .role(Use::Choice)
-                .needed_in(&["arm"]),
-        ],
-        states: &[EffectState { name: "reading", role: Role::Keeps }],
-        integrates: false,
-        ports: &[Port::Passage],
-        make: made_by!(make),
-    }],
+    source: "ISO 6358-3; Eckersten (1975); Shapiro (1953) for the form pipe",
+    forms: &[
+        ISO_6358,
+        Form {
+            name: "pipe",
+            parameters: &[
+                CONDUCTANCE,
+                TAP,
+                EffectParameter::new("laminar_pressure", "Pa", 10.0, 1e7, 2e4).starts(&[2e4]),
+            ],
+            make: made_by!(pipe),
+            ..ISO_6358
+        },
+    ],
     ..EffectInfo::USUAL
 };
 
@@ -61,8 +79,52 @@ const CRITICAL_RATIO: f64 = 0.3;
 const MOST_STEPS: usize = 60;
 
 /// The tube of a conductance.
-pub fn tube<S: Scalar>(conductance: S, temperature: f64) -> Tube<S> {
-    Tube::of_conductance(conductance, constant(CRITICAL_RATIO), temperature)
+pub fn tube<S: Scalar>(conductance: S, temperature: f64) -> Passage<S> {
+    Passage::Tube(Tube::of_conductance(conductance, constant(CRITICAL_RATIO), temperature))
+}
+
+/// What is in series with a valve.
+#[derive(Debug, Clone, Copy)]
+pub enum Passage<S> {
+    /// By ISO 6358.
+    Tube(Tube<S>),
+    /// Long enough for friction along it.
+    Pipe(Pipe<S>),
+}
+
+impl<S: Scalar> Passage<S> {
+    #[inline]
+    fn re(&self) -> Passage<f64> {
+        match self {
+            Self::Tube(tube) => Passage::Tube(tube.re()),
+            Self::Pipe(pipe) => Passage::Pipe(pipe.re()),
+        }
+    }
+
+    #[inline]
+    fn mass_flow(&self, upstream: S, downstream: S) -> S {
+        match self {
+            Self::Tube(tube) => tube.mass_flow(upstream, downstream),
+            Self::Pipe(pipe) => pipe.mass_flow(upstream, downstream),
+        }
+    }
+
+    fn other_end(&self, here: S, flow: S) -> S {
+        match self {
+            Self::Tube(tube) => tube.other_end(here, flow),
+            Self::Pipe(pipe) => pipe.other_end(here, flow),
+        }
+    }
+}
+
+impl Passage<f64> {
+    #[inline]
+    fn lift<S: Scalar>(&self) -> Passage<S> {
+        match self {
+            Self::Tube(tube) => Passage::Tube(tube.lift()),
+            Self::Pipe(pipe) => Passage::Pipe(pipe.lift()),
+        }
+    }
 }
 
 /// Mass flow [kg/s] through an area [m2] and then a tube, between two absolute pressures [Pa]; the
@@ -70,7 +132,7 @@ pub fn tube<S: Scalar>(conductance: S, temperature: f64) -> Tube<S> {
 pub fn mass_flow<S: Scalar>(
     gas: &Gas,
     area: S,
-    tube: &Tube<S>,
+    tube: &Passage<S>,
     upstream: S,
     downstream: S,
     tube_first: bool,
@@ -86,7 +148,7 @@ pub fn mass_flow<S: Scalar>(
 pub fn node<S: Scalar>(
     gas: &Gas,
     area: S,
-    tube: &Tube<S>,
+    tube: &Passage<S>,
     upstream: S,
     downstream: S,
     tube_first: bool,
@@ -100,7 +162,7 @@ pub fn node<S: Scalar>(
 struct Series<'a, S> {
     gas: &'a Gas,
     area: S,
-    tube: Tube<S>,
+    tube: Passage<S>,
     tube_first: bool,
 }
 
@@ -182,15 +244,23 @@ impl Parts for Dual64 {
 #[derive(Debug, Clone, Copy)]
 struct Hose<S> {
     /// None where it restricts nothing.
-    tube: Option<Tube<S>>,
+    tube: Option<Passage<S>>,
     tapped: bool,
 }
 
-fn make<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
+fn hose<S: Scalar>(values: &[S], passage: Passage<S>) -> Box<dyn Effect<S>> {
     Box::new(Hose {
-        tube: (values[0].re() < NONE).then(|| tube(values[0], gas.temperature)),
+        tube: (values[0].re() < NONE).then_some(passage),
         tapped: values[1].re() >= AT_VALVE,
     })
+}
+
+fn make<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
+    hose(values, tube(values[0], gas.temperature))
+}
+
+fn pipe<S: Scalar>(values: &[S], gas: &Gas) -> Box<dyn Effect<S>> {
+    hose(values, Passage::Pipe(Pipe::new(values[0], values[2], gas.temperature)))
 }
 
 impl<S: Scalar> Effect<S> for Hose<S> {
