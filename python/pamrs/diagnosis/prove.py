@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._writing import write_atomically
+from pamrs._writing import check_writable, write_atomically
 from pamrs.diagnosis.result import READABLE
 from pamrs.errors import CaseError, ParameterError
 
@@ -226,11 +226,17 @@ def worker(words: Sequence[str] | None = None) -> int:
     """
     case, out = sys.argv[1:] if words is None else words
     from pamrs.diagnosis import diagnose
-    from pamrs.errors import PamrsError
+    from pamrs.errors import NotWrittenError, PamrsError
 
     try:
         result = diagnose(case)
-        write_atomically(out, result.to_json())
+        try:
+            write_atomically(out, result.to_json())
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise NotWrittenError(
+                f"diagnosed ({result.verdict}), but {out} could not be written ({why})"
+            ) from error
     except (PamrsError, OSError) as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         return 2
@@ -411,6 +417,7 @@ def prove(
     found, manifest = cases_of(folder)
     target = Path(folder) / "results" if results is None else Path(results)
     target.mkdir(parents=True, exist_ok=True)
+    check_writable(target / "run.json")
     tell = say or (lambda text: None)
     run = _Run.of(found[:limit], target, jobs, manifest, fresh=fresh)
     kept = len(run.entries)
