@@ -51,6 +51,12 @@ def diagnose_command(
             help="Write the commands of the proposed next experiment (CSV: time and commands)."
         ),
     ] = None,
+    allow_outside: Annotated[
+        bool,
+        typer.Option(
+            "--allow-outside", help="Rig file and recordings may lie outside the case folder."
+        ),
+    ] = False,
     plan: Annotated[
         Path | None,
         typer.Option(
@@ -97,7 +103,7 @@ def diagnose_command(
     check_packages(
         "report", *(["jinja2"] if report else []), *(["matplotlib"] if report or png else [])
     )
-    loaded = load_case(case)
+    loaded = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         from pamrs.rig import load_rig
 

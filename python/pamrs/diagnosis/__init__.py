@@ -140,6 +140,7 @@ def diagnose(
     case: Case | str | os.PathLike[str],
     *,
     rig: Rig | str | os.PathLike[str] | None = None,
+    allow_outside: bool = False,
     settings: DiagnosisSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -154,6 +155,8 @@ def diagnose(
     rig : Rig or path-like, optional
         A model to begin from in the place of the case's own, for example one with the effects that
         an earlier diagnosis found.
+    allow_outside : bool
+        Whether rig file and recordings of a case folder may lie outside of it.
     settings : DiagnosisSettings, optional
         The numbers that the verdict rests on; those of the published trials by default.
     progress : callable, optional
@@ -179,13 +182,13 @@ def diagnose(
     Examples
     --------
     >>> import pamrs
-    >>> pamrs.diagnose("cases/zillen_chambers/Ultimaker_020").verdict  # doctest: +SKIP
+    >>> pamrs.diagnose("my_case").verdict  # doctest: +SKIP
     'effects'
     """
     began = time.perf_counter()
     say = progress or _quiet
     if not isinstance(case, Case):
-        case = load_case(case)
+        case = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
