@@ -37,6 +37,7 @@ from pamrs.diagnosis.prepare import (
     check_plausible,
     check_sense,
     prepare,
+    without_copies,
 )
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -196,6 +197,8 @@ def diagnose(
     case = case.with_rig(without_passing(case.rig))
     chosen = DiagnosisSettings() if settings is None else settings
     check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    kept, copies = without_copies(case.recordings, chosen.overlap)
+    case = replace(case, recordings=kept)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, left_out = _problems(case, chosen)
     blocks = inner.blocks
@@ -208,7 +211,7 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*held, *left_out, *diagnosis.warnings]
+    warnings = [*copies, *held, *left_out, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(

@@ -1,7 +1,8 @@
 """Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted
 from their measured neighbours.
 
-Public: `check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
+Public: `overlap`, `without_copies`, `Overlap` (recordings that hold the same samples),
+`check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
 `Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
 `begun`, `change`, `predicted`, `residual` (blocks and their residuals).
 """
@@ -17,11 +18,13 @@ from pamrs.diagnosis.prepare._blocks import (
     predicted,
     residual,
 )
+from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
 from pamrs.diagnosis.prepare._plausible import check_plausible, check_sense, implausible
 from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
 
 __all__ = [
     "Block",
+    "Overlap",
     "Prepared",
     "Residual",
     "available_blocks",
@@ -32,8 +35,10 @@ __all__ = [
     "check_sense",
     "implausible",
     "noise_level",
+    "overlap",
     "predicted",
     "prepare",
     "residual",
     "smoothed",
+    "without_copies",
 ]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.settings._setting import SettingsGroup, setting
 
-__all__ = ["NoiseSettings", "PlausibilitySettings", "PrepareSettings"]
+__all__ = ["NoiseSettings", "OverlapSettings", "PlausibilitySettings", "PrepareSettings"]
 
 
 @dataclass(frozen=True)
@@ -165,6 +165,92 @@ class PrepareSettings(SettingsGroup):
         above=0.0,
         reason="the same for a sealed chamber, whose pressure hardly moves",
         origin="judgement: the error is below the noise level (docs/convergence.md)",
+    )
+
+
+@dataclass(frozen=True)
+class OverlapSettings(SettingsGroup):
+    """When two recordings hold the same samples, so that one proves nothing of the other."""
+
+    noise_share: float = setting(
+        0.5,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="error of one recording's samples told by the other's, over that told by their own "
+        "neighbours, below which their noise is the same: 0 for a copy, about 1 for a repetition",
+        origin="docs/decisions/0039",
+    )
+    usual_share: float = setting(
+        0.9,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of a window's samples that are compared; steps of the signal are left out",
+        origin="judgement",
+    )
+    least_alive: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a window's samples that differ from the one before: at rest on one step "
+        "of a converter two recordings are equal by chance",
+        origin="judgement",
+    )
+    window_samples: int = setting(
+        64,
+        unit="count",
+        least=16,
+        reason="samples of a window in which noise is compared",
+        origin="judgement: the mean of so many differs by a tenth by chance",
+    )
+    least_samples: int = setting(
+        192,
+        unit="count",
+        least=16,
+        reason="samples that are shared at the least: three windows",
+        origin="judgement",
+    )
+    copy_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a recording that is in another one of its role before it is left out",
+        origin="judgement",
+    )
+    lags: int = setting(
+        8, unit="count", least=1, reason="shifts in time that are looked at", origin="judgement"
+    )
+    most_rate_ratio: float = setting(
+        50.0,
+        unit="1",
+        least=1.0,
+        reason="ratio of sample times up to which recordings are compared",
+        origin="judgement",
+    )
+    block_samples: int = setting(
+        256,
+        unit="count",
+        least=64,
+        reason="samples for which one linear combination tells a resampled recording",
+        origin="judgement",
+    )
+    reach: float = setting(
+        10.0,
+        unit="1",
+        above=0.0,
+        reason="samples on either side from which a resampled one is told, for each sample of the "
+        "slower recording",
+        origin="the usual length of filters for resampling",
+    )
+    most_reach: int = setting(
+        40,
+        unit="count",
+        least=2,
+        reason="the same at the most: the combination has far fewer terms than a block has samples",
+        origin="judgement",
     )
 
 
