@@ -27,13 +27,14 @@ from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
-from pamrs.diagnosis.explain import assemble
+from pamrs.diagnosis.explain import assemble, data_used
 from pamrs.diagnosis.fit import Problem, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
     available_blocks,
+    averaged_to_need,
     check_plausible,
     check_sense,
     prepare,
@@ -199,6 +200,9 @@ def diagnose(
     check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
     kept, copies = without_copies(case.recordings, chosen.overlap)
     case = replace(case, recordings=kept)
+    seen = available_blocks(case.rig, case.channels, chosen.prepare)
+    shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
+    case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, left_out = _problems(case, chosen)
     blocks = inner.blocks
@@ -222,7 +226,10 @@ def diagnose(
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    return replace(diagnosis, warnings=warnings, seconds=round(time.perf_counter() - began, 3))
+    data = data_used(case.recordings, counts, blocks, case.rig, inner.core, left_out=bool(left_out))
+    return replace(
+        diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
+    )
 
 
 def _examined(

@@ -1,7 +1,8 @@
 """Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted
 from their measured neighbours.
 
-Public: `overlap`, `without_copies`, `Overlap` (recordings that hold the same samples),
+Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_copies`, `Overlap`
+(recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
 `Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
 `begun`, `change`, `predicted`, `residual` (blocks and their residuals).
@@ -9,6 +10,7 @@ Public: `overlap`, `without_copies`, `Overlap` (recordings that hold the same sa
 
 from __future__ import annotations
 
+from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Residual,
@@ -28,6 +30,8 @@ __all__ = [
     "Prepared",
     "Residual",
     "available_blocks",
+    "averaged",
+    "averaged_to_need",
     "begun",
     "binned",
     "change",

@@ -118,15 +118,13 @@ def overlap(one: Recording, other: Recording, settings: OverlapSettings) -> Over
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
     if slow.sample_time > settings.most_rate_ratio * fast.sample_time:
         return None
-    best: tuple[int, float, Mask] | None = None
-    for lag in _lags(slow, fast, names, settings):
-        same = _same(slow, fast, names, lag, settings)
-        if best is None or same.sum() > best[0]:
-            best = int(same.sum()), lag, same
-    if best is None or best[0] < settings.least_samples:
+    found = [
+        (lag, *_same(slow, fast, names, lag, settings))
+        for lag in _lags(slow, fast, names, settings)
+    ]
+    lag, rows, count = max(found, key=lambda one: one[1].size)
+    if rows.size < settings.least_samples:
         return None
-    count, lag, same = best
-    rows = np.flatnonzero(same)
     at = float(slow.time[rows[0]]), float(slow.time[rows[-1]])
     shifted = at[0] + lag, at[1] + lag
     own, away = (at, shifted) if slow is one else (shifted, at)
@@ -167,40 +165,52 @@ def _lags(
 
 def _same(
     slow: Recording, fast: Recording, names: list[str], lag: float, settings: OverlapSettings
-) -> Mask:
-    """Where the slow recording's samples are told by those of the fast one at a lag."""
+) -> tuple[NDArray[np.intp], float]:
+    """Which of the slow recording's samples are told by those of the fast one at a lag, and how
+    many that makes of all.
+    """
     ratio = slow.sample_time / fast.sample_time
     reach = min(settings.most_reach, round(settings.reach * ratio))
-    told = np.zeros(len(slow), dtype=bool)
-    denied = np.zeros(len(slow), dtype=bool)
     at = slow.time + lag
     inside = (at > -0.5 * slow.sample_time) & (at < fast.duration + 0.5 * slow.sample_time)
+    rows, beside = _looked_at(inside, settings), settings.beside_samples
+    told, denied = np.zeros(rows.size, dtype=bool), np.zeros(rows.size, dtype=bool)
     for name in names:
         filled = _filled(slow, name)
         centre = float(filled.mean())
-        values, source = filled - centre, _filled(fast, name) - centre
+        values, source = filled[rows] - centre, _filled(fast, name) - centre
         steps = np.arange(-reach, reach + 1) * fast.sample_time
-        others = np.stack([np.interp(at + step, fast.time, source) for step in steps], axis=1)
-        near = [np.roll(values, k) for k in (-4, -3, -2, -1, 1, 2, 3, 4)]
-        good = inside & slow.mask[name]
-        good[:4] = good[-4:] = False
+        others = np.stack([np.interp(at[rows] + s, fast.time, source) for s in steps], axis=1)
+        own = [k for k in range(-beside, beside + 1) if k]
+        near = np.stack([np.roll(filled, k)[rows] - centre for k in own], axis=1)
+        good = slow.mask[name][rows] & (rows >= beside) & (rows < len(slow) - beside)
         if good.sum() < settings.least_samples:
             continue
         left = _left(values, others, good, settings.block_samples)
-        alone = _left(values, np.stack(near, axis=1), good, settings.block_samples)
-        for a in range(0, len(slow), settings.window_samples):
-            rows = np.flatnonzero(good[a : a + settings.window_samples]) + a
-            if rows.size < settings.window_samples // 2:
+        alone = _left(values, near, good, settings.block_samples)
+        for a in range(0, rows.size, settings.window_samples):
+            window = np.flatnonzero(good[a : a + settings.window_samples]) + a
+            if window.size < settings.window_samples // 2:
                 continue
-            usual = rows[alone[rows] <= np.quantile(alone[rows], settings.usual_share)]
+            usual = window[alone[window] <= np.quantile(alone[window], settings.usual_share)]
             size = float(alone[usual].mean())
-            alive = float(np.mean(np.diff(filled[rows]) != 0.0))
-            rounding = 1e-12 * max(float(np.abs(filled[rows]).max()), 1e-300)
+            alive = float(np.mean(np.diff(values[window]) != 0.0))
+            rounding = 1e-12 * max(float(np.abs(filled[rows[window]]).max()), 1e-300)
             if alive < settings.least_alive or size <= rounding:
                 continue  # at rest on one step of the converter: equal by chance
             span = slice(a, a + settings.window_samples)
             (told if left[usual].mean() < settings.noise_share * size else denied)[span] = True
-    return told & ~denied & inside
+    same = told & ~denied
+    return rows[same], float(same.sum()) * float(inside.sum()) / max(rows.size, 1)
+
+
+def _looked_at(inside: Mask, settings: OverlapSettings) -> NDArray[np.intp]:
+    """The rows that are compared: all, of long recordings blocks spread over them."""
+    rows, block = np.flatnonzero(inside), settings.block_samples
+    if rows.size <= settings.most_blocks * block:
+        return rows
+    starts = np.linspace(0, rows.size - block, settings.most_blocks).astype(int)
+    return np.asarray(rows[(starts[:, None] + np.arange(block)).ravel()])
 
 
 def _left(values: Array, by: Array, rows: Mask, block: int) -> Array:

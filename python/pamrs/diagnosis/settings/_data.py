@@ -83,6 +83,35 @@ class PrepareSettings(SettingsGroup):
         reason="fewest samples of a recording that can be diagnosed",
         origin="judgement",
     )
+    ample_samples: int = setting(
+        250_000,
+        unit="count",
+        least=32,
+        reason="samples of all recordings of a case up to which they are used as they are; more "
+        "are averaged to the sample time that the fastest block needs",
+        origin="docs/decisions/0039: the published trials stay below it",
+    )
+    most_samples: int = setting(
+        500_000,
+        unit="count",
+        least=32,
+        reason="samples of a case, averaged where they can be, that are diagnosed at all",
+        origin="docs/decisions/0039: some five minutes",
+    )
+    needed_sample_time: float = setting(
+        0.005,
+        unit="s",
+        above=0.0,
+        reason="sample time that tanks, fed chambers, joints and loads need",
+        origin="that of the published trials",
+    )
+    needed_sealed_sample_time: float = setting(
+        0.1,
+        unit="s",
+        above=0.0,
+        reason="the same where every block is a sealed chamber, whose pressure hardly moves",
+        origin="judgement: the recordings of printed chambers",
+    )
     least_channel_samples: int = setting(
         16,
         unit="count",
@@ -229,6 +258,20 @@ class OverlapSettings(SettingsGroup):
         least=1.0,
         reason="ratio of sample times up to which recordings are compared",
         origin="judgement",
+    )
+    beside_samples: int = setting(
+        4,
+        unit="count",
+        least=1,
+        reason="neighbours on either side by which a sample is told without the other recording",
+        origin="judgement",
+    )
+    most_blocks: int = setting(
+        200,
+        unit="count",
+        least=4,
+        reason="blocks of a long recording that are compared, spread over it",
+        origin="judgement: seconds for a recording of a million samples",
     )
     block_samples: int = setting(
         256,
