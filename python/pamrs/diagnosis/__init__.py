@@ -39,6 +39,7 @@ from pamrs.diagnosis.prepare import (
     check_sense,
     prepare,
     without_copies,
+    without_impossible,
 )
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -198,6 +199,8 @@ def diagnose(
     case = case.with_rig(without_passing(case.rig))
     chosen = DiagnosisSettings() if settings is None else settings
     check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
+    case = replace(case, recordings=sound)
     kept, copies = without_copies(case.recordings, chosen.overlap)
     case = replace(case, recordings=kept)
     seen = available_blocks(case.rig, case.channels, chosen.prepare)
@@ -215,7 +218,7 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*copies, *held, *left_out, *diagnosis.warnings]
+    warnings = [*copies, *masked, *held, *left_out, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(

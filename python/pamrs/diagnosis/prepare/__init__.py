@@ -3,7 +3,8 @@ from their measured neighbours.
 
 Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
+`check_plausible`, `check_sense`, `implausible`, `without_impossible` (what recordings
+cannot be), `prepare`,
 `Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
 `begun`, `change`, `predicted`, `residual` (blocks and their residuals).
 """
@@ -21,7 +22,12 @@ from pamrs.diagnosis.prepare._blocks import (
     residual,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
-from pamrs.diagnosis.prepare._plausible import check_plausible, check_sense, implausible
+from pamrs.diagnosis.prepare._plausible import (
+    check_plausible,
+    check_sense,
+    implausible,
+    without_impossible,
+)
 from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
 
 __all__ = [
@@ -45,4 +51,5 @@ __all__ = [
     "residual",
     "smoothed",
     "without_copies",
+    "without_impossible",
 ]

@@ -308,6 +308,13 @@ class PlausibilitySettings(SettingsGroup):
         reason="gauge pressure that a pressure channel exceeds somewhere, or it is in another unit",
         origin="judgement: bar under a heading in Pa stays below it",
     )
+    least_gauge_pressure: float = setting(
+        -1.1e5,
+        unit="Pa",
+        most=0.0,
+        reason="gauge pressure below which a sample is no pressure: a vacuum is at -101 kPa",
+        origin="judgement: with the error of a transducer",
+    )
     most_pressure: float = setting(
         1e7,
         unit="Pa",
