@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import os
 import tempfile
+from collections.abc import Iterable
 from pathlib import Path
+from typing import Final
 
-__all__ = ["write_atomically"]
+from pamrs.errors import ParameterError
+
+__all__ = ["check_writable", "write_atomically"]
+
+_ROOM: Final = 1 << 20
+"""Bytes that must fit where a file is to be written: a result with its page and pictures."""
 
 
 _UMASK = os.umask(0)  # it can only be read by setting it: once, at import
@@ -36,3 +43,58 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
         Path(temporary).unlink(missing_ok=True)
         raise
     return Path(path)
+
+
+def check_writable(*paths: str | os.PathLike[str] | None) -> None:
+    """Refuse outputs that could not be written, before any long work starts.
+
+    Parameters
+    ----------
+    *paths : path-like or None
+        Files that are to be written; None is passed over. Nothing is left behind.
+
+    Raises
+    ------
+    OSError
+        If a folder does not exist, is full or does not let files be made in it, or a path is a
+        folder itself or a file that must not be written.
+    ParameterError
+        If two of them are the same file.
+    """
+    wanted = [Path(path) for path in paths if path is not None]
+    for path in wanted:
+        _check_writable(path)
+    _check_different(path for path in wanted if not path.exists() or path.is_file())
+
+
+def _check_writable(path: Path) -> None:
+    if not path.absolute().parent.is_dir():
+        raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise IsADirectoryError(f"{path}: cannot be written, it is a folder; a file is needed")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(f"{path}: cannot be written, the file is read-only")
+    if target.exists() and not target.is_file():
+        return  # a pipe or a terminal
+    try:
+        with tempfile.TemporaryFile(dir=target.parent, prefix=f".{target.name[:40]}.") as stream:
+            stream.write(bytes(_ROOM))
+            stream.flush()
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise OSError(
+            f"{path}: cannot be written, the folder {target.parent} takes no file of "
+            f"{_ROOM >> 20} MB ({why})"
+        ) from error
+
+
+def _check_different(paths: Iterable[Path]) -> None:
+    seen: dict[str, Path] = {}
+    for path in paths:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise ParameterError(
+                f"{seen[real]} and {path} are the same file: each result needs one of its own"
+            )
+        seen[real] = path

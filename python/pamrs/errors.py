@@ -39,6 +39,10 @@ class FitError(PamrsError, ValueError):
     """The measurements do not determine what a fit asks for; the message says what is missing."""
 
 
+class NotWrittenError(PamrsError, OSError):
+    """The work was done, and a file of its result could not be written; the message names each."""
+
+
 class MissingPackageError(PamrsError, ImportError):
     """A package that only some commands need is not installed."""
 

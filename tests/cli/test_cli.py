@@ -164,7 +164,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
         name = "a case"
         path = tmp_path
 
-    monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder: Loaded())
+    monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder, **options: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())
     options = ("report", "json", "png", "model", "experiment")
     paths = {word: tmp_path / f"out.{word}" for word in options}

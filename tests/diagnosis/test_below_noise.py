@@ -73,8 +73,10 @@ def test_rivals_below_the_noise_that_look_alike_stay_a_set() -> None:
         )
     )
     assert found.verdict == "effects"
+    # a family of many forms gets more of it than a rival of one; nothing is settled
     assert ["input_path_lag"] in found.ambiguity
-    assert max(found.probabilities.values()) < 0.6
+    assert ["clock_skew"] in found.ambiguity
+    assert max(found.probabilities.values()) < 0.75
 
 
 def test_noise_alone_has_no_effect_below_it() -> None:

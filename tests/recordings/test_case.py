@@ -58,7 +58,10 @@ def test_roles_names_and_files_outside(tmp_path: Path) -> None:
     )
     home = folder(tmp_path, TOML + extra)
     (tmp_path / "elsewhere.csv").write_bytes((home / "run.csv").read_bytes())
-    case = load_case(home)
+    message = refused(home)
+    assert "'../elsewhere.csv': lies outside the case folder" in message
+    assert "--allow-outside" in message
+    case = load_case(home, allow_outside=True)
     assert [recording.name for recording in case.held_out] == ["proof"]
     assert case.held_out[0].sample_time == 0.2
 
@@ -143,7 +146,7 @@ def test_sealed_cases_load(path: Path) -> None:
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the recordings are not beside the project")
 @pytest.mark.parametrize("path", sorted(CHAMBERS.glob("*/")), ids=lambda path: path.name)
 def test_chambers_load(path: Path) -> None:
-    case = load_case(path)
+    case = load_case(path, allow_outside=True)
     (recording,) = case.recordings
     assert not case.rig.parameters["chamber.dead_volume"].known
     assert {issue.kind for issue in recording.issues} <= {"gap"}

@@ -2,8 +2,10 @@
 ``simulate``, ``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
-command did its work (a diagnosis that finds nothing missing included), 2 when the input is wrong, 3
-when ``prove`` has a case without a result. Everything heavy is imported inside the command that
+command did its work (a diagnosis that finds nothing missing included), 1 when it was interrupted, 2
+when the input is wrong or an output could not be written from the start (nothing was done then), 3
+when ``prove`` has a case without a result, 4 when the work was done and its text printed, but a
+file of it could not be written. Everything heavy is imported inside the command that
 needs it, so that ``pamrs --help`` answers at once.
 """
 
@@ -11,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from typing import Annotated, Final
 
 import typer
 
@@ -26,13 +28,21 @@ from pamrs.cli.reproduce import reproduce_command
 from pamrs.cli.rig import rig_app
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
+from pamrs.errors import NotWrittenError
 
-__all__ = ["app", "main"]
+__all__ = ["NOT_WRITTEN", "app", "main"]
+
+NOT_WRITTEN: Final = 4
+"""Exit code when the work was done, but a file of its result could not be written."""
 
 app = typer.Typer(
     name="pamrs",
     help=(
         "Simulate pneumatic artificial muscles, and find the physics that a simulation leaves out."
+    ),
+    epilog=(
+        "Exit codes: 0 done; 1 interrupted; 2 wrong input, nothing done; 3 prove: a case has no "
+        "result; 4 done and printed, but a file could not be written."
     ),
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -91,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a
-        case without a result.
+        case without a result, 4 done and told on standard output, but a file could not be written.
 
     Examples
     --------
@@ -105,6 +115,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, EOFError, typer.Abort):
         typer.echo("pamrs: interrupted", err=True)
         return 1
+    except NotWrittenError as error:
+        typer.echo(f"pamrs: error: {_one_line(error)}", err=True)
+        return NOT_WRITTEN
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
         typer.echo(f"pamrs: error: {where}{error.strerror or _one_line(error)}", err=True)

@@ -7,12 +7,14 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import typer
+
+from pamrs._writing import check_writable
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
@@ -21,6 +23,7 @@ __all__ = [
     "GEOMETRY",
     "QUANTITY",
     "as_given",
+    "check_packages",
     "check_writable",
     "exact",
     "named_muscle",
@@ -119,13 +122,69 @@ def rig_named(file: Path) -> Rig:
     )
 
 
-def write(contents: Mapping[Path, str | bytes]) -> None:
-    """Write every file, and say so."""
-    from pamrs._writing import write_atomically
+def check_packages(extra: str, *packages: str) -> None:
+    """Refuse, before any long work starts, what needs a package that is not installed.
 
+    Parameters
+    ----------
+    extra : str
+        The extra of pamrs that installs them.
+    *packages : str
+        What is imported.
+
+    Raises
+    ------
+    MissingPackageError
+        If one is missing; names it and the extra.
+    """
+    import importlib
+
+    from pamrs.errors import missing_package
+
+    for package in packages:
+        try:
+            importlib.import_module(package)
+        except ImportError as error:
+            raise missing_package(error, extra) from error
+
+
+def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]]) -> None:
+    """Write every file, and say so; one that fails does not keep the others from being written.
+
+    Parameters
+    ----------
+    contents : mapping of Path to str, bytes or callable
+        What is to be in each file, or what writes it, given its path.
+
+    Raises
+    ------
+    NotWrittenError
+        If some could not be written; names each, and why.
+    ParameterError
+        If a file cannot be made from what was asked for.
+    """
+    from pamrs._writing import write_atomically
+    from pamrs.errors import NotWrittenError, ParameterError
+
+    failed: list[str] = []
+    refused: ParameterError | None = None
     for path, content in contents.items():
-        write_atomically(path, content)
-        typer.echo(f"written: {path}", err=True)
+        try:
+            if callable(content):
+                content(path)
+            else:
+                write_atomically(path, content)
+        except ParameterError as error:
+            refused = refused or error
+        except Exception as error:  # a drawing that fails must not cost the other files
+            why = getattr(error, "strerror", None) or str(error) or type(error).__name__
+            failed.append(f"{path} ({why})")
+        else:
+            typer.echo(f"written: {path}", err=True)
+    if refused is not None:
+        raise refused
+    if failed:
+        raise NotWrittenError(f"the work is done, but not written: {'; '.join(failed)}")
 
 
 @contextmanager
@@ -141,10 +200,3 @@ def progress(text: str) -> Iterator[None]:
         typer.echo(f"{text} ...", err=True)
         yield
     typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)
-
-
-def check_writable(*paths: Path | None) -> None:
-    """Refuse an output whose folder does not exist before any long work starts."""
-    for path in paths:
-        if path is not None and not path.absolute().parent.is_dir():
-            raise FileNotFoundError(f"{path}: the folder {path.parent} does not exist")

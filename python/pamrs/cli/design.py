@@ -101,14 +101,17 @@ def _joint(
     search = _Search(method, evaluations, mutation, seed)
     found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
-    contents: dict[Path, str | bytes] = {}
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
     if json is not None:
         contents[json] = _json(title, found)
-    if png is not None and draw is not None:
-        caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
-        contents[png] = draw(found.design, caption, comparison=found.comparison, front=found.front)
     if rig_joint is not None:
         contents[rig_joint] = found.design.to_toml()
+    if png is not None and draw is not None:
+        from pamrs._writing import write_atomically
+
+        caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
+        shown = {"comparison": found.comparison, "front": found.front}
+        contents[png] = lambda path: write_atomically(path, draw(found.design, caption, **shown))
     typer.echo(title)
     typer.echo(_summary(found))
     write(contents)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pamrs.cli._shared import check_writable, exact, progress, rig_named, write
+from pamrs.cli._shared import check_packages, check_writable, exact, progress, rig_named, write
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
@@ -49,6 +51,12 @@ def diagnose_command(
             help="Write the commands of the proposed next experiment (CSV: time and commands)."
         ),
     ] = None,
+    allow_outside: Annotated[
+        bool,
+        typer.Option(
+            "--allow-outside", help="Rig file and recordings may lie outside the case folder."
+        ),
+    ] = False,
     plan: Annotated[
         Path | None,
         typer.Option(
@@ -71,6 +79,9 @@ def diagnose_command(
 ) -> None:
     """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
     could be found at all.
+
+    The verdict is printed before files are written. Exit code 0: diagnosed; 2: not diagnosed; 4:
+    diagnosed, but some file could not be written.
     """
     check_writable(report, json, png, model, experiment)
     if plan is not None:
@@ -86,9 +97,13 @@ def diagnose_command(
         )
     if not (channels is None and pressure_noise is None and angle_noise is None):
         raise typer.BadParameter("--channels, --pressure-noise and --angle-noise need --plan")
+    from pamrs._writing import write_atomically
     from pamrs.recordings import load_case
 
-    loaded = load_case(case)
+    check_packages(
+        "report", *(["jinja2"] if report else []), *(["matplotlib"] if report or png else [])
+    )
+    loaded = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         from pamrs.rig import load_rig
 
@@ -97,37 +112,34 @@ def diagnose_command(
 
     with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded)
-    if json is not None:
-        result.to_json(json)
-    if model is not None:
-        from pamrs._writing import write_atomically
-
-        write_atomically(model, _model_text(result, loaded, model))
-    if experiment is not None:
-        experiment = _written_experiment(result, experiment)
-    if report is not None:
-        result.report(report)
-    if png is not None:
-        result.figure(png)
     typer.echo(result.summary())
-    for path in (report, json, png, model, experiment):
-        if path is not None:
-            typer.echo(f"written: {path}", err=True)
+    sys.stdout.flush()
+    files: dict[Path | None, Callable[[Path], object]] = {
+        json: result.to_json,
+        model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
+        _playable(result, experiment): lambda path: write_atomically(path, _commands(result)),
+        png: result.figure,
+        report: result.report,
+    }
+    write({path: how for path, how in files.items() if path is not None})
 
 
-def _written_experiment(result: Diagnosis, file: Path) -> Path | None:
-    """The commands of the next experiment as a file; None, and why, where there are none."""
-    protocol = result.next_experiment.protocol
-    if protocol is None:
+def _playable(result: Diagnosis, file: Path | None) -> Path | None:
+    """The file for the commands of the next experiment; None, and why, where there are none."""
+    if file is not None and result.next_experiment.protocol is None:
         typer.echo(
             f"not written: {file}: the next experiment has no commands to play "
             "(it is none, or done by hand)",
             err=True,
         )
         return None
-    from pamrs._writing import write_atomically
+    return file
 
-    return write_atomically(file, protocol.to_csv())
+
+def _commands(result: Diagnosis) -> str:
+    """The commands of the next experiment as CSV; none where there are none."""
+    protocol = result.next_experiment.protocol
+    return "" if protocol is None else protocol.to_csv()
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
@@ -177,6 +189,6 @@ def _plan(
     )
     with progress(f"planning for {loaded.name}"):
         result = plan_diagnosis(loaded, given, noise=noise)
+    typer.echo(result.text())
     if json is not None:
         write({json: dumps(result.to_dict(), indent=2) + "\n"})
-    typer.echo(result.text())

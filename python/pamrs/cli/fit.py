@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -12,7 +12,15 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from pamrs.cli._shared import GEOMETRY, check_writable, named_muscle, progress, quantity, write
+from pamrs.cli._shared import (
+    GEOMETRY,
+    check_packages,
+    check_writable,
+    named_muscle,
+    progress,
+    quantity,
+    write,
+)
 
 if TYPE_CHECKING:
     from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
@@ -135,6 +143,8 @@ def _muscle(
     """Fit a muscle's force model to measured forces over length and pressure."""
     outputs = _Outputs(report=report, rig=rig, json=json, png=png)
     check_writable(report, rig, json, png)
+    drawn = ["matplotlib"] if report or png else []
+    check_packages("report", *(["jinja2", "markupsafe"] if report else []), *drawn)
     if per_level and rig is not None:
         raise typer.BadParameter(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
@@ -192,19 +202,21 @@ def _friction(
     geometry, the rest length is enough.
     """
     check_writable(json, png)
+    check_packages("report", *(["matplotlib"] if png else []))
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
     map_ = _loops(data, muscle, sizes, where or [], clipped)
     from pamrs.fit import fit_friction
 
-    contents: dict[Path, str | bytes] = {}
     with progress(f"fitting {map_.label}"):
         fit = fit_friction(map_, floor=floor)
-        if json is not None:
-            contents[json] = _friction_json(fit, map_, _command(context))
-        if png is not None:
-            from pamrs.fit.report import render_friction_png
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
+    if json is not None:
+        contents[json] = _friction_json(fit, map_, _command(context))
+    if png is not None:
+        from pamrs._writing import write_atomically
+        from pamrs.fit.report import render_friction_png
 
-            contents[png] = render_friction_png(fit, map_)
+        contents[png] = lambda path: write_atomically(path, render_friction_png(fit, map_))
     typer.echo(f"{map_.label}: {fit.fit_report()}")
     write(contents)
 
@@ -521,19 +533,21 @@ def _contents(
     command: str,
     base: Rig | None,
     files: _Outputs,
-) -> dict[Path, str | bytes]:
-    """Every file to write with its content; made before the first is written."""
+) -> dict[Path, str | bytes | Callable[[Path], object]]:
+    """Every file to write with its content, or what draws it: what is text comes first."""
     from pamrs.fit import report as pages
 
-    contents: dict[Path, str | bytes] = {}
-    if files.report is not None:
-        contents[files.report] = pages.render_html(fit, comparison, command=command)
-    if files.png is not None:
-        contents[files.png] = pages.render_png(fit, comparison)
-    if files.rig is not None:
-        contents[files.rig] = fit.to_rig(base).to_toml_text()
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
     if files.json is not None:
         contents[files.json] = _json(fit, comparison, friction, command)
+    if files.rig is not None:
+        contents[files.rig] = fit.to_rig(base).to_toml_text()
+    if files.png is not None:
+        contents[files.png] = lambda path: pages.write_figure(fit, path, comparison)
+    if files.report is not None:
+        contents[files.report] = lambda path: pages.write_report(
+            fit, path, comparison, command=command
+        )
     return contents
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import as_given, check_writable, exact, rig_named, write
+from pamrs.cli._shared import as_given, check_packages, check_writable, exact, rig_named, write
 
 __all__ = ["lift_command"]
 
@@ -38,6 +39,7 @@ def lift_command(
     at most.
     """
     check_writable(png, json)
+    check_packages("plot", *(["matplotlib"] if png else []))
     from pamrs.design import lift
     from pamrs.errors import ParameterError
 
@@ -55,17 +57,11 @@ def lift_command(
         to=None if to is None else exact("to", to, "angle"),
     )
     typer.echo(result.summary())
-    if json is not None:
-        import json as encoder
+    import json as encoder
 
-        write(
-            {
-                json: encoder.dumps(
-                    {"schema": SCHEMA, **result.to_dict()}, indent=1, allow_nan=False
-                )
-                + "\n"
-            }
-        )
-    if png is not None:
-        result.plot(png)
-        typer.echo(f"written: {png}", err=True)
+    document = {"schema": SCHEMA, **result.to_dict()}
+    files: dict[Path | None, str | Callable[[Path], object]] = {
+        json: encoder.dumps(document, indent=1, allow_nan=False) + "\n",
+        png: result.plot,
+    }
+    write({path: content for path, content in files.items() if path is not None})

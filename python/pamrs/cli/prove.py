@@ -29,6 +29,12 @@ def prove_command(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Diagnose again what has a result.")
     ] = False,
+    allow_outside: Annotated[
+        bool,
+        typer.Option(
+            "--allow-outside", help="Rig files and recordings may lie outside the case folders."
+        ),
+    ] = False,
     timeout: Annotated[
         float, typer.Option(help="Seconds after which a case is given up.")
     ] = 1800.0,
@@ -45,7 +51,14 @@ def prove_command(
         typer.echo(text, err=True)
 
     proof = prove(
-        folder, results=results, jobs=jobs, limit=limit, fresh=fresh, timeout=timeout, say=say
+        folder,
+        results=results,
+        jobs=jobs,
+        limit=limit,
+        fresh=fresh,
+        timeout=timeout,
+        say=say,
+        allow_outside=allow_outside,
     )
     typer.echo(proof.table())
     for name, error in proof.failed.items():

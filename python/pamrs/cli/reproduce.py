@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from pamrs.cli._shared import check_writable, progress, write
+from pamrs.cli._shared import check_packages, check_writable, progress, write
 
 __all__ = ["reproduce_command"]
 
@@ -51,8 +52,11 @@ def reproduce_command(
     chapters = list(dict.fromkeys(chapter))
     for name in chapters:
         reproduce.check(name)
-    check_writable(page)
+    check_packages("plot", "matplotlib", "PIL")
+    if search and "ch3" in chapters:
+        check_packages("search", "deap", "cma")
     output.mkdir(parents=True, exist_ok=True)
+    check_writable(page, output / "facts.csv")
     sections = []
     for name in chapters:
         with progress(f"reproducing {name}"):
@@ -68,7 +72,7 @@ def reproduce_command(
     words += [] if page is None else ["--page", str(page)]
     words += [] if search else ["--no-search"]
     folder = os.path.relpath(output.resolve(), target.resolve().parent)
-    contents: dict[Path, str | bytes] = {
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {
         output / "facts.csv": to_csv(rows),
         target: to_page(sections, shlex.join(words), folder),
         **{

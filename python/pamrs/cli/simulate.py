@@ -4,13 +4,21 @@ line.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from pamrs.channels import UNITS, channel_of, unit_of
-from pamrs.cli._shared import check_writable, exact, progress, rig_named
+from pamrs.cli._shared import (
+    check_packages,
+    check_writable,
+    exact,
+    progress,
+    rig_named,
+    write,
+)
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,6 +83,7 @@ def simulate_command(
     if input is not None and (hold or initial):
         raise typer.BadParameter("--hold and --initial do not go with --input, which says both")
     check_writable(output, plot, animation)
+    check_packages("plot", *(["matplotlib"] if plot or animation else []))
     loaded = rig_named(rig)
     recorded: dict[str, tuple[Any, Any]] = {}
     recording = None
@@ -98,22 +107,23 @@ def simulate_command(
             exact("duration", duration, "time"),
             exact("sample_time", sample_time, "time"),
         )
-    if output is not None:
-        _write_csv(output, result)
-        typer.echo(f"{loaded.name}: {len(result.time)} samples written to {output}")
-    if plot is not None:
-        result.plot(plot, recorded=recorded)
-        typer.echo(f"written: {plot}", err=True)
-    if animation is not None:
-        with progress("drawing the motion"):
-            result.animate(animation, speed=speed)
-        typer.echo(f"written: {animation}", err=True)
     typer.echo(result.summary())
     if recording is not None:
         from pamrs.simulation import differences
 
         for name, rms in differences(result, recording).items():
             typer.echo(f"{name}: rms difference from the recording {rms:.4g} {unit_of(name)}")
+    files: dict[Path | None, Callable[[Path], object]] = {
+        output: lambda path: _write_csv(path, result),
+        plot: lambda path: result.plot(path, recorded=recorded),
+        animation: lambda path: _animate(path, result, speed),
+    }
+    write({path: how for path, how in files.items() if path is not None})
+
+
+def _animate(path: Path, result: Simulation, speed: float) -> None:
+    with progress("drawing the motion"):
+        result.animate(path, speed=speed)
 
 
 def _say_what_is_held(rig: Rig, recording: Recording, path: Path) -> None:
@@ -217,3 +227,4 @@ def _write_csv(path: Path, columns: Simulation) -> None:
     for row in zip(*(columns[name].tolist() for name in names), strict=True):
         lines.append(",".join(f"{value:.10g}" for value in row))
     write_atomically(path, "\n".join(lines) + "\n")
+    typer.echo(f"{columns.rig.name}: {len(columns.time)} samples written to {path}")

@@ -27,16 +27,19 @@ from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group
-from pamrs.diagnosis.explain import assemble
+from pamrs.diagnosis.explain import assemble, data_used
 from pamrs.diagnosis.fit import Problem, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
     available_blocks,
+    averaged_to_need,
     check_plausible,
     check_sense,
     prepare,
+    without_copies,
+    without_impossible,
 )
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -140,6 +143,7 @@ def diagnose(
     case: Case | str | os.PathLike[str],
     *,
     rig: Rig | str | os.PathLike[str] | None = None,
+    allow_outside: bool = False,
     settings: DiagnosisSettings | None = None,
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
@@ -154,6 +158,8 @@ def diagnose(
     rig : Rig or path-like, optional
         A model to begin from in the place of the case's own, for example one with the effects that
         an earlier diagnosis found.
+    allow_outside : bool
+        Whether rig file and recordings of a case folder may lie outside of it.
     settings : DiagnosisSettings, optional
         The numbers that the verdict rests on; those of the published trials by default.
     progress : callable, optional
@@ -179,13 +185,13 @@ def diagnose(
     Examples
     --------
     >>> import pamrs
-    >>> pamrs.diagnose("cases/zillen_chambers/Ultimaker_020").verdict  # doctest: +SKIP
+    >>> pamrs.diagnose("my_case").verdict  # doctest: +SKIP
     'effects'
     """
     began = time.perf_counter()
     say = progress or _quiet
     if not isinstance(case, Case):
-        case = load_case(case)
+        case = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
@@ -193,6 +199,13 @@ def diagnose(
     case = case.with_rig(without_passing(case.rig))
     chosen = DiagnosisSettings() if settings is None else settings
     check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
+    case = replace(case, recordings=sound)
+    kept, copies = without_copies(case.recordings, chosen.overlap)
+    case = replace(case, recordings=kept)
+    seen = available_blocks(case.rig, case.channels, chosen.prepare)
+    shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
+    case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, left_out = _problems(case, chosen)
     blocks = inner.blocks
@@ -205,7 +218,7 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*held, *left_out, *diagnosis.warnings]
+    warnings = [*copies, *masked, *held, *left_out, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(
@@ -216,7 +229,10 @@ def diagnose(
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    return replace(diagnosis, warnings=warnings, seconds=round(time.perf_counter() - began, 3))
+    data = data_used(case.recordings, counts, blocks, case.rig, inner.core, left_out=bool(left_out))
+    return replace(
+        diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
+    )
 
 
 def _examined(

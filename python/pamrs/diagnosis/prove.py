@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._writing import write_atomically
+from pamrs._writing import check_writable, write_atomically
 from pamrs.diagnosis.result import READABLE
 from pamrs.errors import CaseError, ParameterError
 
@@ -39,6 +39,7 @@ __all__ = [
 ]
 
 SCHEMA: Final = "pamrs.prove/1"
+OUTSIDE: Final = "--allow-outside"
 MANIFEST: Final = "manifest.json"
 _VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
 TIMEOUT: Final = 1800.0
@@ -217,20 +218,29 @@ def worker(words: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     words : sequence of str, optional
-        The case's folder and the file to write; those of this process by default.
+        The case's folder and the file to write, before them maybe ``--allow-outside``; those of
+        this process by default.
 
     Returns
     -------
     int
         0, or 2 with one line on standard error when the case cannot be diagnosed.
     """
-    case, out = sys.argv[1:] if words is None else words
+    given = list(sys.argv[1:] if words is None else words)
+    allow_outside = OUTSIDE in given
+    case, out = (word for word in given if word != OUTSIDE)
     from pamrs.diagnosis import diagnose
-    from pamrs.errors import PamrsError
+    from pamrs.errors import NotWrittenError, PamrsError
 
     try:
-        result = diagnose(case)
-        write_atomically(out, result.to_json())
+        result = diagnose(case, allow_outside=allow_outside)
+        try:
+            write_atomically(out, result.to_json())
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise NotWrittenError(
+                f"diagnosed ({result.verdict}), but {out} could not be written ({why})"
+            ) from error
     except (PamrsError, OSError) as error:
         print(f"{type(error).__name__}: {error}", file=sys.stderr)
         return 2
@@ -368,6 +378,7 @@ def prove(
     timeout: float = TIMEOUT,
     say: Callable[[str], None] | None = None,
     command: Sequence[str] | None = None,
+    allow_outside: bool = False,
 ) -> Proof:
     """Diagnose every case of a folder, each in a process of its own.
 
@@ -389,6 +400,8 @@ def prove(
         Called with a line of text for each case.
     command : sequence of str, optional
         The worker, given a case's folder and the file to write; this module by default.
+    allow_outside : bool
+        Whether rig files and recordings may lie outside the case folders.
 
     Returns
     -------
@@ -411,6 +424,7 @@ def prove(
     found, manifest = cases_of(folder)
     target = Path(folder) / "results" if results is None else Path(results)
     target.mkdir(parents=True, exist_ok=True)
+    check_writable(target / "run.json")
     tell = say or (lambda text: None)
     run = _Run.of(found[:limit], target, jobs, manifest, fresh=fresh)
     kept = len(run.entries)
@@ -421,7 +435,8 @@ def prove(
             + (f", {other} of them made by other code (--fresh makes them again)" * bool(other))
         )
     run.record()
-    run.finish(command or (sys.executable, "-m", "pamrs.diagnosis.prove"), jobs, timeout, tell)
+    own = (sys.executable, "-m", "pamrs.diagnosis.prove", *([OUTSIDE] if allow_outside else []))
+    run.finish(command or own, jobs, timeout, tell)
     return Proof(target, {case.name: run.entries[case.name] for case in run.cases}, kept)
 
 

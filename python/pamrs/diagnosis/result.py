@@ -81,6 +81,10 @@ class Diagnosis(Findings):
         hypotheses that are left open apart: ``between``, ``text``, ``experiment``, ``noises``), and
         ``ranking``, ``curves`` and ``protocol`` (its commands, ``protocol.to_csv()``) of what
         was simulated.
+    data : list of RecordingUsed
+        ``recording``, ``role``, ``source``, ``samples``, ``sample_time``, ``averaged`` (recorded
+        samples in each), ``used`` channels, ``unused`` {channel: why} and ``masked`` {channel:
+        share}, of each recording that was used.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -216,6 +220,7 @@ class Diagnosis(Findings):
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
         lines += self._summary_next()
+        lines += self._summary_data()
         for warning in self.warnings[:3]:
             lines += textwrap.wrap(f"Warning: {warning}", 96, subsequent_indent="  ")
         if len(self.warnings) > 3:
@@ -266,6 +271,11 @@ class Diagnosis(Findings):
             told = f"Budget of {block}: {words.budget_sentence(own)}".translate(_ASCII)
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []
+
+    def _summary_data(self) -> list[str]:
+        """What the answer rests on, and what of it was not used."""
+        told = words.data_sentence(self)
+        return ["", *textwrap.wrap(told, 96, subsequent_indent="  ")] if told else []
 
     def _summary_next(self) -> list[str]:
         """What to record next, and what tells the leading hypothesis from each other one."""

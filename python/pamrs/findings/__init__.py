@@ -19,6 +19,7 @@ from pamrs.findings._details import (
     PairExperiment,
     Protocol,
     RankedExperiment,
+    RecordingUsed,
     Tested,
     Tried,
 )
@@ -75,6 +76,7 @@ __all__ = [
     "Protocol",
     "ParameterFound",
     "RankedExperiment",
+    "RecordingUsed",
     "StageError",
     "Tested",
     "Trace",

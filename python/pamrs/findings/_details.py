@@ -21,6 +21,7 @@ __all__ = [
     "PairExperiment",
     "Protocol",
     "RankedExperiment",
+    "RecordingUsed",
     "Tested",
     "Tried",
 ]
@@ -261,6 +262,39 @@ class Tried(Entry):
     prior: float
     suspects: list[str]
     gain: float
+
+
+@dataclass(frozen=True, eq=False)
+class RecordingUsed(Entry):
+    """What of a recording the answer rests on.
+
+    Attributes
+    ----------
+    recording, role, source : str
+        Its name, ``fit`` or ``held_out``, and the file that it was read from.
+    samples : int
+        Samples as they were used.
+    sample_time : float
+        Time between them [s].
+    averaged : int
+        Recorded samples in each of them; 1 where nothing was averaged.
+    used : list of str
+        Channels that a judged block is compared with or driven by.
+    unused : dict of str to str
+        Channels that were recorded and not used, and why.
+    masked : dict of str to float
+        Share of samples of a channel that could not be used, where there are any.
+    """
+
+    recording: str
+    role: str
+    source: str
+    samples: int
+    sample_time: float
+    averaged: int
+    used: list[str]
+    unused: dict[str, str]
+    masked: dict[str, float]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from pamrs.findings._details import BlockResidual, ConditionMap, NextExperiment, Tested, Tried
+from pamrs.findings._details import (
+    BlockResidual,
+    ConditionMap,
+    NextExperiment,
+    RecordingUsed,
+    Tested,
+    Tried,
+)
 from pamrs.findings._entries import (
     VERDICTS,
     BlockVerdict,
@@ -63,6 +70,8 @@ class Findings:
         Error of each channel, and how much of the gap to the noise is closed.
     next_experiment : NextExperiment
         What to record next.
+    data : list of RecordingUsed
+        What of each recording the answer rests on, and which channels were not used, and why.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -137,6 +146,12 @@ class Findings:
     parameters: dict[str, ParameterFound] = field(default_factory=dict)
     fit: FitErrors = field(default_factory=FitErrors)
     next_experiment: NextExperiment = field(default_factory=NextExperiment)
+    data: list[RecordingUsed] = field(
+        default_factory=list,
+        metadata=told(
+            "what of each recording the answer rests on, and which channels were not used"
+        ),
+    )
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
     text: str = field(default="", metadata=told(json=False))

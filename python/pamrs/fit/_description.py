@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from pamrs._files import parse_toml, read_toml
 from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
@@ -150,7 +151,7 @@ def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
 
 def _document(file: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return parse_toml(read_toml(file))
     except OSError as error:
         raise RecordingError(f"{file}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:

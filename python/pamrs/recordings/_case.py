@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from pamrs._files import is_inside, parse_toml, read_toml
 from pamrs.errors import CaseError, RecordingError, RigError, joined
 from pamrs.recordings._recording import Recording, load_recording
 from pamrs.rig import Rig, load_rig
@@ -80,7 +81,7 @@ class Case:
         return replace(self, rig=rig)
 
 
-def load_case(folder: str | os.PathLike[str]) -> Case:
+def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) -> Case:
     """Read a case.
 
     Parameters
@@ -88,7 +89,9 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     folder : path-like
         A folder with a ``case.toml`` of the schema ``pamrs.case/1``, or that file itself; or a rig
         file that a diagnosis wrote and that says from which case, which then is that case with this
-        rig. File names in it are relative to the folder and may point out of it.
+        rig. File names in it are relative to the folder.
+    allow_outside : bool
+        Whether the rig file and recordings may lie outside the folder (``../run.csv``, or links).
 
     Returns
     -------
@@ -103,7 +106,7 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     """
     given = Path(folder)
     if given.is_file() and given.name != "case.toml":
-        return _case_of(given)
+        return _case_of(given, allow_outside)
     file = given if given.name == "case.toml" else given / "case.toml"
     home = file.parent
     document = _document(file, given)
@@ -114,6 +117,9 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     name = _text(problems, document, "name", home.resolve().name)
     description = _text(problems, document, "description", "")
     source = _text(problems, document, "source", "")
+    outside = [] if allow_outside else _outside(home, document)
+    if outside:  # nothing there is opened
+        raise CaseError(joined(str(file), [*problems, *outside]))
     rig = _rig(problems, home, _text(problems, document, "rig", "rig.toml"))
     recordings = _recordings(problems, home, document.get("recording"), source)
     if problems or rig is None:
@@ -121,7 +127,7 @@ def load_case(folder: str | os.PathLike[str]) -> Case:
     return Case(name, rig, recordings, home, description)
 
 
-def _case_of(file: Path) -> Case:
+def _case_of(file: Path, allow_outside: bool) -> Case:
     """The case from which a rig file was diagnosed, with that rig."""
     try:
         rig = load_rig(file)
@@ -135,14 +141,14 @@ def _case_of(file: Path) -> Case:
     home = file.parent / rig.case
     if not home.is_dir():
         raise CaseError(f"{file}: case = {rig.case!r}: there is no such case folder")
-    return load_case(home).with_rig(rig)
+    return load_case(home, allow_outside=allow_outside).with_rig(rig)
 
 
 def _document(file: Path, given: Path) -> dict[str, Any]:
     if not given.exists():
         raise CaseError(f"{given}: no such case folder")
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return parse_toml(read_toml(file))
     except FileNotFoundError:
         raise CaseError(f"{given}: not a case folder, it has no case.toml") from None
     except OSError as error:
@@ -169,6 +175,22 @@ def _text(problems: list[str], document: Mapping[str, Any], key: str, default: s
         return value
     problems.append(f"{key} = {value!r} is not allowed: a text is needed")
     return default
+
+
+def _outside(home: Path, document: Mapping[str, Any]) -> list[str]:
+    """Files that lie outside the case folder."""
+    entries = document.get("recording")
+    named = [("rig", document.get("rig"))] + [
+        (f"recording[{index}].file", entry.get("file"))
+        for index, entry in enumerate(entries if isinstance(entries, list) else [])
+        if isinstance(entry, Mapping)
+    ]
+    return [
+        f"{key} = {name!r}: lies outside the case folder; copy it there, or allow it with "
+        "--allow-outside (in Python: load_case(..., allow_outside=True))"
+        for key, name in named
+        if isinstance(name, str) and "\0" not in name and not is_inside(home, home / name)
+    ]
 
 
 def _rig(problems: list[str], home: Path, name: str) -> Rig | None:

@@ -18,6 +18,8 @@ _GAP: Final = 1.6  # intervals longer than this many samples are holes
 _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
 _ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stands as it is
 _MOST_EVENTS: Final = 20
+_LATE: Final = 2  # samples: a hole of so many is the timer's jitter where there are several
+_FEW_LATE: Final = 2  # such holes that are told one by one
 
 
 class Event(NamedTuple):
@@ -193,7 +195,17 @@ def _gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Even
             f"gap {float(elapsed[holes].max()):.6g} s"
         )
         return [Event("gap", float(placed[holes[0]]), float(placed[holes[-1] + 1]), text)]
-    return [
+    late = missing <= _LATE
+    found: list[Event] = []
+    if late.sum() > _FEW_LATE:
+        first, last, longest = holes[late][0], holes[late][-1], float(elapsed[holes[late]].max())
+        text = (
+            f"timer jitter: {int(late.sum())} times one or two samples are late or missing, the "
+            f"longest interval {longest:.6g} s"
+        )
+        found = [Event("gap", float(placed[first]), float(placed[last + 1]), text)]
+        holes, missing = holes[~late], missing[~late]
+    return found + [
         Event(
             "gap",
             float(placed[i]),

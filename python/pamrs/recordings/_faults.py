@@ -22,6 +22,9 @@ _WINDOW: Final = 40  # samples of a window in which rest and noise are judged
 _LEAST: Final = 20  # no shorter run is ever suspect
 _CHANCE: Final = 1e-6  # chance of a false alarm per channel, under the channel's own noise
 _MARGIN: Final = 2.0  # on the longest expected run
+_RAIL_SHARE: Final = 0.1  # of the samples that dropouts may take; more is how the channel is
+_RAIL_LEAP: Final = 5.0  # step into a dropout over the largest one elsewhere
+_RAIL_SAME: Final = 0.3  # difference before and after it, over that step
 _REST: Final = 12.0  # quanta that a channel at rest may span
 
 #: Set by the controller or the user: constant stretches are their nature.
@@ -67,7 +70,13 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
         return []
     if np.all(data == data[0]):
         return _constant(channel, data, good)
-    faults = _outliers(data, good)
+    faults = _rails(data, good)
+    for fault in faults:
+        good = good[(good < fault.start) | (good >= fault.stop)]
+    data = values[good]
+    if len(data) < 3:
+        return faults
+    faults += _outliers(data, good)
     spiked = np.zeros(len(values), dtype=bool)
     for fault in faults:
         spiked[fault.start : fault.stop] = True
@@ -91,6 +100,46 @@ def _constant(channel: str, data: Array, good: NDArray[np.intp]) -> list[Fault]:
     masked = channel in CLIPPING - {"supply_pressure"}
     text = "one and the same value throughout"
     return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
+
+
+def _rails(data: Array, good: NDArray[np.intp]) -> list[Fault]:
+    """Dropouts: runs at one end of the range, entered and left by leaps that the channel makes
+    nowhere else, after which it goes on where it was.
+    """
+    found: list[Fault] = []
+    if len(data) < 3 * _LEAST:
+        return found
+    steps = np.abs(np.diff(data))
+    for value in (float(data.min()), float(data.max())):
+        runs = _groups(np.flatnonzero(data == value))
+        share = sum(last - first + 1 for first, last in runs) / len(data)
+        beside = np.zeros(len(steps), dtype=bool)
+        for first, last in runs:
+            beside[max(0, first - 1) : last + 1] = True
+        if share > _RAIL_SHARE or beside.all():
+            continue
+        usual = max(float(steps[~beside].max()), float(np.median(steps)))
+        if all(_dropped(data, first, last, usual) for first, last in runs):
+            found += [
+                Fault(
+                    "saturated",
+                    int(good[first]),
+                    int(good[last]) + 1,
+                    f"{last - first + 1} samples at the end of its range ({value:.4g}, SI), "
+                    "reached by a leap",
+                )
+                for first, last in runs
+                if last > first  # a single one is an outlier
+            ]
+    return found
+
+
+def _dropped(data: Array, first: int, last: int, usual: float) -> bool:
+    """Whether a run is a dropout: leaps at both ends, about the same value on either side."""
+    sides = [float(data[i]) for i in (first - 1, last + 1) if 0 <= i < len(data)]
+    leaps = [abs(side - float(data[first])) for side in sides]
+    same = len(sides) == 1 or abs(sides[0] - sides[1]) <= _RAIL_SAME * min(leaps)
+    return bool(leaps) and min(leaps) > _RAIL_LEAP * usual and same
 
 
 def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:

@@ -112,6 +112,8 @@ class Recording:
         What was found.
     units : dict of str to str
         SI unit of each channel.
+    source : str
+        The file that it was read from.
     """
 
     name: str
@@ -122,6 +124,7 @@ class Recording:
     mask: dict[str, Mask]
     issues: list[Issue] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
+    source: str = ""
 
     def __len__(self) -> int:
         return len(self.time)
@@ -302,7 +305,8 @@ def load_recording(
     wanted = _understood(_headings(table, columns, source), source)
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    return _assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
+    recording = _assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
+    return replace(recording, source=source)
 
 
 # ------------------------------------------------------------------------- columns

@@ -7,7 +7,7 @@ value" become NaN.
 from __future__ import annotations
 
 import csv
-import gzip
+import importlib
 import io
 import math
 import zlib
@@ -18,12 +18,17 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
 
 __all__ = ["Table", "is_text", "read_table", "read_text", "split_rows"]
 
 Array = NDArray[np.float64]
 
+MOST_ROWS: Final = 5_000_000
+"""Rows of a table."""
+MOST_CELLS: Final = 20_000_000
+"""Cells of a table."""
 _NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 _TEXT = (".csv", ".tsv", ".txt", ".dat", "")
 
@@ -157,8 +162,7 @@ def read_text(path: Path) -> str:
             f"{path}: the format {ending!r} is not read here; readable are {_READABLE}"
         )
     try:
-        data = path.read_bytes()
-        raw = gzip.decompress(data) if packed else data
+        raw = read_file(path, packed=packed)
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise RecordingError(
@@ -175,7 +179,19 @@ def read_text(path: Path) -> str:
     return text
 
 
+def _check_size(rows: int, cells: int, source: str) -> None:
+    """Refuse tables that no memory holds."""
+    for count, most, what in ((rows, MOST_ROWS, "rows"), (cells, MOST_CELLS, "cells")):
+        if count > most:
+            raise RecordingError(
+                f"{source}: about {count} {what}; at most {most} are read: cut it into parts, or "
+                "keep only the rows and columns that are needed"
+            )
+
+
 def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
+    lines = text.count("\n") + 1
+    _check_size(lines, lines + (text.count(delimiter) if delimiter != " " else 0), source)
     rows, numbers = [], []
     for number, row in enumerate(split_rows(text, delimiter), start=1):
         if any(cell.strip() for cell in row):
@@ -215,9 +231,21 @@ def _usual_width(rows: list[list[str]]) -> int:
     return max(set(widths), key=widths.count)
 
 
+def _parquet_size(path: Path) -> tuple[int, int]:
+    """Rows and cells by the file's own account; none where pyarrow is missing or cannot tell."""
+    try:
+        told = importlib.import_module("pyarrow.parquet").read_metadata(path)
+    except Exception:  # what is wrong with the file is said when it is read
+        return 0, 0
+    return int(told.num_rows), int(told.num_rows) * int(told.num_columns)
+
+
 def _parquet(path: Path) -> Table:
     if not path.is_file():
-        raise RecordingError(f"{path}: cannot be read (no such file)")
+        what = "it is not a regular file" if path.exists() else "no such file"
+        raise RecordingError(f"{path}: cannot be read ({what})")
+    if path.stat().st_size > MOST_BYTES:
+        raise RecordingError(f"{path}: more than {MOST_BYTES >> 20} MB, and at most that is read")
     try:
         import pandas as pd
     except ImportError as error:
@@ -225,7 +253,10 @@ def _parquet(path: Path) -> Table:
             f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
         ) from error
     try:
+        _check_size(*_parquet_size(path), str(path))
         frame = pd.read_parquet(path)
+    except RecordingError:
+        raise
     except Exception as error:  # each engine has its own kinds for a broken file
         raise RecordingError(f"{path}: cannot be read ({error})") from error
     columns = []

@@ -6,6 +6,7 @@ import importlib
 import os
 from pathlib import Path
 
+from pamrs.errors import MissingPackageError
 from pamrs.findings import Findings
 
 __all__ = ["render_html", "write_figure", "write_report"]
@@ -31,7 +32,7 @@ def require(*packages: str) -> None:
             text = (
                 f"the report needs {error.name}, which is not installed: pip install pamrs[report]"
             )
-            raise ImportError(text, name=error.name) from error
+            raise MissingPackageError(text, name=error.name) from error
 
 
 def render_html(diagnosis: Findings) -> str:

@@ -496,5 +496,6 @@ def render(diagnosis: Findings) -> str:
         hidden=hidden,
         parameters=_parameters(diagnosis),
         timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
+        data=words.data_sentence(diagnosis),
         model=diagnosis.model,
     )

@@ -19,6 +19,7 @@ from pamrs.findings import (
 )
 
 __all__ = [
+    "data_sentence",
     "blocks_label",
     "budget_sentence",
     "budgets",
@@ -579,3 +580,43 @@ def _percent(share: float) -> str:
 def _span(interval: Sequence[float]) -> str:
     """An interval in percent."""
     return " to ".join(_percent(share) for share in interval)
+
+
+def data_sentence(diagnosis: Findings) -> str:
+    """Recordings, rates and channels that the answer rests on, and channels that were not used.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        What was found.
+
+    Returns
+    -------
+    str
+        Empty where the result does not say.
+    """
+    data = diagnosis.data
+    if not data:
+        return ""
+    rates = dict.fromkeys(
+        f"{1.0 / own.sample_time:.4g} Hz"
+        + (
+            f" (means of {own.averaged} samples recorded at "
+            f"{own.averaged / own.sample_time:.4g} Hz)"
+            if own.averaged > 1
+            else ""
+        )
+        for own in data
+    )
+    seconds = sum(own.samples * own.sample_time for own in data)
+    count = f"{len(data)} recording{'s' if len(data) > 1 else ''}"
+    used = dict.fromkeys(name for own in data for name in own.used)
+    text = f"Data: {count}, {seconds:.4g} s at {' and '.join(rates)}; used: {', '.join(used)}"
+    unused = {name: why for own in data for name, why in own.unused.items()}
+    if not unused:
+        return text
+    reasons: dict[str, list[str]] = {}
+    for name, why in unused.items():
+        reasons.setdefault(why, []).append(name)
+    told = "; ".join(f"{', '.join(names)} ({why})" for why, names in reasons.items())
+    return f"{text}; recorded but not used: {told}"

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from pamrs._files import parse_toml
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
 from pamrs.rig._model_error import read_model_error
@@ -69,7 +70,7 @@ def read_model(text: str, source: str) -> Content:
         With every problem found.
     """
     try:
-        document = tomllib.loads(text)
+        document = parse_toml(text)
     except tomllib.TOMLDecodeError as error:
         raise RigError(f"{source}: not valid TOML: {error}") from error
     reader = Reader()

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pamrs._checks import checked_number, checked_table
+from pamrs._files import read_toml
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
@@ -567,7 +568,7 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
     if file.is_dir():
         file = file / "rig.toml"
     try:
-        text = file.read_text(encoding="utf-8")
+        text = read_toml(file)
     except OSError as error:
         raise RigError(f"{file}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:

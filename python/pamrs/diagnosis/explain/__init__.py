@@ -1,14 +1,16 @@
 """From judged hypotheses to an answer: where and when, in words, the model, its traces.
 
-Public: `assemble`, `describe_closure`.
+Public: `assemble`, `data_used`, `describe_closure`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.explain._assemble import assemble
 from pamrs.diagnosis.explain._closure_words import describe_closure
+from pamrs.diagnosis.explain._data_used import data_used
 
 __all__ = [
     "assemble",
+    "data_used",
     "describe_closure",
 ]

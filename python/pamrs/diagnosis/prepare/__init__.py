@@ -1,13 +1,17 @@
 """Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted
 from their measured neighbours.
 
-Public: `check_plausible`, `check_sense`, `implausible` (what recordings cannot be), `prepare`,
+Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_copies`, `Overlap`
+(recordings that hold the same samples),
+`check_plausible`, `check_sense`, `implausible`, `without_impossible` (what recordings
+cannot be), `prepare`,
 `Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
 `begun`, `change`, `predicted`, `residual` (blocks and their residuals).
 """
 
 from __future__ import annotations
 
+from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Residual,
@@ -17,14 +21,23 @@ from pamrs.diagnosis.prepare._blocks import (
     predicted,
     residual,
 )
-from pamrs.diagnosis.prepare._plausible import check_plausible, check_sense, implausible
+from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
+from pamrs.diagnosis.prepare._plausible import (
+    check_plausible,
+    check_sense,
+    implausible,
+    without_impossible,
+)
 from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
 
 __all__ = [
     "Block",
+    "Overlap",
     "Prepared",
     "Residual",
     "available_blocks",
+    "averaged",
+    "averaged_to_need",
     "begun",
     "binned",
     "change",
@@ -32,8 +45,11 @@ __all__ = [
     "check_sense",
     "implausible",
     "noise_level",
+    "overlap",
     "predicted",
     "prepare",
     "residual",
     "smoothed",
+    "without_copies",
+    "without_impossible",
 ]

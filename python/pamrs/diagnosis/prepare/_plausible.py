@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,11 @@ from pamrs.errors import DiagnosisError, SimulationError, joined
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 
-__all__ = ["check_plausible", "check_sense", "implausible"]
+__all__ = ["check_plausible", "check_sense", "implausible", "without_impossible"]
 
 Array = NDArray[np.float64]
 
+_PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
 _DEGREES = 180.0 / math.pi
 _TOLD = 12
 """Findings that a message lists."""
@@ -100,6 +101,60 @@ def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) 
         *_motion(recording, rig, settings),
         *_valves(recording, rig, settings),
     ]
+
+
+def without_impossible(
+    recordings: Sequence[Recording], rig: Rig, settings: PlausibilitySettings
+) -> tuple[list[Recording], list[str]]:
+    """Recordings whose samples beyond what the rig allows are masked, so that nothing starts there.
+
+    A recording that is beyond it for long is refused before (:func:`check_plausible`).
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        SI values with masks.
+    rig : Rig
+        The nominal model.
+    settings : PlausibilitySettings
+        What is allowed.
+
+    Returns
+    -------
+    recordings : list of Recording
+    said : list of str
+        A line for each channel of each recording with such samples: how many, and when.
+    """
+    limits = {m.channel: (m.low - m.margin, m.high + m.margin) for m in _moving(rig, settings)}
+    found, said = [], []
+    for recording in recordings:
+        mask = dict(recording.mask)
+        channels = dict(recording.channels)
+        for name in recording.channels:
+            low, high = limits.get(name, (-math.inf, math.inf))
+            if channel_of(name) in _PRESSURES:
+                low, high = settings.least_gauge_pressure, settings.most_pressure
+            bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
+            if bad.any():
+                mask[name] = mask[name] & ~bad
+                channels[name] = np.where(bad, np.nan, channels[name])
+                where = recording.source or recording.name
+                said.append(
+                    f"{recording.name}: {int(bad.sum())} samples of {name} in {where} are beyond "
+                    f"the possible ({low:.4g} to {high:.4g} {recording.units.get(name) or 'SI'}) "
+                    f"and were masked: {_when(bad, recording)}"
+                )
+        found.append(replace(recording, mask=mask, channels=channels))
+    return found, said
+
+
+def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
+    """The first stretches in which something is, in seconds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
+    pairs = list(zip(edges[::2], edges[1::2] - 1, strict=True))
+    told = [f"{recording.time[a]:.4g} to {recording.time[b]:.4g} s" for a, b in pairs[:_TOLD]]
+    more = f" and {len(pairs) - _TOLD} more stretches" if len(pairs) > _TOLD else ""
+    return ", ".join(told) + more
 
 
 def _values(recording: Recording, name: str) -> Array:

@@ -13,7 +13,12 @@ from typing import Any
 
 from pamrs._checks import checked_table
 from pamrs.diagnosis.settings._after import NextExperimentSettings, PlanSettings, WarningSettings
-from pamrs.diagnosis.settings._data import NoiseSettings, PlausibilitySettings, PrepareSettings
+from pamrs.diagnosis.settings._data import (
+    NoiseSettings,
+    OverlapSettings,
+    PlausibilitySettings,
+    PrepareSettings,
+)
 from pamrs.diagnosis.settings._judgement import EvidenceSettings, VerdictSettings
 from pamrs.diagnosis.settings._models import (
     ClosureSettings,
@@ -37,6 +42,7 @@ __all__ = [
     "FitSettings",
     "NextExperimentSettings",
     "NoiseSettings",
+    "OverlapSettings",
     "PlanSettings",
     "PlausibilitySettings",
     "PrepareSettings",
@@ -62,6 +68,8 @@ class DiagnosisSettings:
         Recordings made ready for the cut chain.
     plausibility : PlausibilitySettings
         What recordings cannot be.
+    overlap : OverlapSettings
+        When two recordings hold the same samples.
     noise : NoiseSettings
         When a residual is more than noise.
     fit : FitSettings
@@ -106,6 +114,7 @@ class DiagnosisSettings:
 
     prepare: PrepareSettings = field(default_factory=PrepareSettings)
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
+    overlap: OverlapSettings = field(default_factory=OverlapSettings)
     noise: NoiseSettings = field(default_factory=NoiseSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     transients: TransientSettings = field(default_factory=TransientSettings)
@@ -197,6 +206,7 @@ class DiagnosisSettings:
 _GROUPS: dict[str, type[SettingsGroup]] = {
     "prepare": PrepareSettings,
     "plausibility": PlausibilitySettings,
+    "overlap": OverlapSettings,
     "noise": NoiseSettings,
     "fit": FitSettings,
     "transients": TransientSettings,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.settings._setting import SettingsGroup, setting
 
-__all__ = ["NoiseSettings", "PlausibilitySettings", "PrepareSettings"]
+__all__ = ["NoiseSettings", "OverlapSettings", "PlausibilitySettings", "PrepareSettings"]
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,35 @@ class PrepareSettings(SettingsGroup):
         least=8,
         reason="fewest samples of a recording that can be diagnosed",
         origin="judgement",
+    )
+    ample_samples: int = setting(
+        250_000,
+        unit="count",
+        least=32,
+        reason="samples of all recordings of a case up to which they are used as they are; more "
+        "are averaged to the sample time that the fastest block needs",
+        origin="docs/decisions/0039: the published trials stay below it",
+    )
+    most_samples: int = setting(
+        500_000,
+        unit="count",
+        least=32,
+        reason="samples of a case, averaged where they can be, that are diagnosed at all",
+        origin="docs/decisions/0039: some five minutes",
+    )
+    needed_sample_time: float = setting(
+        0.005,
+        unit="s",
+        above=0.0,
+        reason="sample time that tanks, fed chambers, joints and loads need",
+        origin="that of the published trials",
+    )
+    needed_sealed_sample_time: float = setting(
+        0.1,
+        unit="s",
+        above=0.0,
+        reason="the same where every block is a sealed chamber, whose pressure hardly moves",
+        origin="judgement: the recordings of printed chambers",
     )
     least_channel_samples: int = setting(
         16,
@@ -169,6 +198,106 @@ class PrepareSettings(SettingsGroup):
 
 
 @dataclass(frozen=True)
+class OverlapSettings(SettingsGroup):
+    """When two recordings hold the same samples, so that one proves nothing of the other."""
+
+    noise_share: float = setting(
+        0.5,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="error of one recording's samples told by the other's, over that told by their own "
+        "neighbours, below which their noise is the same: 0 for a copy, about 1 for a repetition",
+        origin="docs/decisions/0039",
+    )
+    usual_share: float = setting(
+        0.9,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of a window's samples that are compared; steps of the signal are left out",
+        origin="judgement",
+    )
+    least_alive: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a window's samples that differ from the one before: at rest on one step "
+        "of a converter two recordings are equal by chance",
+        origin="judgement",
+    )
+    window_samples: int = setting(
+        64,
+        unit="count",
+        least=16,
+        reason="samples of a window in which noise is compared",
+        origin="judgement: the mean of so many differs by a tenth by chance",
+    )
+    least_samples: int = setting(
+        192,
+        unit="count",
+        least=16,
+        reason="samples that are shared at the least: three windows",
+        origin="judgement",
+    )
+    copy_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a recording that is in another one of its role before it is left out",
+        origin="judgement",
+    )
+    lags: int = setting(
+        8, unit="count", least=1, reason="shifts in time that are looked at", origin="judgement"
+    )
+    most_rate_ratio: float = setting(
+        50.0,
+        unit="1",
+        least=1.0,
+        reason="ratio of sample times up to which recordings are compared",
+        origin="judgement",
+    )
+    beside_samples: int = setting(
+        4,
+        unit="count",
+        least=1,
+        reason="neighbours on either side by which a sample is told without the other recording",
+        origin="judgement",
+    )
+    most_blocks: int = setting(
+        200,
+        unit="count",
+        least=4,
+        reason="blocks of a long recording that are compared, spread over it",
+        origin="judgement: seconds for a recording of a million samples",
+    )
+    block_samples: int = setting(
+        256,
+        unit="count",
+        least=64,
+        reason="samples for which one linear combination tells a resampled recording",
+        origin="judgement",
+    )
+    reach: float = setting(
+        10.0,
+        unit="1",
+        above=0.0,
+        reason="samples on either side from which a resampled one is told, for each sample of the "
+        "slower recording",
+        origin="the usual length of filters for resampling",
+    )
+    most_reach: int = setting(
+        40,
+        unit="count",
+        least=2,
+        reason="the same at the most: the combination has far fewer terms than a block has samples",
+        origin="judgement",
+    )
+
+
+@dataclass(frozen=True)
 class PlausibilitySettings(SettingsGroup):
     """What recordings cannot be: wrong units, swapped columns, dead sensors."""
 
@@ -178,6 +307,13 @@ class PlausibilitySettings(SettingsGroup):
         above=0.0,
         reason="gauge pressure that a pressure channel exceeds somewhere, or it is in another unit",
         origin="judgement: bar under a heading in Pa stays below it",
+    )
+    least_gauge_pressure: float = setting(
+        -1.1e5,
+        unit="Pa",
+        most=0.0,
+        reason="gauge pressure below which a sample is no pressure: a vacuum is at -101 kPa",
+        origin="judgement: with the error of a transducer",
     )
     most_pressure: float = setting(
         1e7,

@@ -1,0 +1,158 @@
+"""Files that are read: regular ones, with limits that no honest file comes near."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import os
+import stat
+import tomllib
+from pathlib import Path
+from typing import Any, Final
+
+__all__ = [
+    "MOST_BYTES",
+    "MOST_DEPTH",
+    "MOST_TOML_BYTES",
+    "is_inside",
+    "parse_toml",
+    "read_file",
+    "read_toml",
+]
+
+MOST_BYTES: Final = 512 << 20
+"""Bytes of a table, packed or unpacked."""
+MOST_TOML_BYTES: Final = 4 << 20
+"""Bytes of a description in TOML."""
+MOST_DEPTH: Final = 32
+"""Tables and lists inside each other in TOML."""
+_KINDS: Final = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
+
+
+def read_file(
+    path: str | os.PathLike[str], *, most: int = MOST_BYTES, packed: bool = False
+) -> bytes:
+    """Bytes of a regular file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file; links are followed.
+    most : int
+        Bytes that it may have, packed and unpacked.
+    packed : bool
+        Whether it is packed by gzip; its content is then unpacked.
+
+    Returns
+    -------
+    bytes
+        What is in it.
+
+    Raises
+    ------
+    OSError
+        If it is not there, cannot be read, is not a regular file (a device, a pipe) or has more
+        than `most` bytes.
+    EOFError, zlib.error
+        If it is packed and broken.
+    """
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        kind = next((name for matches, name in _KINDS if matches(mode)), "a special file")
+        raise OSError(f"it is {kind}; a regular file is needed, copy what it gives into one")
+    with open(path, "rb") as stream:
+        data = stream.read(most + 1)
+    if len(data) > most:
+        raise OSError(f"it has more than {_size(most)}, and at most that is read; {_ADVICE}")
+    if not packed:
+        return data
+    with gzip.GzipFile(fileobj=io.BytesIO(data)) as unpacked:
+        content = unpacked.read(most + 1)
+    if len(content) > most:
+        raise OSError(f"it unpacks to more than {_size(most)}, and at most that is read; {_ADVICE}")
+    return content
+
+
+_ADVICE: Final = "cut it into parts"
+
+
+def _size(count: int) -> str:
+    return f"{count >> 20} MB" if count >= 1 << 20 else f"{count} bytes"
+
+
+def read_toml(path: Path) -> str:
+    """Text of a description in TOML.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    OSError
+        As :func:`read_file`.
+    UnicodeDecodeError
+        If it is no text in UTF-8.
+    """
+    return read_file(path, most=MOST_TOML_BYTES).decode("utf-8").replace("\r\n", "\n")
+
+
+def parse_toml(text: str) -> dict[str, Any]:
+    """A TOML document that is not nested without end.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    tomllib.TOMLDecodeError
+        If it is not TOML, or is nested deeper than :data:`MOST_DEPTH`.
+    """
+    deep = f"nested more than {MOST_DEPTH} deep, and at most that is allowed"
+    try:
+        document = tomllib.loads(text)
+    except RecursionError as error:
+        raise tomllib.TOMLDecodeError(deep) from error
+    inside: list[Any] = [document]
+    for _ in range(MOST_DEPTH + 1):
+        inside = [
+            part
+            for value in inside
+            for part in (value.values() if isinstance(value, dict) else value)
+            if isinstance(part, (dict, list))
+        ]
+        if not inside:
+            return document
+    raise tomllib.TOMLDecodeError(deep)
+
+
+def is_inside(folder: Path, path: Path) -> bool:
+    """Whether a file is in a folder or below it, links followed.
+
+    Parameters
+    ----------
+    folder, path : Path
+        They need not be there.
+
+    Returns
+    -------
+    bool
+    """
+    return path.resolve().is_relative_to(folder.resolve())

@@ -1,0 +1,97 @@
+"""Which recordings, samples and channels the answer rests on, and which were not used, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from pamrs import _core
+from pamrs.channels import channel_of
+from pamrs.diagnosis.prepare import Block
+from pamrs.findings import RecordingUsed
+from pamrs.recordings import Recording
+from pamrs.rig import Rig
+
+__all__ = ["data_used"]
+
+_BELONGS = {
+    "supply_pressure": "supply",
+    "supply_command": "supply",
+    "line_pressure": "line",
+    "valve_command": "valve",
+    "joint_angle": "joint",
+    "length": "load",
+}
+"""Block of a rig that a channel is of."""
+
+
+def data_used(
+    recordings: Sequence[Recording],
+    counts: Sequence[int],
+    blocks: Sequence[Block],
+    rig: Rig,
+    core: _core.Rig,
+    *,
+    left_out: bool,
+) -> list[RecordingUsed]:
+    """What of each recording the answer rests on.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Those that were used, as they were used.
+    counts : sequence of int
+        Recorded samples in each of their samples.
+    blocks : sequence of Block
+        The blocks that were judged.
+    rig : Rig
+        The nominal model.
+    core : _core.Rig
+        The same, compiled.
+    left_out : bool
+        Whether a block was left out.
+
+    Returns
+    -------
+    list of RecordingUsed
+    """
+    needed = {name for block in blocks for name in (block.channel, *block.drives)}
+    needed |= set(core.inputs)
+    found = []
+    for recording, count in zip(recordings, counts, strict=True):
+        unused = {
+            name: _why(name, rig, core, left_out)
+            for name in recording.channels
+            if name not in needed
+        }
+        found.append(
+            RecordingUsed(
+                recording=recording.name,
+                role=recording.role,
+                source=recording.source,
+                samples=len(recording),
+                sample_time=recording.sample_time,
+                averaged=count,
+                used=[name for name in recording.channels if name not in unused],
+                unused=unused,
+                masked={
+                    name: share
+                    for name, mask in recording.mask.items()
+                    if (share := float(np.mean(~mask))) > 0.0
+                },
+            )
+        )
+    return found
+
+
+def _why(name: str, rig: Rig, core: _core.Rig, thinned: bool) -> str:
+    """Why a channel is not used."""
+    kind, _, block = name.partition(".")
+    table = _BELONGS.get(channel_of(name), "")
+    if name in core.channels or name in core.inputs:
+        after = " or its block was left out" if thinned else ""
+        return f"no block that is judged needs it{after}"
+    if table and (not rig.model.get(table) or block):
+        return f"the rig has no block [{table}{'.' + block if block else ''}]"
+    return f"no block of the model has a {kind.replace('_', ' ')} to compare it with"

@@ -1,0 +1,148 @@
+"""Outputs: what could not be written is refused before the work; what is done is not lost."""
+
+import errno
+import os
+import sys
+
+import pytest
+
+import pamrs.diagnosis
+import pamrs.recordings
+from pamrs import _writing, cli
+from pamrs._writing import check_writable, write_atomically
+from pamrs.errors import ParameterError
+
+
+class Done:
+    """Stands in for a finished diagnosis."""
+
+    model = 'name = "x"\n'
+    rig = None
+
+    class next_experiment:
+        protocol = None
+
+    def summary(self):
+        return "verdict: none"
+
+    def to_json(self, path):
+        return write_atomically(path, "{}\n")
+
+    def report(self, path):
+        return write_atomically(path, "<html>")
+
+    def figure(self, path):
+        return write_atomically(path, b"png")
+
+
+@pytest.fixture
+def diagnosed(monkeypatch, tmp_path):
+    """A diagnosis that is done at once; how often it was asked for."""
+
+    class Loaded:
+        name = "a case"
+        path = tmp_path
+
+    asked = []
+    monkeypatch.setattr(pamrs.recordings, "load_case", lambda *given, **options: Loaded())
+    monkeypatch.setattr(
+        pamrs.diagnosis, "diagnose", lambda case, **options: asked.append(case) or Done()
+    )
+    return asked
+
+
+def run(capsys, *words):
+    code = cli.main([str(word) for word in words])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+@pytest.mark.parametrize("option", ["--report", "--json", "--png", "--model", "--experiment"])
+def test_what_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, diagnosed, option):
+    for path, part in (
+        (tmp_path / "absent" / "a", "does not exist"),
+        (tmp_path, "is a folder"),
+        ("/proc/a", "takes no file"),
+    ):
+        code, out, err = run(capsys, "diagnose", tmp_path, option, path)
+        assert (code, out, diagnosed) == (2, "", [])
+        assert str(path) in err
+        assert part in err
+
+
+def test_two_results_in_one_file_are_refused(capsys, tmp_path, diagnosed):
+    same = tmp_path / "a.json"
+    code, _, err = run(capsys, "diagnose", tmp_path, "--json", same, "--model", same)
+    assert (code, diagnosed) == (2, [])
+    assert "are the same file" in err
+
+
+def test_a_full_disk_is_seen_before_the_work(tmp_path, monkeypatch):
+    class Full:
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *_):
+            return None
+
+        def write(self, data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(_writing.tempfile, "TemporaryFile", lambda **_: Full())
+    with pytest.raises(OSError, match=r"a\.json: cannot be written.* \(No space left on device\)"):
+        check_writable(tmp_path / "a.json")
+
+
+def test_a_check_leaves_nothing_behind(tmp_path):
+    (tmp_path / "there").write_text("kept", encoding="utf-8")
+    check_writable(tmp_path / "a", None, tmp_path / "there", "/dev/null", "/dev/null")
+    assert [p.name for p in tmp_path.iterdir()] == ["there"]
+    assert (tmp_path / "there").read_text(encoding="utf-8") == "kept"
+    with pytest.raises(ParameterError, match="are the same file"):
+        check_writable(tmp_path / "a", f"{tmp_path}/./a")
+
+
+@pytest.mark.parametrize(
+    ("option", "package"),
+    [("--report", "jinja2"), ("--report", "matplotlib"), ("--png", "matplotlib")],
+)
+def test_a_missing_package_is_told_before_the_work(
+    capsys, tmp_path, monkeypatch, diagnosed, option, package
+):
+    monkeypatch.setitem(sys.modules, package, None)
+    code, out, err = run(capsys, "diagnose", tmp_path, option, tmp_path / "out")
+    assert (code, out, diagnosed) == (2, "", [])
+    assert package in err
+    assert "pip install pamrs[report]" in err
+
+
+def test_what_is_done_is_told_although_a_file_cannot_be_written(
+    capsys, tmp_path, monkeypatch, diagnosed
+):
+    def full(self, path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(Done, "to_json", full)
+    json, report = tmp_path / "a.json", tmp_path / "a.html"
+    code, out, err = run(capsys, "diagnose", tmp_path, "--json", json, "--report", report)
+    assert code == cli.NOT_WRITTEN == 4
+    assert out == "verdict: none\n"
+    assert f"not written: {json} (No space left on device)" in err
+    assert f"written: {report}" in err
+    assert report.read_text(encoding="utf-8") == "<html>"
+    assert not json.exists()
+
+
+def test_a_file_is_whole_or_as_before(tmp_path, monkeypatch):
+    file = tmp_path / "a"
+    file.write_text("before", encoding="utf-8")
+
+    def broken(*_):
+        raise OSError(errno.ENOSPC, "full")
+
+    monkeypatch.setattr(_writing.os, "replace", broken)
+    with pytest.raises(OSError, match="full"):
+        write_atomically(file, "after")
+    assert [(p.name, p.read_text(encoding="utf-8")) for p in tmp_path.iterdir()] == [
+        ("a", "before")
+    ]

@@ -1,0 +1,98 @@
+"""What an answer rests on: long recordings are averaged, channels without use are told."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import available_blocks, averaged, averaged_to_need
+from pamrs.errors import DiagnosisError
+from pamrs.recordings import Recording
+from tests.diagnosis.test_overlap import of, run
+
+SETTINGS = DiagnosisSettings()
+NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+
+
+def test_means_are_of_their_time_and_free_of_aliases() -> None:
+    dt = 0.001
+    time = dt * np.arange(5000)
+    hum = np.sin(2 * np.pi * 200.0 * time)  # would be a constant at every fifth sample
+    volts = np.where(time < 2.0015, 5.0, 6.0)
+    fast = of(
+        "fast", "fit", dt, {"muscle_pressure": 1e5 * time + 1e4 * hum, "valve_command": volts}
+    )
+    slow = averaged(fast, 5)
+    assert slow.sample_time == pytest.approx(0.005)
+    assert len(slow) == 999
+    middle = slow.time + 0.002
+    np.testing.assert_allclose(slow.channels["muscle_pressure"], 1e5 * middle, atol=1e-6)
+    # a command holds from the middle of its mean on
+    step = slow.channels["valve_command"]
+    assert step[399] == 5.0
+    assert step[400] == 6.0
+    assert averaged(fast, 1) is fast
+
+
+def test_holes_stay_holes() -> None:
+    values = np.arange(50.0)
+    values[10:13] = np.nan  # three of five
+    values[20:22] = np.nan  # two of five
+    slow = averaged(of("a", "fit", 0.001, {"muscle_pressure": values}), 5)
+    assert slow.mask["muscle_pressure"].tolist() == [True, True, False] + [True] * 6
+    assert np.isnan(slow.channels["muscle_pressure"][2])
+    assert slow.channels["muscle_pressure"][4] == pytest.approx(23.0)
+
+
+def test_only_long_cases_are_averaged_and_no_further_than_needed() -> None:
+    one = run()
+    blocks = available_blocks(pamrs.rigs.shoulder(), NAMES, SETTINGS.prepare)
+    few = replace(SETTINGS.prepare, ample_samples=3000)
+    assert averaged_to_need([one], blocks, "a", SETTINGS.prepare) == ([one], [1])
+    assert averaged_to_need([one], blocks, "a", few)[1] == [1]  # at the rate that is needed
+    quick = run(dt=0.001, duration=4.0)
+    assert averaged_to_need([quick, one], blocks, "a", few)[1] == [5, 1]
+    with pytest.raises(
+        DiagnosisError, match=r"'long': .* 3999 samples .* at most 3500 .* start and"
+    ):
+        averaged_to_need([quick, one], blocks, "long", replace(few, most_samples=3500))
+    sealed = available_blocks(pamrs.rigs.sealed_chamber(), ("muscle_pressure",), SETTINGS.prepare)
+    assert averaged_to_need([quick], sealed, "a", few)[1] == [99]
+
+
+def test_channels_without_use_are_told_everywhere() -> None:
+    rig = pamrs.rigs.sealed_chamber()
+    leaky = rig.with_effect("leak_muscle", {"conductance": 3e-11})
+    made = pamrs.simulate(
+        leaky, duration=60.0, sample_time=0.02, step=0.01, initial={"muscle_pressure": 7e5}
+    )
+    rng = np.random.default_rng(1)
+    size = made.time.size
+    channels = {
+        "muscle_pressure": made["muscle_pressure"] + rng.normal(0.0, 150.0, size),
+        "line_pressure": rng.normal(1e5, 150.0, size),
+        "temperature": rng.normal(293.0, 0.1, size),
+    }
+    hold: Recording = of("hold", "fit", 0.02, channels)
+    settings = SETTINGS.with_values({"prepare.ample_samples": 1000})
+    found = pamrs.diagnose(pamrs.Case("hold", rig, [hold], Path()), settings=settings)
+    assert [e.id for e in found.effects][:1] == ["leak_muscle"]
+    (own,) = json.loads(found.to_json())["data"]
+    assert own["used"] == ["muscle_pressure"]
+    assert own["unused"] == {
+        "line_pressure": "the rig has no block [line]",
+        "temperature": "no block that is judged needs it",
+    }
+    assert (own["averaged"], own["samples"]) == (5, 599)
+    told = " ".join(found.summary().split())
+    assert "at 10 Hz (means of 5 samples recorded at 50 Hz); used: muscle_pressure" in told
+    assert "recorded but not used: line_pressure (the rig has no block [line])" in told
+    from pamrs.report import render_html
+
+    assert "recorded but not used: line_pressure" in render_html(found)

@@ -1,0 +1,98 @@
+"""Samples that a sensor dropped: masked in any channel, told with their times, and no window
+begins with them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import without_impossible
+from pamrs.recordings import Recording, load_recording
+from pamrs.recordings._faults import find_faults
+from tests.diagnosis.test_load import RIG, recording
+
+SETTINGS = DiagnosisSettings()
+
+
+def dropped(name: str, value: float, stretches: list[tuple[int, int]]) -> Recording:
+    """A lift in which one channel has another value now and then."""
+    one = recording(RIG, "slow", "fit", 0, 6.0)
+    values = one.channels[name].copy()
+    for first, last in stretches:
+        values[first:last] = value
+    return replace(one, channels=one.channels | {name: values}, source="lift.csv")
+
+
+@pytest.mark.parametrize("value", [0.0, 3.0])
+def test_a_length_beyond_the_load_does_not_end_the_run(value: float) -> None:
+    """Also where windows of the load begin: at 0 and 2.5 s."""
+    bad = dropped("length", value, [(0, 12), (495, 520), (1000, 1010)])
+    found = pamrs.diagnose(pamrs.Case("lift", RIG, [bad], Path()))
+    assert found.verdict in ("none", "parameters")
+    (told,) = (text for text in found.warnings if "beyond the possible" in text)
+    assert "47 samples of length in lift.csv" in told
+    assert "0 to 0.055 s, 2.475 to 2.595 s, 5 to 5.045 s" in told
+    (own,) = found.data
+    assert own.masked["length"] == pytest.approx(47 / len(bad))
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("muscle_pressure", -2e5), ("supply_pressure", 2e7), ("length", -1.0)]
+)
+def test_every_channel_is_looked_at(name: str, value: float) -> None:
+    bad = dropped(name, value, [(30, 40)])
+    (masked,), (told,) = without_impossible([bad], RIG, SETTINGS.plausibility)
+    assert np.flatnonzero(~masked.mask[name]).tolist() == list(range(30, 40))
+    assert np.isnan(masked.channels[name][30:40]).all()
+    assert f"10 samples of {name} in lift.csv" in told
+    sound = dropped(name, value, [])
+    (kept,), said = without_impossible([sound], RIG, SETTINGS.plausibility)
+    assert said == []
+    assert all(mask.all() for mask in kept.mask.values())
+
+
+@pytest.mark.parametrize("channel", ["joint_angle", "length", "muscle_pressure", "temperature"])
+@pytest.mark.parametrize("rail", [-0.5, 9.0])
+def test_rails_inside_the_possible_are_masked_too(channel: str, rail: float) -> None:
+    rng = np.random.default_rng(2)
+    values = 3.0 + np.sin(0.01 * np.arange(3000)) + rng.normal(0.0, 0.01, 3000)
+    for first, last in ((0, 9), (700, 705), (1500, 1540)):
+        values[first:last] = rail
+    masked = np.zeros(3000, dtype=bool)
+    for fault in find_faults(channel, values):
+        assert fault.masked
+        masked[fault.start : fault.stop] = True
+    assert masked[:9].all()
+    assert masked[700:705].all()
+    assert masked[1500:1540].all()
+    assert masked.sum() == 54
+
+
+def test_a_valve_that_vents_at_once_is_no_dropout() -> None:
+    """A slow log of a muscle that is filled and vented between two rows."""
+    rng = np.random.default_rng(2)
+    full = np.repeat(np.arange(60) % 2, 20) * 5e5
+    values = np.maximum(full + (full > 0) * rng.normal(0.0, 300.0, full.size), 0.0)
+    assert not [f for f in find_faults("muscle_pressure", values) if f.masked]
+
+
+def test_jitter_of_the_timer_is_one_line(tmp_path: Path) -> None:
+    rng = np.random.default_rng(4)
+    stamps = 0.005 * np.arange(2000) + 0.0004 * rng.standard_normal(2000)
+    late = np.arange(100, 1900, 160)
+    keep = np.ones(2000, dtype=bool)
+    keep[late] = False
+    keep[1950:1970] = False
+    rows = "".join(f"{t:.5f},{2e5 + 300 * rng.standard_normal():.0f}\n" for t in stamps[keep])
+    file = tmp_path / "a.csv"
+    file.write_text("time [s],muscle_pressure [Pa]\n" + rows)
+    issues = [issue for issue in load_recording(file).issues if issue.channel == "time"]
+    assert len(issues) == 2
+    assert f"timer jitter: {late.size} times" in issues[0].text
+    assert "(about 20 missing)" in issues[1].text
