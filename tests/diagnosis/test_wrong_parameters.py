@@ -173,11 +173,9 @@ def test_a_dead_time_of_the_command_and_a_late_clock_stay_a_set() -> None:
     )
     assert found.verdict == "effects"
     assert sorted(found.ambiguity) == [["clock_skew"], ["input_path_lag"]]
-    # a spool of second order is late by 2 zeta T, a lag behind a delay by their sum
+    # a spool of second order is late by its time constant, a lag behind a delay by their sum
     told = {name: entry["value"] for name, entry in found.effects[0]["parameters"].items()}
-    lag = told["time_constant"]
-    late_by = lag * 2.0 * told["damping_ratio"] if "damping_ratio" in told else lag + told["delay"]
-    assert late_by == pytest.approx(0.025, rel=0.25)
+    assert told["time_constant"] + told.get("delay", 0.0) == pytest.approx(0.025, rel=0.2)
     assert "with the logger of the pressures" in found.next_experiment["text"]
 
 
