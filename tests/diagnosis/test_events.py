@@ -21,7 +21,12 @@ ROLES = {"lift": "fit", "lower": "fit", "again": "held_out"}
 
 
 def recordings(
-    effect: str, make: dict[str, float], duration: float = 12.0, *, plant: pamrs.Rig | None = None
+    effect: str,
+    make: dict[str, float],
+    duration: float = 12.0,
+    *,
+    plant: pamrs.Rig | None = None,
+    form: str = "",
 ) -> list[Recording]:
     """Recordings of a shoulder with an event each, with the noise of transducers."""
     found = []
@@ -33,7 +38,8 @@ def recordings(
             + (0.35 + 0.1 * number) * np.sin(2 * np.pi * 0.15 * time)
             + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
         )
-        rig = (plant or pamrs.rigs.shoulder()).with_effect(effect, make | {"time": when})
+        rig = plant or pamrs.rigs.shoulder()
+        rig = rig.with_effect(effect, make | {"time": when}, form=form)
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
         channels = {
             "valve_command": command,
@@ -71,6 +77,25 @@ def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -
     for name, when in TIMES.items():
         assert abs(times[name] - when) < 0.25, name
     assert found.fit["gap_closed"] > 0.8
+
+
+@pytest.mark.slow
+def test_a_payload_that_is_poured_is_told_as_a_ramp() -> None:
+    poured = {"mass_change": 0.6, "duration": 3.0}
+    records = recordings("payload_change", poured, form="ramp")
+    found = pamrs.diagnose(pamrs.Case("poured", pamrs.rigs.shoulder(), records, Path()))
+    (effect,) = found.effects
+    assert (effect["id"], effect["form"]) == ("payload_change", "ramp")
+    assert found.probabilities["payload_change"] > 0.8
+    told = effect["parameters"]["mass_change"]
+    assert abs(told["value"] - 0.6) < max(0.03, 2.0 * told["std"])
+    assert {event["recording"] for event in effect["events"]} == TIMES.keys()
+    for event in effect["events"]:
+        assert abs(event["time"] - TIMES[event["recording"]]) < 0.4
+        assert abs(event["duration"] - 3.0) < 0.8
+    assert found.fit["gap_closed"] > 0.8
+    # the model that is written holds what it found, in its form
+    assert [e["form"] for e in found.rig.effects] == ["ramp"]
 
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:

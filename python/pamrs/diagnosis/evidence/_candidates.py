@@ -226,7 +226,8 @@ class Attempts:
         leading = EFFECTS[effect].leading
         size = found.values[f"{effect}.{leading.name}"] if leading.same_everywhere else None
         quiet = residuals(self.outer, bare)
-        events = look_for_events(effect, self.outer, bare, quiet, white, size)
+        form = found.events.form if found.events else ""
+        events = look_for_events(effect, self.outer, bare, quiet, white, size, form)
         if events is None:
             return self.judged(effects, found, quiet)
         everywhere = replace(
@@ -270,7 +271,7 @@ class Attempts:
         return replace(
             again,
             effects=(*beside.effects, effect),
-            rig=again.rig.with_effect(effect, happened),
+            rig=again.rig.with_effect(effect, happened, form=found.events.form),
             values=again.values | {n: v for n, (v, _) in parts.items()},
             std=again.std | {n: s for n, (_, s) in parts.items()},
         )

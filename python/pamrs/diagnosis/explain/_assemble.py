@@ -608,7 +608,7 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     found = []
     rises = [p.name for p in EFFECTS[effect].with_role("rise")]
     for recording, values in events.values.items():
-        for parameters in events_of(effect):
+        for parameters in events_of(effect, events.form):
             own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
             if own:
                 found.append(

@@ -62,11 +62,7 @@ def free_run(
 
 def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
     """A model with what happened in one recording."""
-    if events is None:
-        return rig
-    own = events.values.get(recording.name)
-    rig = rig.without_effect(events.effect)
-    return rig.with_effect(events.effect, own) if own else rig
+    return rig if events is None else events.put_into(rig, recording.name)
 
 
 def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, final: Rig) -> FreeRun:

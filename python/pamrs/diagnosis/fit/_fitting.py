@@ -91,10 +91,19 @@ class Events:
         Its id.
     values : dict of str to dict
         Its parameters (SI) by recording; a recording without an entry has none.
+    form : str
+        Its form; empty for the usual one.
     """
 
     effect: str
     values: dict[str, dict[str, float]]
+    form: str = ""
+
+    def put_into(self, rig: Rig, recording: str) -> Rig:
+        """A rig with what happened in one recording, and without it where nothing did."""
+        own = self.values.get(recording)
+        rig = rig.without_effect(self.effect)
+        return rig.with_effect(self.effect, own, form=self.form) if own else rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,9 +193,9 @@ def residuals(
     """
     core = _compiled(problem, rig)
     own = {
-        prepared.recording.name: _compiled(problem, rig.with_effect(events.effect, values))
-        for prepared in problem.recordings
-        if events is not None and (values := events.values.get(prepared.recording.name))
+        name: _compiled(problem, events.put_into(rig, name))
+        for name in (prepared.recording.name for prepared in problem.recordings)
+        if events is not None and events.values.get(name)
     }
 
     def one(block: Block, prepared: Prepared) -> Residual:

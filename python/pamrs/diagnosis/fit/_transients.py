@@ -40,7 +40,7 @@ __all__ = ["events_of", "fit_events", "look_for_events"]
 Array = NDArray[np.float64]
 
 
-def events_of(effect: str) -> list[list[EffectParameter]]:
+def events_of(effect: str, form: str = "") -> list[list[EffectParameter]]:
     """Parameters (size, time, duration) of each event that one recording can have, the first
     event's first.
 
@@ -48,10 +48,12 @@ def events_of(effect: str) -> list[list[EffectParameter]]:
     ----------
     effect : str
         A transient effect.
+    form : str
+        Its form; the usual one where it is empty.
     """
-    info = EFFECTS[effect]
-    first = [p for p in info.parameters if p is info.leading or p.role in ("time", "duration")]
-    every = [[p, *(q for q in info.parameters if q.repeats == p.name)] for p in first]
+    own, leading = EFFECTS[effect].form(form).parameters, EFFECTS[effect].leading.name
+    first = [p for p in own if p.name == leading or p.role in ("time", "duration")]
+    every = [[p, *(q for q in own if q.repeats == p.name)] for p in first]
     return [list(one) for one in zip(*every, strict=True)]
 
 
@@ -106,14 +108,39 @@ def fit_events(
     last = _jointly(found, problem, nominal, baseline, inflation)
     if last is None or last.events is None:
         return None
+    for form in EFFECTS[effect].forms[1:]:
+        if not form.transient:
+            continue
+        again = _jointly(
+            _in_form(last.events or found, form.name), problem, nominal, baseline, inflation
+        )
+        least = problem.settings.transients.least_gain
+        if again is not None and 2.0 * (last.cost - again.cost) > least:
+            last = again
+    assert last.events is not None
     first = next(iter(last.events.values.values()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
     return replace(
         last,
         effects=(effect,),
-        rig=last.rig.with_effect(effect, first),
+        rig=last.rig.with_effect(effect, first, form=last.events.form),
         values=last.values | values,
     )
+
+
+def _in_form(events: Events, form: str) -> Events:
+    """Events in another form: what the forms share stays, and what comes over a time of its own
+    begins half of it earlier.
+    """
+    effect = events.effect
+    values = {}
+    for name, own in events.values.items():
+        told = {p.name: own.get(p.name, _tried(p)) for p in EFFECTS[effect].form(form).parameters}
+        new = [p for event in events_of(effect, form) for p in event if p.name not in own]
+        early = sum(0.5 * told[p.name] for p in new if p.role == "duration")
+        later = [p.name for event in events_of(effect, form) for p in event if p.role == "time"]
+        values[name] = told | {n: max(0.0, told[n] - early) for n in later}
+    return Events(effect, values, form)
 
 
 def look_for_events(
@@ -123,6 +150,7 @@ def look_for_events(
     base: dict[Key, Residual],
     inflation: dict[str, float],
     size: float | None = None,
+    form: str = "",
 ) -> Events | None:
     """The events of an effect in each recording, at a model that stays.
 
@@ -140,6 +168,8 @@ def look_for_events(
         As in :func:`pamrs.diagnosis.fit.fit`.
     size : float, optional
         Size that is known; times alone are looked for.
+    form : str, optional
+        Form in which they are fitted; they are looked for in the usual one.
 
     Returns
     -------
@@ -150,12 +180,13 @@ def look_for_events(
     def one(prepared: Prepared) -> dict[str, float] | None:
         alone = replace(problem, recordings=[prepared])
         own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
+        name = prepared.recording.name
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
-        return (
-            _fitted(effect, started, alone, prepared, rig, inflation, size is not None, stopped)
-            if started
-            else None
-        )
+        if not started:
+            return None
+        begun = Events(effect, {name: started})
+        begun = _in_form(begun, form) if form else begun
+        return _fitted(begun, alone, prepared, rig, inflation, size is not None, stopped)
 
     stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -169,7 +200,7 @@ def look_for_events(
         for p, own in zip(problem.recordings, found, strict=True)
         if own is not None
     }
-    return Events(effect, values) if values else None
+    return Events(effect, values, form) if values else None
 
 
 def _scan(
@@ -273,8 +304,7 @@ def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float
 
 
 def _fitted(
-    effect: str,
-    start: dict[str, float],
+    begun: Events,
     alone: Problem,
     prepared: Prepared,
     rig: Rig,
@@ -285,8 +315,9 @@ def _fitted(
     """Events of one recording fitted alone, at a model that stays; None where the model leaves its
     range.
     """
+    effect, start = begun.effect, begun.values[prepared.recording.name]
     settings, leading = alone.settings, EFFECTS[effect].leading
-    free = [p for p in start if not (keep_size and _first_of(effect, p) is leading)]
+    free = [p for p in start if not (keep_size and _first_of(effect, p).name == leading.name)]
     scale = np.array([_scale(effect, p, settings.transients) for p in free])
     limits = [_limits(effect, p, prepared, settings.transients) for p in free]
     low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
@@ -297,18 +328,16 @@ def _fitted(
     def evaluate(x: Array) -> tuple[Array, Array, None]:
         if stopped.is_set():
             raise SimulationError("the search for events was stopped")
-        events = Events(effect, {prepared.recording.name: told(x)})
+        events = replace(begun, values={prepared.recording.name: told(x)})
         found = residuals(alone, rig, [f"{effect}.{p}" for p in free], events)
         rows, slope = stacked(alone, found, inflation)
         assert slope is not None
         return rows, slope * scale, None
 
     try:
-        begun, most = (
-            np.array([start[p] for p in free]) / scale,
-            settings.transients.evaluations_alone,
-        )
-        x, _, _ = levenberg_marquardt(evaluate, begun, (low, high), most, settings.fit)
+        most = settings.transients.evaluations_alone
+        first = np.array([start[p] for p in free]) / scale
+        x, _, _ = levenberg_marquardt(evaluate, first, (low, high), most, settings.fit)
     except SimulationError:
         return None
     return told(x)
@@ -440,7 +469,7 @@ class _Joint:
         for (name, p), value in zip(self.places, x[len(self.names) :] * self.scale, strict=True):
             for own in values.values() if name == "" else [values[name]]:
                 own[p] = float(value)
-        return Events(self.events.effect, values)
+        return replace(self.events, values=values)
 
     def evaluate(self, x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
         """Stacked residuals and priors, their sensitivities, and the residuals by block and
