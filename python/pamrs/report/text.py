@@ -19,12 +19,12 @@ from pamrs.findings import (
 )
 
 __all__ = [
-    "data_sentence",
     "blocks_label",
     "budget_sentence",
     "budgets",
     "chance_of",
     "claim",
+    "data_sentence",
     "display_unit",
     "effect_heading",
     "effect_title",
@@ -48,6 +48,7 @@ __all__ = [
     "set_label",
     "span95",
     "term_label",
+    "told_apart",
     "told_blocks",
     "told_probabilities",
 ]
@@ -340,9 +341,7 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
     if len(block.ambiguity) > 1:
-        rivals = "these recordings cannot tell " + _from_each_other(
-            block.ambiguity, block.probabilities
-        )
+        rivals = "these recordings cannot tell " + told_apart(block.ambiguity, block.probabilities)
         healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
         if all(
             "." in name or name in ("none", "parameters") for s in block.ambiguity for name in s
@@ -441,7 +440,7 @@ def _how_sure(chance: float) -> str:
     return f", probability {format_probability(chance)}" if is_number(chance) else ""
 
 
-def _from_each_other(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:
+def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:
     """Hypotheses that are left, the most probable first: ``a (0.80) from b (0.12)``, ``a (0.50), b
     (0.30) and c (0.20) apart``.
     """
@@ -491,7 +490,7 @@ def _unnamed(diagnosis: Findings) -> str:
         which = f": {', '.join(moved)}" if moved else ""
         return f"No physics is missing; parameter values explain the difference{which}"
     if len(doubtful) > 1:
-        apart = _from_each_other(doubtful, diagnosis.probabilities)
+        apart = told_apart(doubtful, diagnosis.probabilities)
         return f"Physics is missing{place}: these recordings cannot tell {apart}"
     return _outside(diagnosis, place)
 

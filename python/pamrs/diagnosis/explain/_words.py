@@ -22,6 +22,7 @@ from pamrs.report.text import (
     leading,
     name_chance,
     sentence_of,
+    told_apart,
 )
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -273,8 +274,10 @@ def _beside(
 
 def _unsettled(diagnosis: Findings) -> str:
     """The sets that are left, as a sentence; empty where the answer is settled."""
-    sets = " or ".join("{" + ", ".join(s) + "}" for s in diagnosis.ambiguity)
-    return f" It is not settled: these data do not separate {sets}." if sets else ""
+    if len(diagnosis.ambiguity) < 2:
+        return ""
+    apart = told_apart(diagnosis.ambiguity, diagnosis.probabilities)
+    return f" It is not settled: these recordings cannot tell {apart}."
 
 
 def _capital(text: str) -> str:
