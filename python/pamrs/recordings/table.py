@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 
-__all__ = ["Table", "is_text", "read_table", "read_text", "split_rows"]
+__all__ = ["NO_VALUE", "Table", "is_text", "read_table", "read_text", "split_rows"]
 
 Array = NDArray[np.float64]
 
-_NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
+NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 _TEXT = (".csv", ".tsv", ".txt", ".dat", "")
 
 
@@ -80,7 +80,7 @@ class Table:
         for row, cell in enumerate(cells):
             text = cell.strip()
             try:
-                values[row] = math.nan if text.lower() in _NO_VALUE else float(text)
+                values[row] = math.nan if text.lower() in NO_VALUE else float(text)
             except ValueError:
                 raise RecordingError(
                     (
@@ -159,7 +159,8 @@ def read_text(path: Path) -> str:
     try:
         data = path.read_bytes()
         raw = gzip.decompress(data) if packed else data
-        text = raw.decode("utf-8-sig")
+        wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
+        text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         raise RecordingError(
             f"{path}: not a text file in UTF-8; readable are {_READABLE}"
@@ -244,7 +245,8 @@ def _parquet(path: Path) -> Table:
 _READERS: Final[dict[str, Callable[[Path], Table]]] = {".parquet": _parquet}
 """Reader of each ending whose files are not text: a new kind is one function and its entry here."""
 _READABLE: Final = (
-    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}"
+    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}; "
+    "other logs with the key channels (pamrs import LOG writes it)"
 )
 
 

@@ -1,0 +1,128 @@
+"""Logs of a laboratory: every format, written by its own library, gives the same recording."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pamrs.errors import MissingPackageError, RecordingError
+from pamrs.recordings import load_recording, load_recordings
+from pamrs.recordings import logs as logs_package
+from pamrs.recordings.logs import TextFormat, read_log
+from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, mapping, signals, written
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_same_log_gives_the_same_recording(tmp_path: Path, kind: str) -> None:
+    data = signals()
+    file, pattern, time = written(tmp_path, kind)
+    (got,) = load_recordings(file, channels=mapping(pattern), time=time)
+    plain = tmp_path / "plain.csv"
+    head = "time [s],valve_command [V],muscle_pressure [bar],joint_angle [deg]"
+    np.savetxt(plain, np.column_stack(list(data.values())), "%.6f", ",", header=head, comments="")
+    wanted = load_recording(plain)
+    assert got.sample_time == wanted.sample_time == DT
+    assert len(got) == len(wanted) == N
+    assert got.units == wanted.units
+    for channel in CHANNELS:
+        np.testing.assert_array_equal(got.mask[channel], wanted.mask[channel])
+        np.testing.assert_allclose(got.channels[channel], wanted.channels[channel], rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_names_and_units_are_listed(tmp_path: Path, kind: str) -> None:
+    file, pattern, _ = written(tmp_path, kind)
+    log = read_log(file)
+    for name, unit in UNITS.items():
+        series = log.find(pattern.format(name))
+        assert len(series.values) == N
+        assert series.unit in ("", unit, "°" if unit == "deg" else unit)
+
+
+def text_log(tmp_path: Path, text: str, **form: Any) -> Any:
+    file = tmp_path / "log.txt"
+    file.write_text(text, encoding="utf-8")
+    return read_log(file, TextFormat(**form))
+
+
+def test_a_table_without_headings(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * i:.1f} {i % 7} {i}\n" for i in range(30))
+    assert list(text_log(tmp_path, rows).series) == ["column 1", "column 2", "column 3"]
+    named = text_log(tmp_path, rows, columns=("t [ms]", "p", "n"))
+    assert list(named.series) == ["t", "p", "n"]
+    assert named.series["t"].unit == "ms"
+    with pytest.raises(RecordingError, match="columns lists 2 names, but there are 3 columns"):
+        text_log(tmp_path, rows, columns=("t", "p"))
+
+
+def test_dates_times_of_day_texts_and_thousands(tmp_path: Path) -> None:
+    rows = "".join(
+        f"12.05.2024 23:59:{50 + i // 2:02d},{5 * (i % 2)}00;trial {i // 4};1.00{i},5\n"
+        if i < 20
+        else f"13.05.2024 00:00:{(i - 20) // 2:02d},{5 * (i % 2)}00;trial {i // 4};1.00{i % 10},5\n"
+        for i in range(40)
+    )
+    log = text_log(tmp_path, "when;what;load (N)\n" + rows, thousands=".", decimal=",")
+    np.testing.assert_allclose(log.series["when"].values, 0.5 * np.arange(40))
+    assert log.series["what"].labels[:2] == ("trial 0", "trial 1")
+    assert log.series["load"].unit == "N"
+    assert log.series["load"].values[3] == 1003.5
+    night = "".join(f"{23 if i < 9 else 0}:{(51 + i) % 60:02d}:00,{i}\n" for i in range(20))
+    log = text_log(tmp_path, "clock,p\n" + night)
+    np.testing.assert_allclose(log.series["clock"].values, 60.0 * np.arange(20))
+
+
+def test_a_cell_that_is_no_number_is_told_where_it_matters(tmp_path: Path) -> None:
+    rows = "".join(f"{i},{'oops' if i == 7 else i}\n" for i in range(40))
+    log = text_log(tmp_path, "t,p\n" + rows)
+    with pytest.raises(RecordingError, match="'p' cannot be used: in row 8 .*'oops'"):
+        log.find("p")
+
+
+def test_names_that_are_not_there(tmp_path: Path) -> None:
+    file, _, _ = written(tmp_path, "hdf5")
+    log = read_log(file)
+    assert log.find("p1") is log.series["daq/p1"]
+    with pytest.raises(RecordingError, match=r"no channel 'daq/p2'; did you mean 'daq/p1'\?"):
+        log.find("daq/p2")
+
+
+@pytest.mark.parametrize(
+    "ending", ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather"]
+)
+def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"broken.{ending}"
+    file.write_bytes(b"\x00\x01 this is none of these formats " * 20)
+    with pytest.raises(RecordingError, match=f"broken.{ending}"):
+        read_log(file)
+
+
+@pytest.mark.parametrize(("name", "words"), [("a.docx", "'.docx'"), (".", "a folder"), ("b", "no")])
+def test_what_is_not_read(tmp_path: Path, name: str, words: str) -> None:
+    if name != "b":
+        file = tmp_path / name
+        file.exists() or file.write_text("x")
+    with pytest.raises(RecordingError, match=words):
+        read_log(tmp_path / name)
+
+
+def test_a_missing_package_is_named_with_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, pattern, _ = written(tmp_path, "mf4")
+    there = importlib.util.find_spec
+    monkeypatch.setattr(
+        logs_package, "find_spec", lambda name: None if name == "asammdf" else there(name)
+    )
+    with pytest.raises(MissingPackageError, match=r"asammdf.*pip install 'pamrs\[logs\]'"):
+        load_recordings(file, channels=mapping(pattern))
+
+
+def test_objects_in_numpy_files_are_not_executed(tmp_path: Path) -> None:
+    np.save(tmp_path / "x.npy", np.array([{}], dtype=object), allow_pickle=True)
+    with pytest.raises(RecordingError, match="allow_pickle"):
+        read_log(tmp_path / "x.npy")
