@@ -58,6 +58,25 @@ def test_without_a_folder_it_is_printed(
     assert list(tmp_path.iterdir()) == [tmp_path / "run.npz"]
 
 
+def test_columns_without_headings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = "".join(f"{10 * i};{i % 9 / 8:.3f};{i}\n" for i in range(60))
+    (tmp_path / "run.csv").write_text(rows, encoding="utf-8")
+    names = "time [ms], muscle_pressure [bar], n"
+    code, out, _ = run(
+        capsys,
+        tmp_path / "run.csv",
+        "--columns",
+        names,
+        "--rig",
+        "sealed_chamber",
+        "--out",
+        tmp_path,
+    )
+    assert (code, "100 Hz" in out) == (0, True)
+    (only,) = load_case(tmp_path).recordings
+    assert (len(only), only.sample_time) == (60, 0.01)
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

@@ -126,3 +126,15 @@ def test_objects_in_numpy_files_are_not_executed(tmp_path: Path) -> None:
     np.save(tmp_path / "x.npy", np.array([{}], dtype=object), allow_pickle=True)
     with pytest.raises(RecordingError, match="allow_pickle"):
         read_log(tmp_path / "x.npy")
+
+
+def test_points_that_part_thousands_are_seen_where_nothing_else_is_possible(tmp_path: Path) -> None:
+    rows = "".join(f"{i // 10}.{i % 10}00.000;{i % 7}.125\n" for i in range(40))
+    log = text_log(tmp_path, rows)
+    np.testing.assert_array_equal(log.series["column 1"].values, 1e5 * np.arange(40))
+    np.testing.assert_array_equal(log.series["column 2"].values, np.arange(40) % 7 + 0.125)
+
+
+def test_a_text_that_is_no_table(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no table was found"):
+        text_log(tmp_path, '{"ob": [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3]], "action": [0.1, 0.2]}')

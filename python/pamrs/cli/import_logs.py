@@ -39,16 +39,25 @@ def import_command(
         str | None,
         typer.Option(help='For logs without any clock: the spacing of the samples, "1 ms".'),
     ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help='For tables without headings: a name for each column, "time [ms], p1 [bar], x".'
+        ),
+    ] = None,
 ) -> None:
     """List the channels of logs, and propose which of them is which channel of the rig."""
     file = None if out is None else out / "case.toml"
     if file is not None and file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
     from pamrs.recordings import propose
-    from pamrs.recordings.logs import check_readable
+    from pamrs.recordings.logs import TextFormat, check_readable
 
     for path in log:
         check_readable(path)
+    form = None
+    if columns is not None:
+        form = TextFormat(columns=tuple(name.strip() for name in columns.split(",")))
     model = None if rig is None else rig_named(rig)
     step = None if sample_time is None else exact("sample_time", sample_time, "time")
     if step is not None and not 0.0 < step < math.inf:
@@ -58,7 +67,7 @@ def import_command(
             f"{as_given('sample_time', sample_time or '')} is not allowed: a time above zero"
         )
     with progress(f"reading {len(log)} log{'s' if len(log) > 1 else ''}"):
-        proposal = propose(log, model, sample_time=step)
+        proposal = propose(log, model, sample_time=step, form=form)
     for item in proposal.logs:
         _show(item)
     folder = out or Path()

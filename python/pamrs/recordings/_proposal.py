@@ -22,7 +22,19 @@ from pamrs.units import parse_unit, same_dimension
 
 __all__ = ["Listed", "LogProposal", "Proposal", "propose"]
 
-_TIMES: Final = ("t", "time", "zeit", "timestamp", "stamp", "seconds", "sec", "clock", "when")
+_TIMES: Final = (
+    "t",
+    "time",
+    "zeit",
+    "timestamp",
+    "stamp",
+    "seconds",
+    "sec",
+    "clock",
+    "when",
+    "tijd",
+    "tiempo",
+)
 _TRIALS: Final = ("trial", "run", "test", "segment", "cycle", "versuch", "experiment", "lift")
 _LONG: Final = 50.0  # usual intervals: a longer pause, of a second at least, parts recordings
 _MOST_PARTS: Final = 200
@@ -99,10 +111,13 @@ class Proposal:
         In the order in which they were given.
     sample_time : float, optional
         What was given for logs without a clock [s].
+    columns : tuple of str, optional
+        Names that were given for columns without any.
     """
 
     logs: list[LogProposal]
     sample_time: float | None = None
+    columns: tuple[str, ...] | None = None
 
     def case_toml(self, folder: Path, rig: str = "rig.toml") -> str:
         """The text of a ``case.toml`` that points at the logs.
@@ -148,6 +163,8 @@ class Proposal:
         file = os.path.relpath(item.log.path.resolve(), folder.resolve())
         lines = ["", *(f"# {text}" for text in item.remarks if role == "fit" or pieces is None)]
         lines += ["[[recording]]", f"file = {_toml(Path(file).as_posix())}", f'role = "{role}"']
+        if self.columns is not None:
+            lines.append(f"columns = {_toml(list(self.columns))}")
         if item.time:
             lines.append(f"time = {_toml(item.time)}")
         elif self.sample_time is not None and not any(
@@ -218,13 +235,15 @@ def propose(
         sample_time = positive("sample_time", sample_time)
     wanted = channels_of(rig)
     read = [read_log(Path(path), form) for path in paths]
-    return Proposal([_proposal(log, wanted, rig, sample_time) for log in read], sample_time)
+    proposals = [_proposal(log, wanted, rig, sample_time) for log in read]
+    return Proposal(proposals, sample_time, form.columns if form else None)
 
 
 def _proposal(
     log: Log, wanted: Sequence[str], rig: Rig | None, sample_time: float | None
 ) -> LogProposal:
-    clocks = {name: _clock_column(log, series) for name, series in log.series.items()}
+    rising = [series for series in log.series.values() if _like_a_clock(series)]
+    clocks = {name: _clock_column(rising, series) for name, series in log.series.items()}
     used = {entry["column"] for entry in clocks.values() if entry}
     candidates = [series for name, series in log.series.items() if name not in used]
     matches, remarks = matched(candidates, wanted, rig)
@@ -257,26 +276,28 @@ def _proposal(
     return LogProposal(log, listed, matches, shared, split, parts, remarks)
 
 
-def _clock_column(log: Log, series: Series) -> dict[str, Any]:
-    """The key ``time`` for a series without a clock: the nearest rising series named like one."""
-    if series.time is not None:
+def _like_a_clock(series: Series) -> bool:
+    """Whether a series is called like a time, and rises."""
+    words = words_of(series.name)
+    if series.labels or not words or (words[-1] not in _TIMES and words[0] not in _TIMES):
+        return False
+    steps = np.diff(series.values[np.isfinite(series.values)])
+    return bool(len(steps)) and bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
+
+
+def _clock_column(rising: Sequence[Series], series: Series) -> dict[str, Any]:
+    """The key ``time`` for a series without a clock: the one of its length nearest by name."""
+    if series.time is not None or series in rising:
         return {}
-    best: tuple[int, int, Series] | None = None
-    for other in log.series.values():
-        if other is series or other.labels or len(other.values) != len(series.values):
-            continue
-        words = words_of(other.name)
-        if not words or words[-1] not in _TIMES and words[0] not in _TIMES:
-            continue
-        steps = np.diff(other.values[np.isfinite(other.values)])
-        if len(steps) and np.mean(steps >= 0.0) > 0.9 and np.any(steps > 0.0):
-            near = len(os.path.commonprefix([other.name, series.name]))
-            rank = (near, -len(other.name), other)
-            if best is None or rank[:2] > best[:2]:
-                best = rank
-    if best is None or words_of(series.name) == words_of(best[2].name):
+    fitting = [other for other in rising if len(other.values) == len(series.values)]
+    if not fitting:
         return {}
-    return {"column": best[2].name, "unit": _time_unit(best[2])}
+
+    def rank(other: Series) -> tuple[int, int]:
+        return len(os.path.commonprefix([other.name, series.name])), -len(other.name)
+
+    best = max(fitting, key=rank)
+    return {"column": best.name, "unit": _time_unit(best)}
 
 
 def _time_unit(series: Series) -> str:

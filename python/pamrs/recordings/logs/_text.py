@@ -24,7 +24,9 @@ _COMMENTS: Final = ("#", "%", "//", "'")
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
 _UNNAMED: Final = "column "
 _LINES: Final = 400  # in which the dialect is looked for
+_HEAD: Final = 5000  # rows above the table, at most
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
+_THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
 _CLOCK = re.compile(
     r"(?:(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[ T]+)?"
     r"(?P<rest>\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)"
@@ -63,6 +65,10 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
     rows = [_stripped(row) for row in split_rows("\n".join(kept), dialect.delimiter)]
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     first, width = _first_row(rows, dialect, form)
+    if len(rows) - first < 2:
+        raise RecordingError(
+            f"{path}: no table was found: it has {len(rows) - first} rows of numbers"
+        )
     names, units = _headings(rows[:first], width, form, _last_comment(lines, dialect, width))
     if form.columns is not None:
         if len(form.columns) != width:
@@ -161,16 +167,15 @@ def _usual(rows: Sequence[Sequence[str]]) -> int:
 
 def _first_row(rows: list[list[str]], dialect: _Dialect, form: TextFormat) -> tuple[int, int]:
     """Index of the first row of numbers, and how many columns there are."""
-    body = rows[len(rows) // 2 :]
-    width = _usual(body)
-    count = [sum(_useful(cell, dialect.decimal, form.thousands) for cell in row) for row in rows]
-    typical = sorted(count[len(rows) // 2 :])[len(body) // 2]
-    for index, row in enumerate(rows):
-        if (
-            len(row) <= width
-            and count[index] >= max(1, (typical + 1) // 2)
-            and len(row) > width / 2
-        ):
+    middle = rows[len(rows) // 2 :][:_LINES]
+    width = _usual(middle)
+
+    def useful(row: list[str]) -> int:
+        return sum(_useful(cell, dialect.decimal, form.thousands) for cell in row)
+
+    typical = sorted(map(useful, middle))[len(middle) // 2]
+    for index, row in enumerate(rows[:_HEAD]):
+        if width / 2 < len(row) <= width and useful(row) >= max(1, (typical + 1) // 2):
             return (max(index, 1) if form.header else index), width
     return 0, width
 
@@ -228,6 +233,8 @@ def _column(
             unread[name] = "it is empty"
         return
     values, strange = _numbers(cells, dialect.decimal, thousands)
+    if strange and thousands is None and _grouped(cells):
+        values, strange = _numbers(cells, dialect.decimal, ".")
     if not strange:
         found.append(Series(name, values, unit))
         return
@@ -265,6 +272,11 @@ def _numbers(cells: Sequence[str], decimal: str, thousands: str | None) -> tuple
                     strange.append(row)
     values[~np.isfinite(values)] = math.nan
     return values, strange
+
+
+def _grouped(cells: Sequence[str]) -> bool:
+    """Whether points part thousands: ``1.000.000`` beside ``900.000``, and no other number."""
+    return all(_THOUSANDS.fullmatch(cell) or cell.lower() in NO_VALUE for cell in cells)
 
 
 def _stamps(cells: Sequence[str]) -> Array | None:
