@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from pamrs.errors import MissingPackageError, RecordingError
 from pamrs.recordings import load_recording, load_recordings
@@ -138,3 +140,139 @@ def test_points_that_part_thousands_are_seen_where_nothing_else_is_possible(tmp_
 def test_a_text_that_is_no_table(tmp_path: Path) -> None:
     with pytest.raises(RecordingError, match="no table was found"):
         text_log(tmp_path, '{"ob": [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3]], "action": [0.1, 0.2]}')
+
+
+def test_several_groups_of_an_mdf_have_their_clocks_and_invalid_samples(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    slow = np.arange(20) * 0.5
+    bad = np.zeros(20, dtype=bool)
+    bad[3] = True
+    with MDF() as file:
+        file.append([Signal(np.arange(100.0), np.arange(100) * 0.1, name="p1", unit="bar")])
+        file.append(
+            [
+                Signal(20.0 + slow, slow, name="T", unit="degC", invalidation_bits=bad),
+                Signal(slow, slow, name="p1", unit="bar"),
+            ]
+        )
+        file.save(tmp_path / "run.mf4", overwrite=True)
+    log = read_log(tmp_path / "run.mf4")
+    assert [name.split("/")[-1] for name in log.series] == ["p1", "T", "p1"]
+    temperature = log.find("T")
+    assert temperature.unit == "degC"
+    assert np.flatnonzero(np.isnan(temperature.values)).tolist() == [3]
+    assert temperature.time is not None
+    np.testing.assert_allclose(temperature.time, slow)
+    with pytest.raises(RecordingError, match="may be any of"):
+        log.find("p1")
+
+
+def test_topics_at_their_own_rates_and_stamps_of_their_own(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    number = store.types["std_msgs/msg/Float64"]
+    text = store.types["std_msgs/msg/String"]
+    wrench = store.types["geometry_msgs/msg/WrenchStamped"]
+    header = store.types["std_msgs/msg/Header"]
+    stamp = store.types["builtin_interfaces/msg/Time"]
+    vector = store.types["geometry_msgs/msg/Vector3"]
+    with Writer(tmp_path / "bag", version=9) as writer:
+        made = {
+            topic: writer.add_connection(topic, kind.__msgtype__, typestore=store)
+            for topic, kind in (("/p", number), ("/note", text), ("/cell", wrench))
+        }
+        for step in range(100):
+            now = 10**18 + step * 10**7
+            writer.write(made["/p"], now, store.serialize_cdr(number(2.0), number.__msgtype__))
+            if step % 5 == 0:
+                message = wrench(
+                    header(stamp(7, step * 10**6), "cell"),
+                    store.types["geometry_msgs/msg/Wrench"](
+                        vector(0.0, 0.0, float(step)), vector(0.0, 0.0, 0.0)
+                    ),
+                )
+                raw = store.serialize_cdr(message, wrench.__msgtype__)
+                writer.write(made["/cell"], now, raw)
+        raw = store.serialize_cdr(text("start"), text.__msgtype__)
+        writer.write(made["/note"], 10**18, raw)
+    for path in (tmp_path / "bag", tmp_path / "bag" / "bag.db3"):
+        log = read_log(path)
+        force = log.find("/cell/wrench/force/z")
+        assert force.time is not None
+        np.testing.assert_allclose(force.time, 0.05 * np.arange(20), atol=1e-12)
+        np.testing.assert_allclose(force.values, 5.0 * np.arange(20))
+        np.testing.assert_allclose(
+            log.find("/cell/header/stamp").values, 7.0 + 0.005 * np.arange(20)
+        )
+        assert len(log.find("/p/data").values) == 100
+
+
+def test_signals_that_simulink_logs_in_a_dataset(tmp_path: Path) -> None:
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        from matio import save_to_mat
+        from matio.utils.matclass import MatlabOpaque
+    time = np.arange(30.0)[:, None] * 0.1
+    elements = np.empty((1, 2), dtype=object)
+    for place, name in enumerate(("p1", "angle")):
+        values = MatlabOpaque(
+            {"Data_": (place + 1.0) * time, "Time_": time, "Name": np.array([name])},
+            "timeseries",
+            "MCOS",
+        )
+        elements[0, place] = MatlabOpaque(
+            {"Name": np.array([name]), "Values": values}, "Simulink.SimulationData.Signal", "MCOS"
+        )
+    dataset = MatlabOpaque({"Elements": elements}, "Simulink.SimulationData.Dataset", "MCOS")
+    save_to_mat(str(tmp_path / "run.mat"), {"logsout": dataset})
+    log = read_log(tmp_path / "run.mat")
+    found = {name: series for name, series in log.series.items() if "p1" in name}
+    (series,) = found.values()
+    np.testing.assert_allclose(series.values, time.ravel())
+    assert series.time is not None
+
+
+def test_tables_of_pandas_with_dates(tmp_path: Path) -> None:
+    import pandas as pd
+
+    when = pd.date_range("2024-05-12", periods=30, freq="20ms")
+    frame = pd.DataFrame(
+        {"when": when, "p1 [bar]": np.arange(30.0), "what": ["a"] * 10 + ["b"] * 20}
+    )
+    for ending in ("parquet", "feather"):
+        getattr(frame, f"to_{ending}")(tmp_path / f"run.{ending}")
+        log = read_log(tmp_path / f"run.{ending}")
+        np.testing.assert_allclose(log.find("when").values, 0.02 * np.arange(30))
+        assert (log.find("when").unit, log.find("p1").unit) == ("s", "bar")
+        assert log.find("what").labels == ("a", "b")
+        frame.set_index("when").to_parquet(tmp_path / "indexed.parquet")
+    assert "when" in read_log(tmp_path / "indexed.parquet").series
+
+
+def test_utf_16_with_headings_that_say_it_all(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * i:.1f},{i % 7}\n" for i in range(40))
+    file = tmp_path / "run.csv"
+    file.write_bytes(("time [s],muscle_pressure [bar]\n" + rows).encode("utf-16"))
+    assert len(load_recording(file)) == 40
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
+@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "mcap", "tdms", "h5"])
+def test_any_bytes_are_a_log_or_an_error_that_names_the_file(
+    tmp_path: Path, ending: str, data: bytes
+) -> None:
+    file = tmp_path / f"any.{ending}"
+    file.write_bytes(data)
+    try:
+        told = str(read_log(file).path)
+    except RecordingError as error:
+        told = str(error)
+    assert f"any.{ending}" in told

@@ -311,3 +311,30 @@ def test_the_example_of_the_page(tmp_path: Path) -> None:
         wanted = np.interp(item.time, data["t"], data["p1"])
         assert np.abs(item.channels["muscle_pressure"] / 1e5 - wanted).max() < 0.02
     np.testing.assert_allclose(found.fit[1].channels["supply_pressure"][[0, -1]], [7.9e5, 7.8e5])
+
+
+def test_parts_by_a_column_with_a_clock_of_its_own(tmp_path: Path) -> None:
+    fast, slow = np.arange(4000) * 1e-3, np.arange(40) * 0.1
+    file = npz(
+        tmp_path,
+        t=fast,
+        p1=2.0 + np.sin(fast),
+        ts=slow,
+        trial=np.repeat([1.0, np.nan, 3.0, 4.0], 10),
+    )
+    channels = {"muscle_pressure": {"column": "p1", "unit": "bar", "time": "t"}}
+    got = load_recordings(file, channels=channels, time="ts", split={"column": "trial"})
+    assert [(part.name, len(part)) for part in got] == [
+        ("run_1", 1000), ("run_3", 1000), ("run_4", 1000),
+    ]  # fmt: skip
+    first = got[1].channels["muscle_pressure"][0] / 1e5
+    assert first == pytest.approx(2.0 + np.sin(2.0), abs=2e-3)
+
+
+def test_a_pause_of_years_is_an_error_and_no_array(tmp_path: Path) -> None:
+    far = np.concatenate([np.arange(50) * 0.01, np.arange(50) * 0.01 + 1.7e9])
+    file = npz(tmp_path, t=far, p1=np.arange(100.0), ta=far + 1e-3, a=np.arange(100.0))
+    channels = BASE | {"joint_angle": {"column": "a", "unit": "deg", "time": "ta"}}
+    with pytest.raises(RecordingError, match="split = { gap"):
+        load_recordings(file, channels=channels, time="t")
+    assert len(load_recordings(file, channels=channels, time="t", split={"gap": 10.0})) == 2

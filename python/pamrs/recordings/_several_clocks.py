@@ -18,6 +18,7 @@ from pamrs.recordings._recording import Issue, Recording, judged
 __all__ = ["Sampled", "on_one_clock"]
 
 _SLOW: Final = frozenset({"temperature"})  # does not say how fine the grid is
+_FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most
 _CUT: Final = 2.0  # samples at the ends whose loss is not worth a word
 
 
@@ -183,6 +184,13 @@ def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[floa
         raise RecordingError(
             f"{source}: the channels were not sampled at the same time: {spans} (time = {{ offset "
             "= ... }} of a channel moves its clock)"
+        )
+    most = _FINEST * max(len(channel.time) for channel in channels)
+    if count > most:
+        raise RecordingError(
+            f"{source}: {stop - start:.6g} s in steps of {step:.6g} s are {count} samples, more "
+            f"than {_FINEST:g} times what was recorded; long pauses part recordings with split = {{ gap "
+            "= ... }, and sample_time says another step"
         )
     return start, np.arange(count, dtype=np.float64) * step
 

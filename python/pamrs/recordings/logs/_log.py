@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -149,7 +149,7 @@ def collected(path: Path, found: Sequence[Series], unread: Mapping[str, str] | N
         name, again = item.name, 2
         while name in series:
             name, again = f"{item.name} ({again})", again + 1
-        same = item if name == item.name else Series(name, item.values, item.unit, item.time)
+        same = item if name == item.name else replace(item, name=name)
         series[name] = same
     if not series:
         why = "; ".join(f"{name}: {text}" for name, text in list((unread or {}).items())[:3])
