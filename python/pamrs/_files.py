@@ -14,6 +14,7 @@ __all__ = [
     "MOST_BYTES",
     "MOST_DEPTH",
     "MOST_TOML_BYTES",
+    "check_regular",
     "is_inside",
     "parse_toml",
     "read_file",
@@ -33,6 +34,20 @@ _KINDS: Final = (
     (stat.S_ISBLK, "a device"),
     (stat.S_ISSOCK, "a socket"),
 )
+
+
+def check_regular(path: str | os.PathLike[str]) -> None:
+    """Refuse what is no regular file, such as a device or a pipe.
+
+    Raises
+    ------
+    OSError
+        If it is not there or of another kind.
+    """
+    mode = os.stat(path).st_mode
+    if not stat.S_ISREG(mode):
+        kind = next((name for matches, name in _KINDS if matches(mode)), "a special file")
+        raise OSError(f"it is {kind}; a regular file is needed, copy what it gives into one")
 
 
 def read_file(
@@ -62,10 +77,7 @@ def read_file(
     EOFError, zlib.error
         If it is packed and broken.
     """
-    mode = os.stat(path).st_mode
-    if not stat.S_ISREG(mode):
-        kind = next((name for matches, name in _KINDS if matches(mode)), "a special file")
-        raise OSError(f"it is {kind}; a regular file is needed, copy what it gives into one")
+    check_regular(path)
     with open(path, "rb") as stream:
         data = stream.read(most + 1)
     if len(data) > most:

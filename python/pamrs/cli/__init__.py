@@ -1,5 +1,5 @@
-"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``library``, ``lift``,
-``simulate``, ``size``, ``rig``, ...
+"""The command line: ``pamrs diagnose``, ``effects``, ``prove``, ``fit``, ``import``, ``library``,
+``lift``, ``simulate``, ``size``, ``rig``, ...
 
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 1 when it was interrupted, 2
@@ -21,6 +21,7 @@ from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
 from pamrs.cli.fit import fit_app
+from pamrs.cli.import_logs import import_command
 from pamrs.cli.library import library_command
 from pamrs.cli.lift import lift_command
 from pamrs.cli.prove import prove_command
@@ -53,6 +54,7 @@ app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
 app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
+app.command("import")(import_command)
 app.command("library")(library_command)
 app.command("lift")(lift_command)
 app.command("prove")(prove_command)

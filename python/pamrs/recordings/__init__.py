@@ -1,12 +1,32 @@
 """Recordings of a rig on one clock, and cases: a rig with its recordings in a folder.
 
 :func:`load_recording` reads a table, checks it and masks what cannot be used; :func:`load_case`
-reads a case folder. :mod:`pamrs.recordings.table` reads tables of numbers from files.
+reads a case folder; :func:`load_recordings` takes the log of a laboratory as it is,
+:func:`propose` says what of it is likely which channel, :func:`suspicions` which units physics
+contradicts.
+:mod:`pamrs.recordings.table` reads tables of numbers from files, :mod:`pamrs.recordings.logs` logs
+of every format.
 """
 
 from __future__ import annotations
 
 from pamrs.recordings._case import Case, load_case
+from pamrs.recordings._from_log import load_recordings
+from pamrs.recordings._proposal import LogProposal, Proposal, propose
 from pamrs.recordings._recording import CHANNELS, Issue, Recording, load_recording
+from pamrs.recordings._suspicion import Suspicion, suspicions
 
-__all__ = ["CHANNELS", "Case", "Issue", "Recording", "load_case", "load_recording"]
+__all__ = [
+    "CHANNELS",
+    "Case",
+    "Issue",
+    "LogProposal",
+    "Proposal",
+    "Recording",
+    "Suspicion",
+    "load_case",
+    "load_recording",
+    "load_recordings",
+    "propose",
+    "suspicions",
+]

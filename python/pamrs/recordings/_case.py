@@ -6,13 +6,16 @@ import difflib
 import os
 import tomllib
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 from pamrs._files import is_inside, parse_toml, read_toml
 from pamrs.errors import CaseError, RecordingError, RigError, joined
+from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._recording import Recording, load_recording
+from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
 
 __all__ = ["SCHEMA", "Case", "load_case"]
@@ -21,7 +24,10 @@ SCHEMA: Final = "pamrs.case/1"
 _ROLES: Final = ("fit", "held_out")
 _TOP: Final = ("schema", "name", "description", "rig", "source", "recording")
 _FORMAT: Final = ("columns", "delimiter", "header", "thousands", "sample_time", "decimal")
-_ENTRY: Final = ("file", "name", "role", "start", "stop", *_FORMAT)
+_LOG: Final = ("channels", "time", "split", "pieces")
+_DIALECT: Final = ("delimiter", "decimal", "thousands", "header")
+_OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
+_ENTRY: Final = ("file", "name", "role", "start", "stop", *_FORMAT, *_LOG)
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,7 +217,9 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
             "recording is missing: one table [[recording]] with file and role for each is needed"
         )
         return []
+    _check_logs(home, entries)
     recordings: list[Recording] = []
+    logs: dict[Any, Log] = {}
     for index, entry in enumerate(entries):
         label = f"recording[{index}]."
         before = len(problems)
@@ -234,6 +242,9 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
             continue
         options = {key: entry[key] for key in _FORMAT if key in entry}
         try:
+            if "channels" in entry:
+                recordings += _from_log(file, role, entry, logs)
+                continue
             recording = load_recording(file, role=role, name=entry.get("name"), **options)
             recordings.append(recording.between(entry.get("start"), entry.get("stop")))
         except RecordingError as error:
@@ -251,6 +262,31 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
     ):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
+
+
+def _check_logs(home: Path, entries: list[Mapping[str, Any]]) -> None:
+    """Refuse a case whose logs need a package that is not there, before anything is read."""
+    for entry in entries:
+        file = home / str(entry.get("file"))
+        if "channels" in entry and file.exists():
+            with suppress(RecordingError):  # said with the other problems of its entry
+                check_readable(file)
+
+
+def _from_log(
+    file: Path, role: str, entry: Mapping[str, Any], logs: dict[Any, Log]
+) -> list[Recording]:
+    """The recordings of an entry that says where its channels are; a file is read once."""
+    names = entry.get("columns")
+    form = TextFormat(
+        **{key: entry[key] for key in _DIALECT if key in entry},
+        columns=None if names is None else tuple(names),
+    )
+    key = (os.path.realpath(file), form)
+    if key not in logs:
+        logs[key] = read_log(file, form)
+    options = {name: entry[name] for name in _OPTIONS if name in entry}
+    return load_recordings(file, role=role, log=logs[key], **options)
 
 
 def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
@@ -282,7 +318,18 @@ def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
         "decimal": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
         "start": (number, "a number of seconds"),
         "stop": (number, "a number of seconds"),
+        "pieces": (
+            lambda v: isinstance(v, list) and len(v) > 0,
+            "a list of numbers or texts of parts",
+        ),
     }
+    if "channels" in entry:
+        rules["columns"] = (texts, "a list of names, one for each column")
+        rules["thousands"] = (lambda v: isinstance(v, str), "a mark")
+    else:
+        problems += [
+            f"{label}{key} goes with channels, which is missing" for key in _LOG if key in entry
+        ]
     for key, (accepts, needed) in rules.items():
         if key in entry and not accepts(entry[key]):
             problems.append(f"{label}{key} = {entry[key]!r} is not allowed: {needed} is needed")

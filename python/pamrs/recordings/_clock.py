@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 
-__all__ = ["Event", "Grid", "lay_grid"]
+__all__ = ["Event", "Grid", "gaps", "lay_grid", "usual_interval"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -47,14 +47,22 @@ class Grid:
     """
 
     def __init__(
-        self, stamps: Array, rows: NDArray[np.intp], step: float, usual: float, events: list[Event]
+        self,
+        stamps: Array,
+        rows: NDArray[np.intp],
+        step: float,
+        usual: float,
+        events: list[Event],
+        time: Array | None = None,
     ) -> None:
         self.rows = rows
         self.sample_time = step
         self.events = events
         self._stamps = stamps
-        count = int(np.floor(stamps[-1] / step + _ON_SAMPLE)) + 1
-        self.time: Array = np.arange(count, dtype=np.float64) * step
+        if time is None:
+            count = int(np.floor(stamps[-1] / step + _ON_SAMPLE)) + 1
+            time = np.arange(count, dtype=np.float64) * step
+        self.time: Array = time
         right = np.clip(np.searchsorted(stamps, self.time, side="left"), 1, len(stamps) - 1)
         self._left, self._right = right - 1, right
         span = stamps[self._right] - stamps[self._left]
@@ -129,9 +137,7 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
         raise RecordingError(
             f"{source}: column 'time': two rows at least, at different times, are needed"
         )
-    usual = float(np.median(forward))
-    ordinary = forward[forward < _GAP * usual]
-    usual = _plain(float(np.mean(ordinary)), len(stamps))
+    usual = usual_interval(forward, len(stamps))
     step = sample_time if sample_time is not None else usual
 
     events: list[Event] = []
@@ -163,8 +169,27 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
         events.append(
             Event("clock_jump", first_at, last_at, f"{further} further steps of the clock")
         )
-    events += _gaps(placed, elapsed, jumps, usual)
+    events += gaps(placed, elapsed, jumps, usual)
     return Grid(placed, rows, step, usual, events)
+
+
+def usual_interval(forward: Array, count: int) -> float:
+    """The interval between samples where none is missing.
+
+    Parameters
+    ----------
+    forward : (m,) array
+        Intervals above zero [s], one at least.
+    count : int
+        Number of samples.
+
+    Returns
+    -------
+    float
+        Seconds.
+    """
+    usual = float(np.median(forward))
+    return _plain(float(np.mean(forward[forward < _GAP * usual])), count)
 
 
 def _plain(interval: float, count: int) -> float:
@@ -184,7 +209,24 @@ def _exact(placed: Array, kept: Array, jumps: Mask) -> Array:
     return placed if jumps.any() else kept - kept[0]
 
 
-def _gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event]:
+def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event]:
+    """Where samples are missing.
+
+    Parameters
+    ----------
+    placed : (n,) array
+        Times [s].
+    elapsed : (n - 1,) array
+        Intervals between them [s].
+    jumps : (n - 1,) bool array
+        Intervals that are no gaps but steps of the clock.
+    usual : float
+        The interval where none is missing [s].
+
+    Returns
+    -------
+    list of Event
+    """
     holes = np.flatnonzero(~jumps & (elapsed > _GAP * usual))
     missing = np.maximum(np.rint(elapsed[holes] / usual).astype(int) - 1, 1)
     if len(holes) > _MOST_EVENTS:

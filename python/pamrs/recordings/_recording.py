@@ -29,7 +29,15 @@ from pamrs.units import parse_unit, to_si
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["CHANNELS", "Issue", "Recording", "load_recording"]
+__all__ = [
+    "CHANNELS",
+    "REFERENCE_UNITS",
+    "Issue",
+    "Recording",
+    "assemble",
+    "judged",
+    "load_recording",
+]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -61,7 +69,7 @@ CHANNELS: Final[dict[str, _Channel]] = {
     )
 }
 # a reference may be one of an angle or of a pressure
-_REFERENCE_UNITS: Final = ("rad", "Pa")
+REFERENCE_UNITS: Final = ("rad", "Pa")
 _HEADING = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
 _FEW: Final = 20
 
@@ -305,7 +313,7 @@ def load_recording(
     wanted = _understood(_headings(table, columns, source), source)
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    recording = _assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
+    recording = assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
     return replace(recording, source=source)
 
 
@@ -355,7 +363,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
                 f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
             )
             continue
-        expected = _REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
+        expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
         unit = match["unit"]
         if unit is None or not unit.strip():
             problems.append(
@@ -420,7 +428,7 @@ def _si_columns(
 # ------------------------------------------------------------------------ assembly
 
 
-def _assemble(
+def assemble(
     name: str,
     role: str,
     raw: dict[str, Array],
@@ -429,6 +437,32 @@ def _assemble(
     source: str,
     sample_time: float | None,
 ) -> Recording:
+    """A recording of channels that share one clock.
+
+    Parameters
+    ----------
+    name, role : str
+        What it is called and for.
+    raw : dict of str to (n,) array
+        SI values by channel, ``time`` among them or not.
+    units : dict of str to str
+        SI unit of each.
+    ragged : list of int
+        Rows with too few or too many cells.
+    source : str
+        The file, for messages.
+    sample_time : float or None
+        Spacing of the grid [s].
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        If there is no clock, or a channel cannot be what it is called.
+    """
     issues: list[Issue] = []
     count = len(next(iter(raw.values())))
     if "time" not in raw:
@@ -463,17 +497,42 @@ def _assemble(
     masks: dict[str, Mask] = {}
     for channel, values in raw.items():
         if channel != "time":
-            laid = _judged(channel, values[stamped][grid.rows], grid, source, issues)
+            laid = judged(channel, values[stamped][grid.rows], grid, source, issues)
             channels[channel], masks[channel] = laid
     issues.sort(key=lambda issue: (issue.start, issue.channel))
     units.pop("time", None)
     return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, units)
 
 
-def _judged(
-    channel: str, values: Array, grid: Grid, source: str, issues: list[Issue]
+def judged(
+    channel: str, values: Array, grid: Grid, source: str, issues: list[Issue], *, held: bool = False
 ) -> tuple[Array, Mask]:
-    """One channel on the grid with its mask; what is wrong with it goes to ``issues``."""
+    """One channel on the grid with its mask.
+
+    Parameters
+    ----------
+    channel : str
+        Its name.
+    values : (r,) array
+        SI values of the rows that the grid uses.
+    grid : Grid
+        The grid.
+    source : str
+        The file, for messages.
+    issues : list of Issue
+        Gets what is wrong with it.
+    held : bool
+        Logged on change: staying equal is its nature, and no fault.
+
+    Returns
+    -------
+    values, mask : (n,) arrays
+
+    Raises
+    ------
+    RecordingError
+        If more than a few values are not possible.
+    """
     values = values.copy()
     limits = CHANNELS[channel_of(channel)]
     usable = np.isfinite(values)
@@ -490,7 +549,7 @@ def _judged(
     found += _runs(impossible, "outlier", "an impossible value")
     usable &= ~impossible
     values[~usable] = np.nan
-    for fault in find_faults(channel_of(channel), values):
+    for fault in [] if held else find_faults(channel_of(channel), values):
         found.append((fault.kind, fault.start, fault.stop, fault.text))
         if fault.masked:
             usable[fault.start : fault.stop] = False

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
 
-__all__ = ["Table", "is_text", "read_table", "read_text", "split_rows"]
+__all__ = ["NO_VALUE", "Table", "check_size", "is_text", "read_table", "read_text", "split_rows"]
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ MOST_ROWS: Final = 5_000_000
 """Rows of a table."""
 MOST_CELLS: Final = 20_000_000
 """Cells of a table."""
-_NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
+NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 _TEXT = (".csv", ".tsv", ".txt", ".dat", "")
 
 
@@ -85,7 +85,7 @@ class Table:
         for row, cell in enumerate(cells):
             text = cell.strip()
             try:
-                values[row] = math.nan if text.lower() in _NO_VALUE else float(text)
+                values[row] = math.nan if text.lower() in NO_VALUE else float(text)
             except ValueError:
                 raise RecordingError(
                     (
@@ -163,7 +163,8 @@ def read_text(path: Path) -> str:
         )
     try:
         raw = read_file(path, packed=packed)
-        text = raw.decode("utf-8-sig")
+        wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
+        text = raw.decode("utf-16" if wide else "utf-8-sig")
     except UnicodeDecodeError:
         raise RecordingError(
             f"{path}: not a text file in UTF-8; readable are {_READABLE}"
@@ -179,7 +180,7 @@ def read_text(path: Path) -> str:
     return text
 
 
-def _check_size(rows: int, cells: int, source: str) -> None:
+def check_size(rows: int, cells: int, source: str) -> None:
     """Refuse tables that no memory holds."""
     for count, most, what in ((rows, MOST_ROWS, "rows"), (cells, MOST_CELLS, "cells")):
         if count > most:
@@ -191,7 +192,7 @@ def _check_size(rows: int, cells: int, source: str) -> None:
 
 def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
     lines = text.count("\n") + 1
-    _check_size(lines, lines + (text.count(delimiter) if delimiter != " " else 0), source)
+    check_size(lines, lines + (text.count(delimiter) if delimiter != " " else 0), source)
     rows, numbers = [], []
     for number, row in enumerate(split_rows(text, delimiter), start=1):
         if any(cell.strip() for cell in row):
@@ -253,7 +254,7 @@ def _parquet(path: Path) -> Table:
             f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
         ) from error
     try:
-        _check_size(*_parquet_size(path), str(path))
+        check_size(*_parquet_size(path), str(path))
         frame = pd.read_parquet(path)
     except RecordingError:
         raise
@@ -275,7 +276,8 @@ def _parquet(path: Path) -> Table:
 _READERS: Final[dict[str, Callable[[Path], Table]]] = {".parquet": _parquet}
 """Reader of each ending whose files are not text: a new kind is one function and its entry here."""
 _READABLE: Final = (
-    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}"
+    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}; "
+    "other logs with the key channels (pamrs import LOG writes it)"
 )
 
 

@@ -1,0 +1,112 @@
+"""``pamrs import``: what a log has, and a case that points at it."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pamrs.cli._shared import as_given, exact, progress, rig_named, write
+
+if TYPE_CHECKING:
+    from pamrs.recordings import LogProposal
+
+__all__ = ["import_command"]
+
+
+def import_command(
+    log: Annotated[
+        list[Path],
+        typer.Argument(
+            help=(
+                "Logs of one rig: CSV and other text, Parquet, Feather, MATLAB, HDF5, MF4, TDMS, "
+                "ROS bags, MCAP, NumPy. They are not changed."
+            )
+        ),
+    ],
+    rig: Annotated[
+        Path | None,
+        typer.Option(help="Rig file, or a rig of the package: which channels there can be."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder that gets case.toml; without it, it is printed."),
+    ] = None,
+    sample_time: Annotated[
+        str | None,
+        typer.Option(help='For logs without any clock: the spacing of the samples, "1 ms".'),
+    ] = None,
+    columns: Annotated[
+        str | None,
+        typer.Option(
+            help='For tables without headings: a name for each column, "time [ms], p1 [bar], x".'
+        ),
+    ] = None,
+) -> None:
+    """List the channels of logs, and propose which of them is which channel of the rig."""
+    file = None if out is None else out / "case.toml"
+    if file is not None and file.exists():
+        raise FileExistsError(f"{file}: is there already; it is not overwritten")
+    from pamrs.recordings import propose
+    from pamrs.recordings.logs import TextFormat, check_readable
+
+    for path in log:
+        check_readable(path)
+    form = None
+    if columns is not None:
+        form = TextFormat(columns=tuple(name.strip() for name in columns.split(",")))
+    model = None if rig is None else rig_named(rig)
+    step = None if sample_time is None else exact("sample_time", sample_time, "time")
+    if step is not None and not 0.0 < step < math.inf:
+        from pamrs.errors import ParameterError
+
+        raise ParameterError(
+            f"{as_given('sample_time', sample_time or '')} is not allowed: a time above zero"
+        )
+    with progress(f"reading {len(log)} log{'s' if len(log) > 1 else ''}"):
+        proposal = propose(log, model, sample_time=step, form=form)
+    for item in proposal.logs:
+        _show(item)
+    folder = out or Path()
+    contents: dict[Path, str | bytes] = {}
+    named = "rig.toml"
+    if rig is not None and rig.exists():
+        named = Path(os.path.relpath(rig.resolve(), folder.resolve())).as_posix()
+    text = proposal.case_toml(folder, named)
+    if file is None:
+        typer.echo(text)
+        return
+    file.parent.mkdir(parents=True, exist_ok=True)
+    if rig is not None and model is not None and not rig.exists():
+        beside = file.parent / "rig.toml"
+        if not beside.exists():
+            from pamrs import rigs
+
+            contents[beside] = rigs.template(str(rig), str(rig))
+    contents[file] = text
+    write(contents)
+    typer.echo(f"look at {file}, then: pamrs diagnose {file.parent}")
+
+
+def _show(item: LogProposal) -> None:
+    """The channels of a log as a table, and what to look at."""
+    typer.echo(f"{item.log.path}: {len(item.listed)} channels")
+    rows = [("channel", "samples", "rate", "unit", "from", "to", "proposed as")]
+    for each in item.listed:
+        rate = f"{each.rate:.4g} Hz" if math.isfinite(each.rate) else "-"
+        low, high = (f"{x:.5g}" if math.isfinite(x) else "-" for x in (each.low, each.high))
+        rows.append((each.name, str(each.count), rate, each.unit or "-", low, high, each.channel))
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    for row in rows:
+        cells = zip(row, widths, strict=True)
+        typer.echo("  " + "  ".join(cell.ljust(width) for cell, width in cells).rstrip())
+    for name, reason in item.log.unread.items():
+        typer.echo(f"  {name}: not read, {reason}")
+    if item.parts > 1:
+        typer.echo(f"  {item.parts} recordings: split = {item.split!r}")
+    for text in item.remarks:
+        typer.echo(f"  look: {text}")
+    typer.echo("")

@@ -1,0 +1,253 @@
+"""Which series of a log is which channel: the keys ``channels`` and ``time`` of a recording."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+from pamrs.channels import channel_of
+from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS
+from pamrs.units import to_si
+
+__all__ = ["Clock", "Source", "read_clock", "read_sources"]
+
+_ENTRY: Final = ("column", "unit", "scale", "offset", "from", "to", "time", "hold")
+_CLOCK: Final = ("column", "unit", "offset")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When the samples of a channel were taken.
+
+    Attributes
+    ----------
+    column : str, optional
+        The series with the times; by default the clock that the log has for the channel.
+    unit : str, optional
+        Unit of that series; by default what the log says, else seconds.
+    offset : float
+        Added to the times [s]: what this clock is behind that of the other channels.
+    """
+
+    column: str | None = None
+    unit: str | None = None
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where a channel comes from: its values are ``scale * raw + offset`` in `unit`.
+
+    Attributes
+    ----------
+    channel : str
+        Its name, ``muscle_pressure``.
+    column : str
+        The series of the log.
+    unit : str
+        Unit after scale and offset.
+    scale, offset : float
+        From the numbers of the log.
+    clock : Clock, optional
+        Its own; by default that of the recording.
+    hold : bool
+        It was logged on change: a value holds until the next one.
+    """
+
+    channel: str
+    column: str
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+    clock: Clock | None = None
+    hold: bool = False
+
+
+def read_sources(channels: Any, source: str) -> list[Source]:
+    """Read the table ``channels`` of a recording.
+
+    Parameters
+    ----------
+    channels : mapping
+        From names of channels to tables with ``column``, ``unit`` and what else there is.
+    source : str
+        The file, for messages.
+
+    Returns
+    -------
+    list of Source
+
+    Raises
+    ------
+    RecordingError
+        Naming every entry that is wrong, its value and what is allowed.
+    """
+    if not isinstance(channels, Mapping) or not channels:
+        raise RecordingError(
+            f"{source}: channels = {channels!r} is not allowed: a table from channels to "
+            '{ column = "...", unit = "..." } is needed'
+        )
+    problems: list[str] = []
+    sources: list[Source] = []
+    for name, entry in _flat(channels):
+        before = len(problems)
+        made = _source(problems, name, entry)
+        if made is not None and len(problems) == before:
+            sources.append(made)
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return sources
+
+
+def _flat(channels: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
+    """``muscle_pressure.flexor = {...}`` is a table in a table for TOML."""
+    for name, entry in channels.items():
+        nested = isinstance(entry, Mapping) and "column" not in entry and entry
+        if nested and all(isinstance(inside, Mapping) for inside in entry.values()):
+            yield from ((f"{name}.{block}", inside) for block, inside in entry.items())
+        else:
+            yield name, entry
+
+
+def _source(problems: list[str], name: str, entry: Any) -> Source | None:
+    label = f"channels.{name}"
+    channel = channel_of(name)
+    if channel not in CHANNELS or channel == "time" or name.endswith("."):
+        near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1)
+        known = ", ".join(key for key in CHANNELS if key != "time")
+        hint = f"did you mean {near[0]!r}?" if near else f"known are {known}"
+        hint = "times are given by the key time" if channel == "time" else hint
+        problems.append(f"{label}: unknown channel {name!r}; {hint}")
+        return None
+    if not isinstance(entry, Mapping):
+        problems.append(f'{label} = {entry!r} is not allowed: {{ column = "...", unit = "..." }}')
+        return None
+    _strange(problems, label, entry, _ENTRY)
+    for key in ("column", "unit"):
+        if not isinstance(entry.get(key), str) or not entry.get(key):
+            problems.append(f"{label}.{key} = {entry.get(key)!r} is not allowed: a text is needed")
+            return None
+    _check_unit(problems, label, channel, entry["unit"])
+    hold = entry.get("hold", False)
+    if not isinstance(hold, bool):
+        problems.append(f"{label}.hold = {hold!r} is not allowed: true or false is needed")
+    scale, offset = _line(problems, label, entry)
+    clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
+    return Source(name, entry["column"], entry["unit"], scale, offset, clock, hold is True)
+
+
+def _check_unit(problems: list[str], label: str, channel: str, unit: str) -> None:
+    expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
+    troubles: list[str] = []
+    for si_unit in expected:
+        try:
+            to_si(1.0, unit, si_unit)
+        except ParameterError as error:
+            troubles.append(str(error))
+    if len(troubles) == len(expected):
+        problems.append(f"{label}.unit: {troubles[0]}")
+
+
+def _line(problems: list[str], label: str, entry: Mapping[str, Any]) -> tuple[float, float]:
+    """Scale and offset, given so or by two readings and what they stand for."""
+    if ("from" in entry) != ("to" in entry) or (
+        "from" in entry and {"scale", "offset"} & set(entry)
+    ):
+        problems.append(
+            f"{label}: from and to belong together, like from = [0, 4095], to = [0, 10], and stand "
+            "instead of scale and offset"
+        )
+        return 1.0, 0.0
+    if "from" in entry:
+        pairs = [entry["from"], entry["to"]]
+        if not all(
+            isinstance(pair, (list, tuple)) and len(pair) == 2 and all(map(_finite, pair))
+            for pair in pairs
+        ):
+            problems.append(
+                f"{label}: from = {pairs[0]!r}, to = {pairs[1]!r} is not allowed: two numbers each"
+            )
+            return 1.0, 0.0
+        (low, high), (first, last) = pairs
+        if low == high or first == last:
+            problems.append(f"{label}: from = {pairs[0]!r}, to = {pairs[1]!r}: two equal numbers")
+            return 1.0, 0.0
+        scale = (last - first) / (high - low)
+        return scale, first - scale * low
+    for key in ("scale", "offset"):
+        value = entry.get(key, 1.0)
+        if not _finite(value) or (key == "scale" and value == 0):
+            needed = "a number other than zero" if key == "scale" else "a number"
+            problems.append(f"{label}.{key} = {value!r} is not allowed: {needed} is needed")
+            return 1.0, 0.0
+    return float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0))
+
+
+def _finite(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+
+
+def read_clock(time: Any, source: str) -> Clock:
+    """Read the key ``time`` of a recording.
+
+    Parameters
+    ----------
+    time : str or mapping, optional
+        The name of a series, or a table with ``column``, ``unit`` and ``offset``.
+    source : str
+        The file, for messages.
+
+    Returns
+    -------
+    Clock
+
+    Raises
+    ------
+    RecordingError
+        If it is none of these.
+    """
+    problems: list[str] = []
+    clock = Clock() if time is None else _clock(problems, "time", time)
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return clock
+
+
+def _clock(problems: list[str], label: str, entry: Any) -> Clock:
+    if isinstance(entry, str) and entry:
+        return Clock(entry)
+    if not isinstance(entry, Mapping):
+        problems.append(
+            f"{label} = {entry!r} is not allowed: the name of a series, or a table with column, "
+            "unit and offset"
+        )
+        return Clock()
+    _strange(problems, label, entry, _CLOCK)
+    column, unit, offset = entry.get("column"), entry.get("unit"), entry.get("offset", 0.0)
+    for key, value in (("column", column), ("unit", unit)):
+        if value is not None and not (isinstance(value, str) and value):
+            problems.append(f"{label}.{key} = {value!r} is not allowed: a text is needed")
+            return Clock()
+    if not _finite(offset):
+        problems.append(f"{label}.offset = {offset!r} is not allowed: a number of seconds")
+        return Clock()
+    if unit is not None:
+        try:
+            to_si(1.0, unit, "time")
+        except ParameterError as error:
+            problems.append(f"{label}.unit: {error}")
+    return Clock(column, unit, float(offset))
+
+
+def _strange(
+    problems: list[str], label: str, entry: Mapping[str, Any], allowed: tuple[str, ...]
+) -> None:
+    for key in entry:
+        if key not in allowed:
+            near = difflib.get_close_matches(str(key), allowed, n=1)
+            hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(allowed)}"
+            problems.append(f"unknown key '{label}.{key}'; {hint}")

@@ -1,0 +1,215 @@
+"""Channels with clocks of their own, on one grid."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import channel_of
+from pamrs.errors import RecordingError
+from pamrs.recordings._clock import Array, Event, Grid, Mask, gaps, usual_interval
+from pamrs.recordings._faults import COMMANDS
+from pamrs.recordings._recording import Issue, Recording, judged
+
+__all__ = ["Sampled", "on_one_clock"]
+
+_SLOW: Final = frozenset({"temperature"})  # does not say how fine the grid is
+_FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most
+_CUT: Final = 2.0  # samples at the ends whose loss is not worth a word
+
+
+@dataclass(frozen=True, eq=False)
+class Sampled:
+    """A channel as it was sampled.
+
+    Attributes
+    ----------
+    name : str
+        The channel.
+    values : (n,) array
+        SI values, NaN where there is none.
+    time : (n,) array
+        Seconds on the clock of the recording, finite.
+    unit : str
+        SI unit.
+    hold : bool
+        Logged on change: a value holds until the next one.
+    """
+
+    name: str
+    values: Array
+    time: Array
+    unit: str
+    hold: bool = False
+
+
+class _Averaged(Grid):
+    """A grid that is coarser than the samples: the mean of those around each of its times."""
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """Means on the grid; NaN, and False in the mask, where nothing usable is near."""
+        half = 0.5 * self.sample_time
+        first = np.searchsorted(self._stamps, self.time - half, side="left")
+        last = np.searchsorted(self._stamps, self.time + half, side="left")
+        total = np.concatenate([[0.0], np.cumsum(np.where(usable, values, 0.0))])
+        count = np.concatenate([[0], np.cumsum(usable)])
+        number = count[last] - count[first]
+        mask: Mask = (number > 0) & (2 * number >= last - first)
+        laid = np.full(len(self.time), np.nan)
+        laid[mask] = (total[last] - total[first])[mask] / number[mask]
+        return laid, mask
+
+
+class _Held(Grid):
+    """Events: each value holds until the next one; there may be only one."""
+
+    def __init__(  # nothing is interpolated
+        self,
+        stamps: Array,
+        rows: NDArray[np.intp],
+        step: float,
+        usual: float,
+        events: list[Event],
+        time: Array | None = None,
+    ) -> None:
+        self.rows = rows
+        self.sample_time = step
+        self.events = events
+        self.time = stamps if time is None else time
+        self._stamps = stamps
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """The last value at or before each time; NaN, and False in the mask, before the first."""
+        near = 1e-6 * self.sample_time
+        place = np.searchsorted(self._stamps, self.time + near, side="right") - 1
+        mask: Mask = (place >= 0) & usable[np.maximum(place, 0)]
+        laid = np.where(mask, values[np.maximum(place, 0)], np.nan)
+        return laid, mask
+
+
+def on_one_clock(
+    name: str, role: str, channels: Sequence[Sampled], source: str, sample_time: float | None
+) -> Recording:
+    """A recording of channels with different clocks, where all of them were sampled.
+
+    Parameters
+    ----------
+    name, role : str
+        What it is called and for.
+    channels : sequence of Sampled
+        One at least that is not held.
+    source : str
+        The file, for messages.
+    sample_time : float, optional
+        Spacing of the grid [s]; by default that of the slowest channel, temperatures left out, so
+        that no sample is made up. A channel twice as fast or faster is averaged over it.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        If a clock does not rise, or the channels were not sampled at the same time.
+    """
+    stepped = [channel for channel in channels if not channel.hold]
+    if not stepped:
+        raise RecordingError(f"{source}: every channel has hold = true; one sampled one is needed")
+    rows = {channel.name: _rising(channel, source) for channel in channels}
+    usual: dict[str, float] = {}
+    for channel in stepped:
+        intervals = np.diff(channel.time[rows[channel.name]])
+        usual[channel.name] = usual_interval(intervals, len(channel.time))
+    telling = [each for each in stepped if channel_of(each.name) not in _SLOW] or stepped
+    step = sample_time or max(usual[channel.name] for channel in telling)
+    start, time = _common(telling, step, source)
+    issues: list[Issue] = []
+    laid: dict[str, Array] = {}
+    masks: dict[str, Mask] = {}
+    for channel in channels:
+        own = rows[channel.name]
+        stamps = channel.time[own] - start
+        interval = usual.get(channel.name, step)
+        kind = Grid
+        if channel.hold:
+            kind = _Held
+        elif 2.0 * interval <= step * 1.01 and channel_of(channel.name) not in COMMANDS:
+            kind = _Averaged
+        if not channel.hold:
+            issues += _missing(channel.name, stamps, interval, time, step)
+        grid = kind(stamps, own, step, interval, [], time)
+        laid[channel.name], masks[channel.name] = judged(
+            channel.name, channel.values[own], grid, source, issues, held=channel.hold
+        )
+    issues.sort(key=lambda issue: (issue.start, issue.channel))
+    units = {channel.name: channel.unit for channel in channels}
+    return Recording(name, role, time, step, laid, masks, issues, units)
+
+
+def _rising(channel: Sampled, source: str) -> NDArray[np.intp]:
+    """Rows whose times differ from the row before; the last one of events at the same time."""
+    intervals = np.diff(channel.time)
+    if np.any(intervals < 0.0):
+        at = int(np.argmax(intervals < 0.0))
+        raise RecordingError(
+            f"{source}: the clock of {channel.name!r} steps back by {-float(intervals[at]):.6g} s "
+            f"at {float(channel.time[at]):.6g} s; with several clocks that is not allowed (split = "
+            "'clock' makes a recording of each part)"
+        )
+    keep = np.concatenate([intervals > 0.0, [True]] if channel.hold else [[True], intervals > 0.0])
+    rows = np.flatnonzero(keep)
+    if len(rows) < 2 and not channel.hold:
+        raise RecordingError(
+            f"{source}: {channel.name!r} has {len(rows)} samples at different times; 2 are needed "
+            "(hold = true if it is logged on change)"
+        )
+    return rows
+
+
+def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[float, Array]:
+    """When all channels have begun, and the grid from there to where the first one ends."""
+    start = max(float(channel.time[0]) for channel in channels)
+    stop = min(float(channel.time[-1]) for channel in channels)
+    count = int(np.floor((stop - start) / step + 0.05)) + 1
+    if stop <= start or count < 2:
+        spans = "; ".join(
+            f"{channel.name} from {channel.time[0]:.9g} to {channel.time[-1]:.9g} s"
+            for channel in channels
+        )
+        raise RecordingError(
+            f"{source}: the channels were not sampled at the same time: {spans} (time = {{ offset "
+            "= ... }} of a channel moves its clock)"
+        )
+    most = _FINEST * max(len(channel.time) for channel in channels)
+    if count > most:
+        raise RecordingError(
+            f"{source}: {stop - start:.6g} s in steps of {step:.6g} s are {count} samples, more "
+            f"than {_FINEST:g} times what was recorded; long pauses part recordings with split = "
+            "{ gap = ... }, and sample_time says another step"
+        )
+    return start, np.arange(count, dtype=np.float64) * step
+
+
+def _missing(name: str, stamps: Array, interval: float, time: Array, step: float) -> list[Issue]:
+    """Gaps of a channel, and what of it lies outside the recording."""
+    elapsed = np.diff(stamps)
+    events = gaps(stamps, elapsed, np.zeros(len(elapsed), dtype=bool), interval)
+    last = float(time[-1])
+    found = [
+        Issue("gap", name, max(0.0, event.start), min(last, event.stop), event.text)
+        for event in events
+        if event.stop > 0.0 and event.start < last
+    ]
+    for lost, words, at in (
+        (-float(stamps[0]), "before another channel begins", 0.0),
+        (float(stamps[-1]) - last, "after another channel ends", last),
+    ):
+        if lost > _CUT * step:
+            text = f"{lost:.4g} s of it, {words}, are left out"
+            found.append(Issue("gap", name, at, at, text))
+    return found

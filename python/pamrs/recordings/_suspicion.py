@@ -1,0 +1,272 @@
+"""Units that the physics contradicts: what a log says, what it is likelier to mean, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import channel_of, dotted
+from pamrs.rig import Rig
+from pamrs.units import from_si, parse_unit
+
+__all__ = ["Suspicion", "limits_of", "suspicions", "top_of"]
+
+Array = NDArray[np.float64]
+
+AMBIENT: Final = 101325.0
+PRESSURES: Final = ("supply_pressure", "line_pressure", "muscle_pressure")
+PRESSURE_UNITS: Final = ("bar", "psi", "kPa", "MPa", "mbar", "Pa")
+_TOP: Final = 0.995  # quantile that stands for the largest value, spikes left out
+_LOW: Final = 0.005
+_HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
+_RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
+_OVER: Final = 1.15  # a muscle beside what feeds it
+_REST: Final = 0.02  # share of the samples that rest at the lowest level
+_NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
+_SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
+
+
+@dataclass(frozen=True)
+class Suspicion:
+    """A unit that is likely wrong.
+
+    Attributes
+    ----------
+    channel : str
+        Its name.
+    said, likely : str
+        The unit that was said, and the one that fits; ``"absolute"`` and ``"gauge"`` where the
+        zero of a pressure is another one.
+    text : str
+        The evidence in plain words.
+    """
+
+    channel: str
+    said: str
+    likely: str
+    text: str
+
+
+def top_of(values: Array) -> float:
+    """The largest value without spikes; 0 where there is none."""
+    good = values[np.isfinite(values)]
+    return float(np.quantile(good, _TOP)) if good.size else 0.0
+
+
+def _bottom(values: Array) -> float:
+    good = values[np.isfinite(values)]
+    return float(np.quantile(good, _LOW)) if good.size else 0.0
+
+
+def limits_of(rig: Rig | None, name: str) -> tuple[float, float] | None:
+    """Where a rig lets an angle or a length be [SI].
+
+    Parameters
+    ----------
+    rig : Rig or None
+        The rig.
+    name : str
+        Channel, ``joint_angle`` or ``length`` with or without the name of a block.
+
+    Returns
+    -------
+    lower, upper : float
+        None where the rig does not say.
+    """
+    kinds = {
+        "joint_angle": ("joint", "min_angle", "max_angle"),
+        "length": ("load", "min_length", "max_length"),
+    }
+    if rig is None or channel_of(name) not in kinds:
+        return None
+    block, low, high = kinds[channel_of(name)]
+    table = rig.tables(block).get(name.partition(".")[2])
+    if table is None or table.get(low) is None or table.get(high) is None:
+        return None
+    return float(table[low]), float(table[high])
+
+
+def suspicions(
+    channels: Mapping[str, Array], said: Mapping[str, str], rig: Rig | None = None
+) -> list[Suspicion]:
+    """Ask of every channel whether its unit can be what it is said to be.
+
+    Parameters
+    ----------
+    channels : mapping of str to (n,) array
+        SI values by channel, as they come out with the units that are said.
+    said : mapping of str to str
+        The unit of each.
+    rig : Rig, optional
+        What is compared with: pressure of the tank, ends of the joint, lengths of the muscle.
+
+    Returns
+    -------
+    list of Suspicion
+        Empty where nothing speaks against the units.
+    """
+    found: list[Suspicion] = []
+    for name, values in channels.items():
+        unit, kind = said.get(name, ""), channel_of(name)
+        if not unit or not np.isfinite(values).any():
+            continue
+        if kind in PRESSURES:
+            found += _pressure(name, unit, channels, rig)
+        elif kind == "temperature":
+            found += _temperature(name, unit, values)
+        elif kind in ("joint_angle", "length"):
+            found += _range(name, unit, values, rig)
+    return found
+
+
+def _other(values: Array | float, said: str, other: str) -> Array | float:
+    """SI values if the numbers were in another unit."""
+    one, two = parse_unit(said), parse_unit(other)
+    return (values - one.offset) / one.scale * two.scale + two.offset
+
+
+# ---------------------------------------------------------------------- pressures
+
+
+def _fed_by(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[float, str] | None:
+    """The pressure that a channel is judged by, and what it is."""
+    rated = [
+        float(table["initial_pressure"])
+        for block, table in (rig.tables("supply") if rig else {}).items()
+        if channel_of(name) != "supply_pressure" or dotted("supply_pressure", block) == name
+    ]
+    if rated and max(rated) > 0.0:
+        return max(rated), "the supply of the rig file"
+    if channel_of(name) != "supply_pressure":
+        tops = [top_of(v) for key, v in channels.items() if channel_of(key) == "supply_pressure"]
+        if tops and max(tops) > 0.0:
+            return max(tops), "the recorded supply"
+    return None
+
+
+def _pressure(
+    name: str, unit: str, channels: Mapping[str, Array], rig: Rig | None
+) -> Iterator[Suspicion]:
+    values = channels[name]
+    top = top_of(values)
+    beside = _fed_by(name, channels, rig)
+    supply = channel_of(name) == "supply_pressure"
+    reference, what = beside or (_HIGHEST, "what pneumatic muscles take")
+    least = _RATED[0] if supply and beside else 0.0
+    most = (_RATED[1] if supply else _OVER) if beside else 1.0
+    if top > 0.0 and not least <= top / reference <= most:
+        likely = _fitting(top, unit, reference, least if least else 0.02, most)
+        if likely:
+            turned = float(_other(top, unit, likely))
+            yield Suspicion(
+                name,
+                unit,
+                likely,
+                f"{name} is said to be in {unit}, so it would reach {_bar(top)}, beside "
+                f"{_bar(reference)} of {what}; read as {likely} it reaches {_bar(turned)}",
+            )
+            return
+    yield from _absolute(name, unit, values, rig)
+
+
+def _fitting(top: float, unit: str, reference: float, least: float, most: float) -> str:
+    """The unit of pressure with which the largest value fits; the first one, for there are few."""
+    for other in PRESSURE_UNITS:
+        scale = parse_unit(other).scale
+        if abs(scale / parse_unit(unit).scale - 1.0) < 1e-9:
+            continue
+        if least <= float(_other(top, unit, other)) / reference <= most:
+            return other
+    return ""
+
+
+def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
+    """A lowest level, at which it rests, that is the ambient pressure, or a vacuum."""
+    good = values[np.isfinite(values)]
+    if good.size < 20:
+        return
+    ambient = AMBIENT
+    if rig is not None:
+        ambient = float((rig.model.get("gas") or {}).get("ambient_pressure", AMBIENT))
+    low, span = _bottom(good), top_of(good) - _bottom(good)
+    rests = float(np.mean(good <= low + 0.02 * max(span, 0.0) + 500.0))
+    if rests < _REST or span < 0.2 * ambient or channel_of(name) == "supply_pressure":
+        return
+    if abs(low - ambient) < _NEAR * ambient:
+        yield Suspicion(
+            name,
+            "gauge",
+            "absolute",
+            f"{name} never falls below {_bar(low)} and rests there for {100 * rests:.0f} % of its "
+            f"samples: the ambient pressure, so its values are likely absolute and not gauge; "
+            f"offset = {-from_si(ambient, unit, 'pressure'):.6g} in {unit} makes them gauge",
+        )
+    elif abs(low + ambient) < _NEAR * ambient:
+        yield Suspicion(
+            name,
+            "absolute",
+            "gauge",
+            f"{name} rests at {_bar(low)} for {100 * rests:.0f} % of its samples, a vacuum: its "
+            "values are gauge pressures already, and the ambient pressure was subtracted once "
+            "more",
+        )
+
+
+def _bar(pressure: float) -> str:
+    return f"{pressure / 1e5:.4g} bar"
+
+
+# ------------------------------------------------------------- temperature, motion
+
+
+def _temperature(name: str, unit: str, values: Array) -> Iterator[Suspicion]:
+    middle = float(np.nanmedian(values))
+    for other in ("degC", "K", "degF"):
+        turned = float(_other(middle, unit, other))
+        if not 220.0 < middle < 400.0 and 250.0 < turned < 350.0:
+            yield Suspicion(
+                name,
+                unit,
+                other,
+                f"{name} is said to be in {unit}, so it would be {middle:.4g} K "
+                f"({middle - 273.15:.4g} degC); read as {other} it is {turned - 273.15:.4g} degC",
+            )
+            return
+
+
+def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Suspicion]:
+    """An angle or a length beside the ends that the rig file gives, else beside the possible."""
+    angle = channel_of(name) == "joint_angle"
+    shown, dimension = ("deg", "angle") if angle else ("mm", "length")
+    given = limits_of(rig, name)
+    low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
+    slack = _SLACK * (high - low) if given else 0.0
+    bottom, top = _bottom(values), top_of(values)
+
+    def fits(first: float, last: float) -> bool:
+        return low - slack <= first and last <= high + slack
+
+    if fits(bottom, top) and not (given and top - bottom < 0.02 * (high - low)):
+        return
+    for other in ("deg", "rad", "mrad", "rev") if angle else ("m", "mm", "cm", "in", "um"):
+        if abs(parse_unit(other).scale / parse_unit(unit).scale - 1.0) < 1e-9:
+            continue
+        first, last = (float(_other(edge, unit, other)) for edge in (bottom, top))
+        if fits(first, last) and last - first > 5.0 * (top - bottom) * fits(bottom, top):
+            ends = "the rig file allows" if given else "possible are"
+            now, then, wide = (
+                f"{from_si(a, shown, dimension):.4g} to {from_si(b, shown, dimension):.4g} {shown}"
+                for a, b in ((bottom, top), (first, last), (low, high))
+            )
+            yield Suspicion(
+                name,
+                unit,
+                other,
+                f"{name} is said to be in {unit}, so it would go from {now}, where {ends} {wide}; "
+                f"read as {other} it goes from {then}",
+            )
+            return

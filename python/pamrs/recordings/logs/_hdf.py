@@ -1,0 +1,79 @@
+"""HDF5 by h5py: every vector, every column, every field of records."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
+from pamrs.recordings.logs._tables import series_of_matrix
+
+__all__ = ["read_hdf"]
+
+_UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")
+_RATES: Final = ("sample_rate", "sampling_rate", "fs", "rate", "SampleRate")  # [Hz]
+_STEPS: Final = ("sample_time", "dt", "wf_increment", "increment")  # [s]
+_MOST_COLUMNS: Final = 256
+
+
+def read_hdf(path: Path, form: TextFormat) -> Log:
+    """Read an HDF5 file.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    form : TextFormat
+        Its `columns` name the columns of matrices.
+
+    Returns
+    -------
+    Log
+        By path of the data set. Its unit is its attribute ``unit`` or ``units``, its clock the
+        attribute ``sample_rate`` [Hz] or ``dt`` [s], of it or of its group.
+    """
+    import h5py
+
+    found: list[Series] = []
+    unread: dict[str, str] = {}
+
+    def take(name: str, item: Any) -> None:
+        if not isinstance(item, h5py.Dataset):
+            return
+        if item.ndim > 2 or item.dtype.kind not in "biufV" or item.size < 2:
+            unread[name] = f"it has the shape {item.shape} and the type {item.dtype}"
+            return
+        if item.ndim == 2 and min(item.shape) > _MOST_COLUMNS:
+            unread[name] = f"it has the shape {item.shape}, which is no table"
+            return
+        for made in series_of_matrix(name, item[()], form.columns, unread, path):
+            unit = made.unit or _unit(item)
+            found.append(Series(made.name, made.values, unit, _clock(item, len(made.values))))
+
+    with h5py.File(path, "r") as file:
+        file.visititems(take)
+    return collected(path, found, unread)
+
+
+def _unit(item: Any) -> str:
+    for key in _UNITS:
+        if key in item.attrs:
+            said = item.attrs[key]
+            text = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
+            return text.strip()
+    return ""
+
+
+def _clock(item: Any, count: int) -> Array | None:
+    for holder in (item, item.parent):
+        for keys, power in ((_STEPS, 1), (_RATES, -1)):
+            for key in keys:
+                try:
+                    step = float(np.asarray(holder.attrs[key]).ravel()[0]) ** power
+                except (KeyError, ValueError, TypeError, IndexError, ZeroDivisionError):
+                    continue
+                if np.isfinite(step) and step > 0.0:
+                    return np.arange(count, dtype=np.float64) * step
+    return None

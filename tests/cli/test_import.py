@@ -1,0 +1,112 @@
+"""The command that looks at logs and proposes a case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs.recordings import load_case
+from pamrs.recordings import logs as logs_package
+from tests.recordings.written import written
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: Any) -> tuple[int, str, str]:
+    code = cli.main(["import", *map(str, arguments)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_a_log_becomes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, _, _ = written(tmp_path, "mf4")
+    before = file.read_bytes()
+    code, out, err = run(capsys, file, "--rig", "shoulder", "--out", tmp_path / "case")
+    assert code == 0
+    assert "400      100 Hz  bar" in out
+    assert "not found in this log: supply_pressure" in out
+    assert "case.toml" in err
+    found = load_case(tmp_path / "case")
+    assert found.channels == ("valve_command", "muscle_pressure", "joint_angle")
+    assert (found.rig.name, file.read_bytes()) == ("shoulder", before)
+    code, _, err = run(capsys, file, "--out", tmp_path / "case")
+    assert (code, "not overwritten" in err) == (2, True)
+
+
+def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, _, _ = written(tmp_path, "bag")
+    pamrs.rigs.shoulder().to_toml(tmp_path / "mine.toml")
+    code, _, _ = run(capsys, file, "--rig", tmp_path / "mine.toml", "--out", tmp_path / "a" / "b")
+    assert code == 0
+    text = (tmp_path / "a" / "b" / "case.toml").read_text(encoding="utf-8")
+    assert 'rig = "../../mine.toml"' in text
+    assert load_case(tmp_path / "a" / "b").recordings[0].name == "run_bag"
+
+
+def test_without_a_folder_it_is_printed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savez("run.npz", p1=np.linspace(0.0, 4.0, 100))
+    code, out, _ = run(capsys, "run.npz", "--sample-time", "5 ms")
+    assert code == 0
+    assert 'schema = "pamrs.case/1"' in out
+    assert "sample_time = 0.005" in out
+    assert list(tmp_path.iterdir()) == [tmp_path / "run.npz"]
+
+
+def test_columns_without_headings(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rows = "".join(f"{10 * i};{i % 9 / 8:.3f};{i}\n" for i in range(60))
+    (tmp_path / "run.csv").write_text(rows, encoding="utf-8")
+    names = "time [ms], muscle_pressure [bar], n"
+    code, out, _ = run(
+        capsys,
+        tmp_path / "run.csv",
+        "--columns",
+        names,
+        "--rig",
+        "sealed_chamber",
+        "--out",
+        tmp_path,
+    )
+    assert (code, "100 Hz" in out) == (0, True)
+    (only,) = load_case(tmp_path).recordings
+    assert (len(only), only.sample_time) == (60, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["absent.csv"], "no such file"),
+        (["run.npz", "--sample-time", "0 s"], "--sample-time = '0 s' is not allowed"),
+        (["run.npz", "--sample-time", "5 bar"], "--sample-time = '5 bar'"),
+        (["run.npz", "--rig", "absent.toml"], "absent.toml"),
+        (["nothing.npz"], "no channel was recognised"),
+    ],
+)
+def test_wrong_input(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    words: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savez("run.npz", p1=np.linspace(0.0, 4.0, 100))
+    np.savez("nothing.npz", zzz=np.linspace(0.0, 4.0, 100))
+    code, _, err = run(capsys, *arguments)
+    assert code == 2
+    assert words in err
+
+
+def test_the_extra_is_named_before_anything_is_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, _, _ = written(tmp_path, "hdf5")
+    monkeypatch.setattr(logs_package, "find_spec", lambda name: None)
+    code, out, err = run(capsys, file)
+    assert (code, out) == (2, "")
+    assert "pip install 'pamrs[logs]'" in err

@@ -1,0 +1,278 @@
+"""Logs of a laboratory: every format, written by its own library, gives the same recording."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from pamrs.errors import MissingPackageError, RecordingError
+from pamrs.recordings import load_recording, load_recordings
+from pamrs.recordings import logs as logs_package
+from pamrs.recordings.logs import TextFormat, read_log
+from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, mapping, signals, written
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_the_same_log_gives_the_same_recording(tmp_path: Path, kind: str) -> None:
+    data = signals()
+    file, pattern, time = written(tmp_path, kind)
+    (got,) = load_recordings(file, channels=mapping(pattern), time=time)
+    plain = tmp_path / "plain.csv"
+    head = "time [s],valve_command [V],muscle_pressure [bar],joint_angle [deg]"
+    np.savetxt(plain, np.column_stack(list(data.values())), "%.6f", ",", header=head, comments="")
+    wanted = load_recording(plain)
+    assert got.sample_time == wanted.sample_time == DT
+    assert len(got) == len(wanted) == N
+    assert got.units == wanted.units
+    for channel in CHANNELS:
+        np.testing.assert_array_equal(got.mask[channel], wanted.mask[channel])
+        np.testing.assert_allclose(got.channels[channel], wanted.channels[channel], rtol=1e-12)
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_names_and_units_are_listed(tmp_path: Path, kind: str) -> None:
+    file, pattern, _ = written(tmp_path, kind)
+    log = read_log(file)
+    for name, unit in UNITS.items():
+        series = log.find(pattern.format(name))
+        assert len(series.values) == N
+        assert series.unit in ("", unit, "°" if unit == "deg" else unit)
+
+
+def text_log(tmp_path: Path, text: str, **form: Any) -> Any:
+    file = tmp_path / "log.txt"
+    file.write_text(text, encoding="utf-8")
+    return read_log(file, TextFormat(**form))
+
+
+def test_a_table_without_headings(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * i:.1f} {i % 7} {i}\n" for i in range(30))
+    assert list(text_log(tmp_path, rows).series) == ["column 1", "column 2", "column 3"]
+    named = text_log(tmp_path, rows, columns=("t [ms]", "p", "n"))
+    assert list(named.series) == ["t", "p", "n"]
+    assert named.series["t"].unit == "ms"
+    with pytest.raises(RecordingError, match="columns lists 2 names, but there are 3 columns"):
+        text_log(tmp_path, rows, columns=("t", "p"))
+
+
+def test_dates_times_of_day_texts_and_thousands(tmp_path: Path) -> None:
+    rows = "".join(
+        f"12.05.2024 23:59:{50 + i // 2:02d},{5 * (i % 2)}00;trial {i // 4};1.00{i},5\n"
+        if i < 20
+        else f"13.05.2024 00:00:{(i - 20) // 2:02d},{5 * (i % 2)}00;trial {i // 4};1.00{i % 10},5\n"
+        for i in range(40)
+    )
+    log = text_log(tmp_path, "when;what;load (N)\n" + rows, thousands=".", decimal=",")
+    np.testing.assert_allclose(log.series["when"].values, 0.5 * np.arange(40))
+    assert log.series["what"].labels[:2] == ("trial 0", "trial 1")
+    assert log.series["load"].unit == "N"
+    assert log.series["load"].values[3] == 1003.5
+    night = "".join(f"{23 if i < 9 else 0}:{(51 + i) % 60:02d}:00,{i}\n" for i in range(20))
+    log = text_log(tmp_path, "clock,p\n" + night)
+    np.testing.assert_allclose(log.series["clock"].values, 60.0 * np.arange(20))
+
+
+def test_a_cell_that_is_no_number_is_told_where_it_matters(tmp_path: Path) -> None:
+    rows = "".join(f"{i},{'oops' if i == 7 else i}\n" for i in range(40))
+    log = text_log(tmp_path, "t,p\n" + rows)
+    with pytest.raises(RecordingError, match="'p' cannot be used: in row 8 .*'oops'"):
+        log.find("p")
+
+
+def test_names_that_are_not_there(tmp_path: Path) -> None:
+    file, _, _ = written(tmp_path, "hdf5")
+    log = read_log(file)
+    assert log.find("p1") is log.series["daq/p1"]
+    with pytest.raises(RecordingError, match=r"no channel 'daq/p2'; did you mean 'daq/p1'\?"):
+        log.find("daq/p2")
+
+
+@pytest.mark.parametrize(
+    "ending", ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather"]
+)
+def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
+    file = tmp_path / f"broken.{ending}"
+    file.write_bytes(b"\x00\x01 this is none of these formats " * 20)
+    with pytest.raises(RecordingError, match=f"broken.{ending}"):
+        read_log(file)
+
+
+@pytest.mark.parametrize(("name", "words"), [("a.docx", "'.docx'"), (".", "a folder"), ("b", "no")])
+def test_what_is_not_read(tmp_path: Path, name: str, words: str) -> None:
+    if name != "b":
+        file = tmp_path / name
+        file.exists() or file.write_text("x")
+    with pytest.raises(RecordingError, match=words):
+        read_log(tmp_path / name)
+
+
+def test_a_missing_package_is_named_with_its_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, pattern, _ = written(tmp_path, "mf4")
+    there = importlib.util.find_spec
+    monkeypatch.setattr(
+        logs_package, "find_spec", lambda name: None if name == "asammdf" else there(name)
+    )
+    with pytest.raises(MissingPackageError, match=r"asammdf.*pip install 'pamrs\[logs\]'"):
+        load_recordings(file, channels=mapping(pattern))
+
+
+def test_objects_in_numpy_files_are_not_executed(tmp_path: Path) -> None:
+    np.save(tmp_path / "x.npy", np.array([{}], dtype=object), allow_pickle=True)
+    with pytest.raises(RecordingError, match="allow_pickle"):
+        read_log(tmp_path / "x.npy")
+
+
+def test_points_that_part_thousands_are_seen_where_nothing_else_is_possible(tmp_path: Path) -> None:
+    rows = "".join(f"{i // 10}.{i % 10}00.000;{i % 7}.125\n" for i in range(40))
+    log = text_log(tmp_path, rows)
+    np.testing.assert_array_equal(log.series["column 1"].values, 1e5 * np.arange(40))
+    np.testing.assert_array_equal(log.series["column 2"].values, np.arange(40) % 7 + 0.125)
+
+
+def test_a_text_that_is_no_table(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no table was found"):
+        text_log(tmp_path, '{"ob": [[0.1, 0.2, 0.3], [0.1, 0.2, 0.3]], "action": [0.1, 0.2]}')
+
+
+def test_several_groups_of_an_mdf_have_their_clocks_and_invalid_samples(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    slow = np.arange(20) * 0.5
+    bad = np.zeros(20, dtype=bool)
+    bad[3] = True
+    with MDF() as file:
+        file.append([Signal(np.arange(100.0), np.arange(100) * 0.1, name="p1", unit="bar")])
+        file.append(
+            [
+                Signal(20.0 + slow, slow, name="T", unit="degC", invalidation_bits=bad),
+                Signal(slow, slow, name="p1", unit="bar"),
+            ]
+        )
+        file.save(tmp_path / "run.mf4", overwrite=True)
+    log = read_log(tmp_path / "run.mf4")
+    assert [name.split("/")[-1] for name in log.series] == ["p1", "T", "p1"]
+    temperature = log.find("T")
+    assert temperature.unit == "degC"
+    assert np.flatnonzero(np.isnan(temperature.values)).tolist() == [3]
+    assert temperature.time is not None
+    np.testing.assert_allclose(temperature.time, slow)
+    with pytest.raises(RecordingError, match="may be any of"):
+        log.find("p1")
+
+
+def test_topics_at_their_own_rates_and_stamps_of_their_own(tmp_path: Path) -> None:
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    number = store.types["std_msgs/msg/Float64"]
+    text = store.types["std_msgs/msg/String"]
+    wrench = store.types["geometry_msgs/msg/WrenchStamped"]
+    header = store.types["std_msgs/msg/Header"]
+    stamp = store.types["builtin_interfaces/msg/Time"]
+    vector = store.types["geometry_msgs/msg/Vector3"]
+    with Writer(tmp_path / "bag", version=9) as writer:
+        made = {
+            topic: writer.add_connection(topic, kind.__msgtype__, typestore=store)
+            for topic, kind in (("/p", number), ("/note", text), ("/cell", wrench))
+        }
+        for step in range(100):
+            now = 10**18 + step * 10**7
+            writer.write(made["/p"], now, store.serialize_cdr(number(2.0), number.__msgtype__))
+            if step % 5 == 0:
+                message = wrench(
+                    header(stamp(7, step * 10**6), "cell"),
+                    store.types["geometry_msgs/msg/Wrench"](
+                        vector(0.0, 0.0, float(step)), vector(0.0, 0.0, 0.0)
+                    ),
+                )
+                raw = store.serialize_cdr(message, wrench.__msgtype__)
+                writer.write(made["/cell"], now, raw)
+        raw = store.serialize_cdr(text("start"), text.__msgtype__)
+        writer.write(made["/note"], 10**18, raw)
+    for path in (tmp_path / "bag", tmp_path / "bag" / "bag.db3"):
+        log = read_log(path)
+        force = log.find("/cell/wrench/force/z")
+        assert force.time is not None
+        np.testing.assert_allclose(force.time, 0.05 * np.arange(20), atol=1e-12)
+        np.testing.assert_allclose(force.values, 5.0 * np.arange(20))
+        np.testing.assert_allclose(
+            log.find("/cell/header/stamp").values, 7.0 + 0.005 * np.arange(20)
+        )
+        assert len(log.find("/p/data").values) == 100
+
+
+def test_signals_that_simulink_logs_in_a_dataset(tmp_path: Path) -> None:
+    import warnings
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        from matio import save_to_mat
+        from matio.utils.matclass import MatlabOpaque
+    time = np.arange(30.0)[:, None] * 0.1
+    elements = np.empty((1, 2), dtype=object)
+    for place, name in enumerate(("p1", "angle")):
+        values = MatlabOpaque(
+            {"Data_": (place + 1.0) * time, "Time_": time, "Name": np.array([name])},
+            "timeseries",
+            "MCOS",
+        )
+        elements[0, place] = MatlabOpaque(
+            {"Name": np.array([name]), "Values": values}, "Simulink.SimulationData.Signal", "MCOS"
+        )
+    dataset = MatlabOpaque({"Elements": elements}, "Simulink.SimulationData.Dataset", "MCOS")
+    save_to_mat(str(tmp_path / "run.mat"), {"logsout": dataset})
+    log = read_log(tmp_path / "run.mat")
+    assert list(log.series) == ["logsout/p1", "logsout/angle"]
+    series = log.find("p1")
+    np.testing.assert_allclose(series.values, time.ravel())
+    assert series.time is not None
+
+
+def test_tables_of_pandas_with_dates(tmp_path: Path) -> None:
+    import pandas as pd
+
+    when = pd.date_range("2024-05-12", periods=30, freq="20ms")
+    frame = pd.DataFrame(
+        {"when": when, "p1 [bar]": np.arange(30.0), "what": ["a"] * 10 + ["b"] * 20}
+    )
+    for ending in ("parquet", "feather"):
+        getattr(frame, f"to_{ending}")(tmp_path / f"run.{ending}")
+        log = read_log(tmp_path / f"run.{ending}")
+        np.testing.assert_allclose(log.find("when").values, 0.02 * np.arange(30))
+        assert (log.find("when").unit, log.find("p1").unit) == ("s", "bar")
+        assert log.find("what").labels == ("a", "b")
+        frame.set_index("when").to_parquet(tmp_path / "indexed.parquet")
+    assert "when" in read_log(tmp_path / "indexed.parquet").series
+
+
+def test_utf_16_with_headings_that_say_it_all(tmp_path: Path) -> None:
+    rows = "".join(f"{0.1 * i:.1f},{i % 7}\n" for i in range(40))
+    file = tmp_path / "run.csv"
+    file.write_bytes(("time [s],muscle_pressure [bar]\n" + rows).encode("utf-16"))
+    assert len(load_recording(file)) == 40
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
+@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "mcap", "tdms", "h5"])
+def test_any_bytes_are_a_log_or_an_error_that_names_the_file(
+    tmp_path: Path, ending: str, data: bytes
+) -> None:
+    file = tmp_path / f"any.{ending}"
+    file.write_bytes(data)
+    try:
+        told = str(read_log(file).path)
+    except RecordingError as error:
+        told = str(error)
+    assert f"any.{ending}" in told

@@ -1,0 +1,340 @@
+"""From a log to channels: units, lines through two readings, clocks, events, parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import CaseError, MissingPackageError, RecordingError
+from pamrs.recordings import load_case, load_recordings
+from pamrs.recordings import logs as logs_package
+from tests.recordings.written import DT, N, mapping, signals, written
+
+BASE = {"muscle_pressure": {"column": "p1", "unit": "bar"}}
+
+
+def npz(tmp_path: Path, **series: Any) -> Path:
+    file = tmp_path / "run.npz"
+    np.savez(file, **{name: np.asarray(values, dtype=float) for name, values in series.items()})
+    return file
+
+
+def test_counts_scales_signs_and_absolute_pressures(tmp_path: Path) -> None:
+    data = signals()
+    counts = np.round(data["p1"] / 10.0 * 4095)
+    file = npz(
+        tmp_path, t=data["t"] * 1e3, adc=counts, enc=-data["angle"] * 100, abs=data["p1"] + 1.0
+    )
+    channels = {
+        "muscle_pressure.flexor": {
+            "column": "adc",
+            "unit": "bar",
+            "from": [0, 4095],
+            "to": [0, 10],
+        },
+        "joint_angle": {"column": "enc", "unit": "deg", "scale": -0.01, "offset": 5},
+        "muscle_pressure": {"extensor": {"column": "abs", "unit": "bar", "offset": -1.0}},
+    }
+    (got,) = load_recordings(file, channels=channels, time={"column": "t", "unit": "ms"})
+    assert got.sample_time == DT
+    wanted = data["p1"] * 1e5
+    assert np.abs(got.channels["muscle_pressure.flexor"] - wanted).max() < 0.51 * 10e5 / 4095
+    np.testing.assert_allclose(got.channels["muscle_pressure.extensor"], wanted, atol=1e-6)
+    np.testing.assert_allclose(got.channels["joint_angle"], np.radians(data["angle"] + 5))
+
+
+def test_channels_with_clocks_of_their_own(tmp_path: Path) -> None:
+    """Fast pressures are averaged over the encoder's interval, its clock is 40 ms behind, and the
+    command holds from one change to the next.
+    """
+    fast = np.arange(8000) * 1e-3 + 100.0
+    slow = np.arange(1700) * 5e-3 + 99.7
+    rng = np.random.default_rng(1)
+    pressure = 2.0 + np.sin(fast) + rng.normal(0.0, 0.01, len(fast))
+    angle = 30.0 + 10.0 * np.sin(slow + 0.04)
+    file = npz(
+        tmp_path, tp=fast, p1=pressure, ta=slow, angle=angle, tu=[99.0, 102.0, 102.0, 104.0],
+        u=[5.0, 6.0, 7.0, 4.0],
+    )  # fmt: skip
+    channels = {
+        "muscle_pressure": {"column": "p1", "unit": "bar", "time": "tp"},
+        "joint_angle": {
+            "column": "angle", "unit": "deg", "time": {"column": "ta", "offset": 0.04},
+        },
+        "valve_command": {"column": "u", "unit": "V", "time": "tu", "hold": True},
+    }  # fmt: skip
+    (got,) = load_recordings(file, channels=channels)
+    assert got.sample_time == 5e-3
+    assert got.duration == pytest.approx(7.995, abs=0.011)
+    assert got.valid().all()
+    true = 100.0 + got.time
+    assert np.abs(got.channels["muscle_pressure"] / 1e5 - 2.0 - np.sin(true)).std() < 0.006
+    assert np.abs(np.degrees(got.channels["joint_angle"]) - 30 - 10 * np.sin(true)).max() < 1e-3
+    wanted = np.select([true < 102 - 1e-7, true < 104 - 1e-7], [5.0, 7.0], 4.0)
+    np.testing.assert_array_equal(got.channels["valve_command"], wanted)
+    assert any("before another channel begins" in issue.text for issue in got.issues)
+    (fine,) = load_recordings(file, channels=channels, sample_time=1e-3)
+    assert fine.sample_time == 1e-3
+    assert fine.valid("muscle_pressure").mean() > 0.99
+
+
+def test_gaps_of_one_clock_are_masked(tmp_path: Path) -> None:
+    data = signals()
+    keep = (data["t"] < 1.0) | (data["t"] > 1.5)
+    file = npz(tmp_path, t=data["t"], p1=data["p1"], ta=data["t"][keep], angle=data["angle"][keep])
+    channels = {
+        "muscle_pressure": {"column": "p1", "unit": "bar", "time": "t"},
+        "joint_angle": {"column": "angle", "unit": "deg", "time": "ta"},
+    }
+    (got,) = load_recordings(file, channels=channels)
+    assert got.valid("muscle_pressure").all()
+    hole = ~got.valid("joint_angle")
+    assert 45 <= hole.sum() <= 52
+    assert [issue.channel for issue in got.issues if issue.kind == "gap"] == ["joint_angle"]
+
+
+def test_clocks_that_never_meet(tmp_path: Path) -> None:
+    file = npz(
+        tmp_path, t=np.arange(50.0), p1=np.arange(50.0), ta=np.arange(50.0) + 1e6, a=np.arange(50.0)
+    )
+    channels = BASE | {"joint_angle": {"column": "a", "unit": "deg", "time": "ta"}}
+    with pytest.raises(RecordingError, match=r"not sampled at the same time: .*1000000"):
+        load_recordings(file, channels=channels, time="t")
+
+
+def test_parts_of_one_log(tmp_path: Path) -> None:
+    data = signals()
+    clock = np.concatenate([data["t"], data["t"], data["t"] + 0.5])
+    trial = np.repeat([1.0, 2.0, 7.0], N)
+    pause = np.concatenate([data["t"] + 10.0 * k for k in range(3)])
+    pressure = np.tile(data["p1"], 3)
+    file = npz(tmp_path, t=clock, trial=trial, pause=pause, p1=pressure)
+    for split, time, names in (
+        ("clock", "t", ["run_1", "run_2", "run_3"]),
+        ({"gap": 2.0}, "pause", ["run_1", "run_2", "run_3"]),
+        ({"column": "trial"}, "t", ["run_1", "run_2", "run_7"]),
+    ):
+        got = load_recordings(file, channels=BASE, time=time, split=split)
+        assert [part.name for part in got] == names
+        for part in got:
+            assert len(part) == N
+            np.testing.assert_allclose(part.channels["muscle_pressure"], data["p1"] * 1e5)
+    (last,) = load_recordings(
+        file, channels=BASE, time="t", split={"column": "trial"}, pieces=["7"], start=1.0, stop=2.0
+    )
+    assert (last.name, len(last)) == ("run_7", 101)
+    with pytest.raises(RecordingError, match=r"no part 4; there are 3, called '1'"):
+        load_recordings(file, channels=BASE, time="t", split="clock", pieces=[4])
+
+
+def test_parts_by_texts(tmp_path: Path) -> None:
+    rows = [
+        f"{0.01 * i:.2f};{i % 9};{'lift' if i < 50 else 'drop' if i < 100 else ''}"
+        for i in range(150)
+    ]
+    file = tmp_path / "log.csv"
+    file.write_text("\n".join(["t;p1;what", *rows]))
+    got = load_recordings(file, channels=BASE, time="t", split={"column": "what"})
+    assert [(part.name, len(part)) for part in got] == [("log_lift", 50), ("log_drop", 50)]
+
+
+WRONG = [
+    ({}, {}, "channels = {}"),
+    ({"muscle_presure": {"column": "p1", "unit": "bar"}}, {}, "did you mean 'muscle_pressure'"),
+    ({"time": {"column": "t", "unit": "s"}}, {}, "by the key time"),
+    ({"muscle_pressure": "p1"}, {}, "channels.muscle_pressure = 'p1'"),
+    ({"muscle_pressure": {"column": "p1"}}, {}, "channels.muscle_pressure.unit = None"),
+    ({"muscle_pressure": {"column": "p1", "unit": "V"}}, {}, "wrong dimension"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "scal": 2}}, {}, "did you mean 'scale'"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "scale": 0}}, {}, "scale = 0"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "scale": np.nan}}, {}, "scale = nan"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "from": [0, 1]}}, {}, "belong together"),
+    ({"muscle_pressure": BASE["muscle_pressure"] | {"from": [1, 1], "to": [0, 1]}}, {}, "equal"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "hold": 1}}, {}, "hold = 1"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "time": 3}}, {}, "time = 3"),
+    (BASE, {"time": {"column": "t", "unit": "bar"}}, "wrong dimension"),
+    (BASE, {"time": {"column": "t", "offset": "1"}}, "time.offset = '1'"),
+    (BASE, {"time": "x"}, "no channel 'x'"),
+    (BASE, {"time": "short"}, "400 values, but its times 'short' are 3"),
+    (BASE, {}, "no clock for 'p1'"),
+    (BASE, {"time": "t", "split": "gap"}, "split = 'gap'"),
+    (BASE, {"time": "t", "split": {"gap": -1}}, "split = "),
+    (BASE, {"time": "t", "pieces": [1]}, "needs split"),
+    (BASE, {"time": "t", "role": "test"}, "role = 'test'"),
+    (BASE, {"time": "t", "sample_time": -1.0}, "sample_time = -1.0"),
+    ({"muscle_pressure": {"column": "p1", "unit": "bar", "hold": True}}, {"time": "t"}, "hold"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("channels", "options", "words"), WRONG)
+def test_mistakes_are_named(
+    tmp_path: Path, channels: Any, options: dict[str, Any], words: str
+) -> None:
+    data = signals()
+    file = npz(tmp_path, t=data["t"], p1=data["p1"], short=[1.0, 2.0, 3.0])
+    with pytest.raises(RecordingError) as caught:
+        load_recordings(file, channels=channels, **options)
+    assert words in str(caught.value)
+    assert "run.npz" in str(caught.value)
+
+
+def test_without_a_clock_the_spacing_is_enough(tmp_path: Path) -> None:
+    (got,) = load_recordings(npz(tmp_path, p1=signals()["p1"]), channels=BASE, sample_time=0.02)
+    assert (got.sample_time, len(got)) == (0.02, N)
+
+
+# ------------------------------------------------------------------------- cases
+
+CASE = """schema = "pamrs.case/1"
+
+[[recording]]
+file = "{file}"
+split = {{ gap = 1.0 }}
+pieces = [1, 2]
+time = "t"
+channels.muscle_pressure = {{ column = "p1", unit = "bar" }}
+
+[[recording]]
+file = "{file}"
+role = "held_out"
+split = {{ gap = 1.0 }}
+pieces = [3]
+time = "t"
+[recording.channels]
+muscle_pressure = {{ column = "p1", unit = "bar" }}
+"""
+
+
+def case(tmp_path: Path, file: Path, toml: str = CASE) -> Path:
+    pamrs.rigs.sealed_chamber().to_toml(tmp_path / "rig.toml")
+    (tmp_path / "case.toml").write_text(toml.format(file=file.name))
+    return tmp_path
+
+
+def test_a_case_takes_parts_of_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = signals()
+    time = np.concatenate([data["t"] + 10.0 * k for k in range(3)])
+    file = npz(tmp_path, t=time, p1=np.tile(data["p1"], 3))
+    reads: list[Path] = []
+    read = logs_package.read_log
+    monkeypatch.setattr(
+        "pamrs.recordings._case.read_log", lambda *given: reads.append(given[0]) or read(*given)
+    )
+    found = load_case(case(tmp_path, file))
+    assert [item.name for item in found.fit] == ["run_1", "run_2"]
+    assert [item.name for item in found.held_out] == ["run_3"]
+    assert len(reads) == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('time = "t"', 'time = "tt"', "no channel 'tt'"),
+        ("pieces = [1, 2]", "pieces = 1", "recording[0].pieces = 1"),
+        ("pieces = [1, 2]", "pieces = []", "recording[0].pieces = []"),
+        ('column = "p1", ', "", "channels.muscle_pressure.column"),
+        ('channels.muscle_pressure = { column = "p1", unit = "bar" }', "", "goes with channels"),
+        ("pieces = [3]", "pieces = [2]", "two recordings are called 'run_2'"),
+        ('role = "held_out"', 'columns = { "a" = "b" }', "recording[1].columns"),
+    ],
+)  # fmt: skip
+def test_mistakes_in_a_case(tmp_path: Path, old: str, new: str, words: str) -> None:
+    data = signals()
+    time = np.concatenate([data["t"] + 10.0 * k for k in range(3)])
+    file = npz(tmp_path, t=time, p1=np.tile(data["p1"], 3))
+    home = case(tmp_path, file)
+    text = (home / "case.toml").read_text()
+    assert old in text
+    (home / "case.toml").write_text(text.replace(old, new, 1))
+    with pytest.raises(CaseError) as caught:
+        load_case(home)
+    assert words in str(caught.value)
+
+
+def test_a_missing_package_stops_a_case_before_its_rig_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, _, _ = written(tmp_path, "tdms")
+    monkeypatch.setattr(logs_package, "find_spec", lambda name: None)
+    home = case(tmp_path, file)
+    (home / "rig.toml").write_text("not a rig")
+    with pytest.raises(MissingPackageError, match=r"nptdms.*pamrs\[logs\]"):
+        load_case(home)
+
+
+def test_a_bag_in_a_case(tmp_path: Path) -> None:
+    file, pattern, _ = written(tmp_path, "bag")
+    entry = mapping(pattern)["muscle_pressure"]
+    toml = (
+        'schema = "pamrs.case/1"\n[[recording]]\nfile = "{file}"\n[recording.channels]\n'
+        f'muscle_pressure = {{{{ column = "{entry["column"]}", unit = "bar" }}}}\n'
+    )
+    (only,) = load_case(case(tmp_path, file, toml)).recordings
+    assert only.name == "run_bag"
+    assert len(only) == N
+
+
+# ------------------------------------------------------------------------- the page
+
+
+def test_the_example_of_the_page(tmp_path: Path) -> None:
+    """``docs/logs.md``: three lifts in one log, the encoder 40 ms behind, the tank on change."""
+    page = (Path(__file__).parents[2] / "docs" / "logs.md").read_text(encoding="utf-8")
+    toml = page.split("```toml\n")[1].split("```")[0]
+    data = signals()
+    time = np.concatenate([data["t"] + 10.0 * k for k in range(3)])
+    slow = np.concatenate([np.arange(0.0, 4.0, 0.02) + 10.0 * k for k in range(3)])
+    angle = np.interp(slow, time, np.tile(data["angle"], 3))
+    np.savez(
+        tmp_path / "bench.npz",
+        t=time * 1e3,
+        u=np.tile(data["u"], 3),
+        adc1=np.round(np.tile(data["p1"], 3) * 409.5),
+        t_enc=slow - 0.04,
+        enc=(90.0 - angle) * 10.0,
+        t_tank=np.array([0.0, 2.0, 12.0]),
+        p_tank=np.array([8.0, 7.9, 7.8]),
+    )
+    pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
+    (tmp_path / "case.toml").write_text(toml, encoding="utf-8")
+    found = load_case(tmp_path)
+    assert [item.name for item in found.fit] == ["bench_1", "bench_2"]
+    assert [item.name for item in found.held_out] == ["bench_3"]
+    for item in found.recordings:
+        assert item.sample_time == 0.02
+        wanted = np.interp(item.time, data["t"], data["angle"])
+        assert np.abs(np.degrees(item.channels["joint_angle"]) - wanted).max() < 0.1
+        wanted = np.interp(item.time, data["t"], data["p1"])
+        assert np.abs(item.channels["muscle_pressure"] / 1e5 - wanted).max() < 0.02
+    np.testing.assert_allclose(found.fit[1].channels["supply_pressure"][[0, -1]], [7.9e5, 7.8e5])
+
+
+def test_parts_by_a_column_with_a_clock_of_its_own(tmp_path: Path) -> None:
+    fast, slow = np.arange(4000) * 1e-3, np.arange(40) * 0.1
+    file = npz(
+        tmp_path,
+        t=fast,
+        p1=2.0 + np.sin(fast),
+        ts=slow,
+        trial=np.repeat([1.0, np.nan, 3.0, 4.0], 10),
+    )
+    channels = {"muscle_pressure": {"column": "p1", "unit": "bar", "time": "t"}}
+    got = load_recordings(file, channels=channels, time="ts", split={"column": "trial"})
+    assert [(part.name, len(part)) for part in got] == [
+        ("run_1", 1000), ("run_3", 1000), ("run_4", 1000),
+    ]  # fmt: skip
+    first = got[1].channels["muscle_pressure"][0] / 1e5
+    assert first == pytest.approx(2.0 + np.sin(2.0), abs=2e-3)
+
+
+def test_a_pause_of_years_is_an_error_and_no_array(tmp_path: Path) -> None:
+    far = np.concatenate([np.arange(50) * 0.01, np.arange(50) * 0.01 + 1.7e9])
+    file = npz(tmp_path, t=far, p1=np.arange(100.0), ta=far + 1e-3, a=np.arange(100.0))
+    channels = BASE | {"joint_angle": {"column": "a", "unit": "deg", "time": "ta"}}
+    with pytest.raises(RecordingError, match="split = { gap"):
+        load_recordings(file, channels=channels, time="t")
+    assert len(load_recordings(file, channels=channels, time="t", split={"gap": 10.0})) == 2

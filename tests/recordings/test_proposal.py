@@ -1,0 +1,232 @@
+"""What is proposed for a log, and the units that physics contradicts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.recordings import load_case, propose, suspicions
+from pamrs.recordings.logs import split_heading, understood_unit
+from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, signals, written
+
+TIME = np.arange(4000) * 5e-3
+LIFT = np.sin(np.pi * TIME / TIME[-1]) ** 2
+
+
+@pytest.mark.parametrize("kind", FORMATS)
+def test_every_format_becomes_a_case(tmp_path: Path, kind: str) -> None:
+    file, pattern, _ = written(tmp_path, kind)
+    rig = pamrs.rigs.shoulder()
+    proposal = propose([file], rig)
+    (item,) = proposal.logs
+    assert {m.channel: m.series.name for m in item.matches} == {
+        channel: pattern.format(name) for channel, name in CHANNELS.items()
+    }
+    home = tmp_path / "case"
+    home.mkdir()
+    rig.to_toml(home / "rig.toml")
+    (home / "case.toml").write_text(proposal.case_toml(home), encoding="utf-8")
+    (only,) = load_case(home).recordings
+    assert (len(only), only.sample_time) == (N, DT)
+    np.testing.assert_allclose(
+        only.channels["muscle_pressure"], signals()["p1"] * 1e5, rtol=1e-9, atol=1e-4
+    )
+    np.testing.assert_allclose(only.channels["joint_angle"], np.radians(signals()["angle"]))
+
+
+def test_rates_units_and_ranges_are_listed(tmp_path: Path) -> None:
+    file, _, _ = written(tmp_path, "mf4")
+    listed = {each.name: each for each in propose([file]).logs[0].listed}
+    assert set(listed) == set(UNITS)
+    p1 = listed["p1"]
+    assert (p1.count, p1.unit, p1.channel) == (N, "bar", "muscle_pressure")
+    assert p1.rate == pytest.approx(1.0 / DT)
+    assert (p1.low, p1.high) == (signals()["p1"].min(), signals()["p1"].max())
+
+
+def test_named_blocks_several_clocks_events_and_parts(tmp_path: Path) -> None:
+    rig = pamrs.rigs.antagonistic_joint()
+    data = signals()
+    series = {
+        "t": np.concatenate([data["t"] + 20.0 * k for k in range(3)]),
+        "p_flexor [bar]": np.tile(data["p1"], 3),
+        "p_extensor [bar]": np.tile(4.0 - data["p1"], 3),
+        "hinge_angle [deg]": np.tile(data["angle"], 3),
+    }
+    np.savez(tmp_path / "run.npz", **series)
+    proposal = propose([tmp_path / "run.npz"], rig)
+    (item,) = proposal.logs
+    found = {match.channel: match.series.name for match in item.matches}
+    assert found["muscle_pressure.flexor"] == "p_flexor"
+    assert found["muscle_pressure.extensor"] == "p_extensor"
+    assert found["joint_angle.elbow"] == "hinge_angle"
+    assert (item.split, item.parts) == ({"gap": 8.0}, 3)
+    assert any("not found in this log: valve_command.flexor" in text for text in item.remarks)
+    rig.to_toml(tmp_path / "rig.toml")
+    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
+    case = load_case(tmp_path)
+    assert ([r.name for r in case.fit], [r.name for r in case.held_out]) == (
+        ["run_1", "run_2"],
+        ["run_3"],
+    )
+
+
+def test_several_logs_hold_out_the_last(tmp_path: Path) -> None:
+    files = []
+    for index in range(2):
+        home = tmp_path / str(index)
+        home.mkdir()
+        files.append(written(home, "tdms", signals(index))[0])
+    text = propose(files, pamrs.rigs.shoulder()).case_toml(tmp_path)
+    assert text.count("[[recording]]") == 2
+    assert text.index('role = "fit"') < text.index('role = "held_out"')
+    assert 'file = "1/run.tdms"' in text
+
+
+def test_events_are_held_and_clocks_in_milliseconds_are_seen(tmp_path: Path) -> None:
+    changes = np.array([0.0, 3.0, 4.0, 11.0, 19.0])
+    np.savez(
+        tmp_path / "run.npz",
+        **{
+            "daq time": TIME * 1e3, "muscle pressure (kPa)": 300.0 * LIFT,
+            "time valve [s]": changes, "valve [V]": np.array([5.0, 6.0, 4.0, 5.5, 5.0]),
+        },
+    )  # fmt: skip
+    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    matches = {match.channel: match for match in item.matches}
+    assert matches["valve_command"].hold
+    assert matches["valve_command"].time["column"] == "time valve"
+    assert matches["muscle_pressure"].time == {"column": "daq time", "unit": "ms"}
+    assert not matches["muscle_pressure"].hold
+
+
+def test_a_sensor_in_volts_is_told(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", t=TIME, **{"muscle_pressure_raw [V]": LIFT, "angle [deg]": LIFT})
+    (item,) = propose([tmp_path / "run.npz"]).logs
+    assert any("is in V: give from and to" in text for text in item.remarks)
+    assert [match.channel for match in item.matches] == ["joint_angle"]
+
+
+def test_without_clock_or_channel(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", p1=LIFT, q=LIFT)
+    (item,) = propose([tmp_path / "run.npz"]).logs
+    assert any("p1 has no clock" in text for text in item.remarks)
+    text = propose([tmp_path / "run.npz"], sample_time=0.005).case_toml(tmp_path)
+    assert "sample_time = 0.005" in text
+    with pytest.raises(ParameterError, match="sample_time = 0"):
+        propose([tmp_path / "run.npz"], sample_time=0.0)
+    np.savez(tmp_path / "none.npz", zzz=LIFT)
+    with pytest.raises(RecordingError, match="no channel was recognised"):
+        propose([tmp_path / "none.npz"]).case_toml(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("heading", "name", "unit"),
+    [
+        ("p1 [bar]", "p1", "bar"),
+        ("p1 (bar)", "p1", "bar"),
+        ("p1 / bar", "p1", "bar"),
+        ("p1 in bar", "p1", "bar"),
+        ("p1_kPa", "p1_kPa", "kPa"),
+        ("p1 (left)", "p1 (left)", ""),
+        ("axis/t", "axis/t", ""),
+        ("gain_m", "gain_m", ""),
+        ("time [zz]", "time", "zz"),
+    ],
+)
+def test_headings(heading: str, name: str, unit: str) -> None:
+    assert split_heading(heading) == (name, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "offset"),
+    [
+        ("bar", "bar", 0.0), ("PSI", "psi", 0.0), ("[V]", "V", 0.0), ("Seconds", "s", 0.0),
+        ("°C", "°C", 0.0), ("N.m", "N m", 0.0), ("KPA", "kPa", 0.0), ("bara", "bar", -1.01325),
+        ("psia", "psi", -14.695949), ("MPa", "MPa", 0.0), ("mm", "mm", 0.0),
+    ],
+)  # fmt: skip
+def test_units_as_logs_write_them(text: str, unit: str, offset: float) -> None:
+    known = understood_unit(text)
+    assert known is not None
+    assert known.unit == unit
+    assert known.offset == pytest.approx(offset, rel=1e-6)
+
+
+@pytest.mark.parametrize("text", ["", "-", "%", "1", "counts", "foo"])
+def test_what_is_no_unit(text: str) -> None:
+    assert understood_unit(text) is None
+
+
+# --------------------------------------------------------------------- suspicions
+
+BAR, PSI = 1e5, 6894.757
+SUPPLY = np.linspace(13.6, 12.9, len(TIME))
+VENTED = np.maximum(4.0 * LIFT - 0.4, 0.0)
+REST = np.maximum(LIFT, 0.1)
+SUSPECT: list[tuple[str, str, Any, str, str]] = [
+    ("supply_pressure", "bar", SUPPLY * 14.5 * BAR, "psi", "13.8 bar of the supply of the rig"),
+    ("supply_pressure", "psi", SUPPLY * PSI, "bar", "read as bar it reaches 13.6 bar"),
+    ("supply_pressure", "Pa", SUPPLY * 100.0, "kPa", ""),
+    ("muscle_pressure", "bar", VENTED * 14.5 * BAR, "psi", "read as psi it reaches 3.599 bar"),
+    ("muscle_pressure", "bar", (VENTED + 1.013) * BAR, "absolute", "the ambient pressure"),
+    ("muscle_pressure", "bar", (VENTED - 1.013) * BAR, "gauge", "a vacuum"),
+    ("temperature", "K", 21.0 + LIFT, "degC", "said to be in K"),
+    ("temperature", "degC", 294.0 + LIFT + 273.15, "K", "read as K"),
+    ("joint_angle", "rad", 20.0 + 60.0 * LIFT, "deg", "goes from 20 to 80 deg"),
+    ("joint_angle", "deg", np.radians(0.35 + 1.0 * LIFT), "rad", "the rig file allows 15 to 120"),
+]
+
+
+@pytest.mark.parametrize(("channel", "said", "values", "likely", "words"), SUSPECT)
+def test_units_that_physics_contradicts(
+    channel: str, said: str, values: Any, likely: str, words: str
+) -> None:
+    channels = {"supply_pressure": SUPPLY * BAR, channel: values}
+    units = {"supply_pressure": "bar", channel: said}
+    (found,) = suspicions(channels, units, pamrs.rigs.shoulder())
+    assert (found.channel, found.likely) == (channel, likely)
+    assert words in found.text
+
+
+@pytest.mark.parametrize(("said", "factor", "likely"), [("m", 1e3, "mm"), ("mm", 1e-3, "m")])
+def test_lengths(said: str, factor: float, likely: str) -> None:
+    rig = pamrs.rigs.hanging_mass()
+    table = rig.tables("load")[""]
+    low, high = table["min_length"], table["max_length"]
+    length = low + (high - low) * (0.2 + 0.6 * LIFT)
+    assert suspicions({"length": length}, {"length": said}, rig) == []
+    (found,) = suspicions({"length": length * factor}, {"length": said}, rig)
+    assert found.likely == likely
+
+
+def test_sound_recordings_are_not_suspected() -> None:
+    rig = pamrs.rigs.shoulder()
+    channels = {
+        "supply_pressure": SUPPLY * BAR,
+        "muscle_pressure": VENTED * BAR,
+        "joint_angle": np.radians(20.0 + 60.0 * LIFT),
+        "temperature": 293.0 + LIFT,
+        "valve_command": 5.0 + LIFT,
+    }
+    units = {
+        "supply_pressure": "bar", "muscle_pressure": "bar", "joint_angle": "deg",
+        "temperature": "K", "valve_command": "V",
+    }  # fmt: skip
+    assert suspicions(channels, units, rig) == []
+    assert suspicions(channels, units) == []
+    empty = {name: np.full(50, np.nan) for name in channels}
+    assert suspicions(empty, units, rig) == []
+    held = {"muscle_pressure": np.maximum(3.0 * LIFT, 1.3) * BAR + np.linspace(0, 3e4, len(TIME))}
+    assert suspicions(held, {"muscle_pressure": "bar"}, rig) == []
+
+
+def test_suspicions_stand_in_the_case(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", t=TIME, **{"p_muscle [bar]": VENTED * 14.5})
+    proposal = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder())
+    assert "read as psi" in proposal.case_toml(tmp_path)

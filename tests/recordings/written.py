@@ -1,0 +1,291 @@
+"""One simulated log, written by the libraries of every format: what the tests read back."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+N, DT = 400, 0.01
+UNITS = {"u": "V", "p1": "bar", "angle": "deg"}
+#: What goes into a case.toml for this log, whatever its format.
+CHANNELS = {"valve_command": "u", "muscle_pressure": "p1", "joint_angle": "angle"}
+
+
+def signals(seed: int = 5) -> dict[str, Array]:
+    """Time [s], valve command [V], pressure [bar] and angle [deg] of a slow lift with noise."""
+    rng = np.random.default_rng(seed)
+    time = np.round(np.arange(N) * DT, 6)
+    lift = np.sin(np.pi * time / time[-1]) ** 2
+    return {
+        "t": time,
+        "u": np.round(5.0 + 2.0 * np.sin(2.0 * time), 6),
+        "p1": np.round(3.0 * lift + rng.normal(0.0, 0.004, N), 6),
+        "angle": np.round(20.0 + 60.0 * lift + rng.normal(0.0, 0.02, N), 6),
+    }
+
+
+def csv_text(data: dict[str, Array], mark: str, decimal: str, head: list[str]) -> str:
+    rows = [
+        mark.join(f"{value:.6f}".replace(".", decimal) for value in row)
+        for row in zip(*data.values(), strict=True)
+    ]
+    return "\r\n".join([*head, *rows]) + "\r\n"
+
+
+def write_excel(path: Path, data: dict[str, Array]) -> None:
+    """German Excel: semicolons, decimal commas, a mark of byte order."""
+    head = ["Zeit [s];u [V];p1 [bar];angle [°]"]
+    path.write_bytes(csv_text(data, ";", ",", head).encode("utf-8-sig"))
+
+
+def write_utf16(path: Path, data: dict[str, Array]) -> None:
+    path.write_bytes(
+        csv_text(data, "\t", ".", ["t (s)\tu (V)\tp1 (bar)\tangle (deg)"]).encode("utf-16")
+    )
+
+
+def write_gz(path: Path, data: dict[str, Array]) -> None:
+    text = csv_text(data, ",", ".", ["# stand 3", "", "t,u,p1,angle", "s,V,bar,deg"])
+    path.write_bytes(gzip.compress(text.encode()))
+
+
+def write_labview(path: Path, data: dict[str, Array]) -> None:
+    head = [
+        "LabVIEW Measurement\t",
+        "Writer_Version\t2",
+        "Separator\tTab",
+        "Date\t2024/05/12",
+        "***End_of_Header***\t",
+        "",
+        "t\tu\tp1\tangle\t",
+        "s\tV\tbar\t°\t",
+    ]
+    path.write_bytes(csv_text(data, "\t", ",", head).encode("cp1252"))
+
+
+def write_parquet(path: Path, data: dict[str, Array]) -> None:
+    import pandas as pd
+
+    pd.DataFrame(data).to_parquet(path)
+
+
+def write_feather(path: Path, data: dict[str, Array]) -> None:
+    import pandas as pd
+
+    pd.DataFrame(data).to_feather(path)
+
+
+def write_npz(path: Path, data: dict[str, Array]) -> None:
+    np.savez(path, **data)
+
+
+def write_npy(path: Path, data: dict[str, Array]) -> None:
+    np.save(path, np.rec.fromarrays(list(data.values()), names=",".join(data)))
+
+
+def write_mat(path: Path, data: dict[str, Array]) -> None:
+    import scipy.io
+
+    scipy.io.savemat(path, {"rig": data, "note": "12 May"})
+
+
+def write_with_time(path: Path, data: dict[str, Array]) -> None:
+    """A scope of Simulink that logs a structure with time."""
+    import scipy.io
+
+    listed = [{"values": data[name], "label": name, "dimensions": 1.0} for name in UNITS]
+    scipy.io.savemat(
+        path, {"scope": {"time": data["t"], "signals": listed, "blockName": "m/Scope"}}
+    )
+
+
+def write_controldesk(path: Path, data: dict[str, Array]) -> None:
+    """A capture of dSPACE ControlDesk: clocks in X, measurements in Y."""
+    import scipy.io
+
+    record = np.zeros((1, 1), dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O")])
+    record[0, 0] = ("HostService", data["t"][None, :], "s")
+    y = np.zeros((1, 3), dtype=[("Name", "O"), ("Data", "O"), ("Unit", "O"), ("XIndex", "O")])
+    for index, (name, unit) in enumerate(UNITS.items()):
+        y[0, index] = (f"Model Root/{name}", data[name][None, :], unit, 1.0)
+    scipy.io.savemat(path, {"capture_001": {"X": record, "Y": y, "Capture": {"Length": 4.0}}})
+
+
+def write_timeseries(path: Path, data: dict[str, Array], version: str = "v7.3") -> None:
+    """Objects ``timeseries`` in the subsystem of the file, as MATLAB lays them out: even times are
+    not stored but for their start, increment and length.
+    """
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        from matio import save_to_mat
+        from matio.utils.matclass import MatlabOpaque
+
+    def column(values: Any) -> Array:
+        return np.asarray(values, dtype=np.float64).reshape(-1, 1)
+
+    def timeseries(name: str, even: bool) -> MatlabOpaque:
+        about = {"Units": np.array(["seconds"]), "Start_": column(0.0), "Length": column(N)}
+        about["Increment_"] = column(DT if even else np.nan)
+        parts = {
+            "Name": np.array([name]),
+            "Data_": column(data[name]),
+            "Time_": np.empty((0, 0)) if even else column(data["t"]),
+            "TimeInfo": MatlabOpaque(about, "tsdata.timemetadata", "MCOS"),
+            "DataInfo": MatlabOpaque(
+                {"Units": np.array([UNITS[name]])}, "tsdata.datametadata", "MCOS"
+            ),
+        }
+        return MatlabOpaque(parts, "timeseries", "MCOS")
+
+    made = {name: timeseries(name, name == "u") for name in UNITS}
+    save_to_mat(str(path), made, version=version)
+
+
+def write_mat73(path: Path, data: dict[str, Array]) -> None:
+    """Arrays and a struct of version 7.3: HDF5 with MATLAB's head of 512 bytes, axes reversed."""
+    import h5py
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        group = file.create_group("rig")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in data.items():
+            item = group.create_dataset(name, data=values[None, :])
+            item.attrs["MATLAB_class"] = np.bytes_("double")
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def write_hdf5(path: Path, data: dict[str, Array]) -> None:
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        group = file.create_group("daq")
+        for name, values in data.items():
+            group[name] = values
+            group[name].attrs["units"] = UNITS.get(name, "s")
+
+
+def write_mf4(path: Path, data: dict[str, Array]) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF() as file:
+        file.append([Signal(data[name], data["t"], unit=UNITS[name], name=name) for name in UNITS])
+        file.save(path, overwrite=True)
+
+
+def write_tdms(path: Path, data: dict[str, Array]) -> None:
+    from nptdms import ChannelObject, TdmsWriter
+
+    with TdmsWriter(path) as writer:
+        writer.write_segment(
+            [
+                ChannelObject(
+                    "daq",
+                    name,
+                    data[name],
+                    properties={
+                        "wf_increment": DT,
+                        "wf_start_offset": 0.0,
+                        "wf_start_time": np.datetime64("2024-05-12T10:00:00"),
+                        "unit_string": unit,
+                    },
+                )
+                for name, unit in UNITS.items()
+            ]
+        )
+
+
+def write_bag(path: Path, data: dict[str, Array]) -> None:
+    """A bag of ROS 2 with one message of three numbers at each time."""
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    joint = store.types["sensor_msgs/msg/JointState"]
+    header = store.types["std_msgs/msg/Header"]
+    stamp = store.types["builtin_interfaces/msg/Time"]
+    empty = np.array([])
+    with Writer(path, version=9) as writer:
+        topic = writer.add_connection("/rig", joint.__msgtype__, typestore=store)
+        for row, seconds in enumerate(data["t"]):
+            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+            head = header(stamp(nanos // 10**9, nanos % 10**9), "")
+            values = np.array([data[name][row] for name in UNITS])
+            message = joint(head, list(UNITS), values, empty, empty)
+            writer.write(topic, nanos, store.serialize_cdr(message, joint.__msgtype__))
+
+
+def write_mcap(path: Path, data: dict[str, Array]) -> None:
+    from mcap_ros2.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        schema = writer.register_msgdef("rig/msg/State", "\n".join(f"float64 {n}" for n in UNITS))
+        for row, seconds in enumerate(data["t"]):
+            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+            message = {name: float(data[name][row]) for name in UNITS}
+            writer.write_message("/rig", schema, message, log_time=nanos, publish_time=nanos)
+        writer.finish()
+
+
+def write_json_mcap(path: Path, data: dict[str, Array]) -> None:
+    from mcap.writer import Writer
+
+    with path.open("wb") as stream:
+        writer = Writer(stream)
+        writer.start()
+        schema = writer.register_schema("State", "jsonschema", b"{}")
+        channel = writer.register_channel("/rig", "json", schema)
+        for row, seconds in enumerate(data["t"]):
+            body = json.dumps({name: float(data[name][row]) for name in UNITS}).encode()
+            nanos = round(seconds * 1e9)
+            writer.add_message(channel, nanos, body, nanos)
+        writer.finish()
+
+
+#: Name of the file, who writes it, where its channels are, its times.
+FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any]] = {
+    "excel": ("run.csv", write_excel, "{}", "Zeit"),
+    "utf16": ("run.txt", write_utf16, "{}", "t"),
+    "gz": ("run.csv.gz", write_gz, "{}", "t"),
+    "labview": ("run.lvm", write_labview, "{}", "t"),
+    "parquet": ("run.parquet", write_parquet, "{}", "t"),
+    "feather": ("run.feather", write_feather, "{}", "t"),
+    "npz": ("run.npz", write_npz, "{}", "t"),
+    "npy": ("run.npy", write_npy, "{}", "t"),
+    "mat": ("run.mat", write_mat, "rig/{}", "rig/t"),
+    "structure with time": ("run.mat", write_with_time, "scope/{}", None),
+    "ControlDesk": ("run.mat", write_controldesk, "{}", None),
+    "timeseries": ("run.mat", write_timeseries, "{}", None),
+    "timeseries 7": ("run.mat", lambda p, d: write_timeseries(p, d, "v7"), "{}", None),
+    "mat 7.3": ("run.mat", write_mat73, "rig/{}", "t"),
+    "hdf5": ("run.h5", write_hdf5, "daq/{}", "daq/t"),
+    "mf4": ("run.mf4", write_mf4, "{}", None),
+    "tdms": ("run.tdms", write_tdms, "daq/{}", None),
+    "bag": ("run_bag", write_bag, "/rig/position[{}]", None),
+    "mcap": ("run.mcap", write_mcap, "/rig/{}", None),
+    "json mcap": ("run.mcap", write_json_mcap, "/rig/{}", None),
+}
+
+
+def mapping(pattern: str) -> dict[str, dict[str, Any]]:
+    """The table ``channels`` of this log."""
+    return {
+        channel: {"column": pattern.format(name), "unit": UNITS[name]}
+        for channel, name in CHANNELS.items()
+    }
+
+
+def written(folder: Path, kind: str, data: dict[str, Array] | None = None) -> tuple[Path, str, Any]:
+    """The log in one format: file, where its channels are, its times."""
+    name, write, pattern, time = FORMATS[kind]
+    write(folder / name, signals() if data is None else data)
+    return folder / name, pattern, time
