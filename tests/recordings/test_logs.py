@@ -231,8 +231,8 @@ def test_signals_that_simulink_logs_in_a_dataset(tmp_path: Path) -> None:
     dataset = MatlabOpaque({"Elements": elements}, "Simulink.SimulationData.Dataset", "MCOS")
     save_to_mat(str(tmp_path / "run.mat"), {"logsout": dataset})
     log = read_log(tmp_path / "run.mat")
-    found = {name: series for name, series in log.series.items() if "p1" in name}
-    (series,) = found.values()
+    assert list(log.series) == ["logsout/p1", "logsout/angle"]
+    series = log.find("p1")
     np.testing.assert_allclose(series.values, time.ravel())
     assert series.time is not None
 

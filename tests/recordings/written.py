@@ -120,7 +120,9 @@ def write_controldesk(path: Path, data: dict[str, Array]) -> None:
 
 
 def write_timeseries(path: Path, data: dict[str, Array], version: str = "v7.3") -> None:
-    """Objects ``timeseries`` in the subsystem of the file, as MATLAB lays them out."""
+    """Objects ``timeseries`` in the subsystem of the file, as MATLAB lays them out: even times are
+    not stored but for their start, increment and length.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", DeprecationWarning)
         from matio import save_to_mat
@@ -130,8 +132,8 @@ def write_timeseries(path: Path, data: dict[str, Array], version: str = "v7.3") 
         return np.asarray(values, dtype=np.float64).reshape(-1, 1)
 
     def timeseries(name: str, even: bool) -> MatlabOpaque:
-        about = {"Units": np.array(["seconds"]), "Start": column(0.0), "Length": column(N)}
-        about["Increment"] = column(DT if even else np.nan)
+        about = {"Units": np.array(["seconds"]), "Start_": column(0.0), "Length": column(N)}
+        about["Increment_"] = column(DT if even else np.nan)
         parts = {
             "Name": np.array([name]),
             "Data_": column(data[name]),

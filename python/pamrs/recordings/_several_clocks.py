@@ -189,8 +189,8 @@ def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[floa
     if count > most:
         raise RecordingError(
             f"{source}: {stop - start:.6g} s in steps of {step:.6g} s are {count} samples, more "
-            f"than {_FINEST:g} times what was recorded; long pauses part recordings with split = {{ gap "
-            "= ... }, and sample_time says another step"
+            f"than {_FINEST:g} times what was recorded; long pauses part recordings with split = "
+            "{ gap = ... }, and sample_time says another step"
         )
     return start, np.arange(count, dtype=np.float64) * step
 

@@ -62,6 +62,7 @@ class _Reader:
         if fields is not None and depth < _DEEPEST:
             if not (
                 self._timeseries(name, fields)
+                or self._of_simulink(name, fields, depth)
                 or self._with_time(name, fields)
                 or self._controldesk(name, fields)
             ):
@@ -91,16 +92,29 @@ class _Reader:
         """A ``timeseries`` object, or a struct with its properties."""
         data = fields.get("data")
         values = numbers_of(data) if isinstance(data, np.ndarray) else None
-        about = _fields(fields.get("timeinfo")) or {}
+        about = _fields(fields.get("timeinfo")) or _Fields()
         time = _times(fields.get("time"), about)
         if values is None or time is None or not len(time):
             return False
-        unit = _text((_fields(fields.get("datainfo")) or {}).get("units")) or _text(
+        unit = _text((_fields(fields.get("datainfo")) or _Fields()).get("units")) or _text(
             fields.get("units")
         )
         inside = _text(fields.get("name"))
         self._columns(name, inside, np.asarray(data), _seconds(time, about), unit)
         return True
+
+    def _of_simulink(self, name: str, fields: Mapping[str, Any], depth: int) -> bool:
+        """A data set of Simulink (``logsout``), or a signal of one: only what was logged."""
+        if not getattr(fields, "kind", "").startswith("Simulink."):
+            return False
+        for part in ("elements", "values"):
+            inside = fields.get(part)
+            if inside is not None and not (
+                isinstance(inside, np.ndarray) and inside.dtype != object
+            ):
+                self.take(name, inside, depth + 1)
+                return True
+        return False
 
     def _with_time(self, name: str, fields: Mapping[str, Any]) -> bool:
         """Simulink's "Structure With Time": ``time`` and ``signals``."""
@@ -139,7 +153,8 @@ class _Reader:
         """One series for each column of data whose samples run along one of its axes."""
         array = np.squeeze(np.asarray(data))
         count = len(time) if time is not None else array.size
-        label = f"{name}/{inside}" if inside and inside not in (name, "unnamed") else name
+        own = (name.rpartition("/")[2], "unnamed")
+        label = f"{name}/{inside}" if inside and inside not in own else name
         if array.ndim == 0 or count not in array.shape:
             self.unread[label] = f"{array.size} values for {count} times"
             return
@@ -162,10 +177,8 @@ def _record(item: Any) -> dict[str, Any]:
     return {part: item[part] for part in item.dtype.names}
 
 
-def _fields(value: Any) -> dict[str, Any] | None:
-    """Fields of a struct or properties of an object, their names in small letters without a last
-    ``_``; those of a plain struct keep their letters as a second entry.
-    """
+def _fields(value: Any) -> _Fields | None:
+    """Fields of a struct or properties of an object; None for all else."""
     value = _bare(value)
     given = getattr(value, "properties", None)
     if given is None and isinstance(value, np.void) and value.dtype.names:
@@ -176,11 +189,15 @@ def _fields(value: Any) -> dict[str, Any] | None:
         given = value
     if not isinstance(given, Mapping):
         return None
-    return _Fields({str(part): _bare(inside) for part, inside in given.items()})
+    made = _Fields({str(part): _bare(inside) for part, inside in given.items()})
+    made.kind = str(getattr(value, "classname", ""))
+    return made
 
 
 class _Fields(dict[str, Any]):
-    """Looked up without regard to capitals and a last ``_``."""
+    """Looked up without regard to capitals and a last ``_``; `kind` is the class of an object."""
+
+    kind: str = ""
 
     def _key(self, key: object) -> str | None:
         wanted = str(key).lower()
