@@ -92,11 +92,11 @@ class _Reader:
         """A ``timeseries`` object, or a struct with its properties."""
         data = fields.get("data")
         values = numbers_of(data) if isinstance(data, np.ndarray) else None
-        about = _fields(fields.get("timeinfo")) or {}
+        about = _fields(fields.get("timeinfo")) or _Fields()
         time = _times(fields.get("time"), about)
         if values is None or time is None or not len(time):
             return False
-        unit = _text((_fields(fields.get("datainfo")) or {}).get("units")) or _text(
+        unit = _text((_fields(fields.get("datainfo")) or _Fields()).get("units")) or _text(
             fields.get("units")
         )
         inside = _text(fields.get("name"))
