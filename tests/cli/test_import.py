@@ -29,7 +29,8 @@ def test_a_log_becomes_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert "400      100 Hz  bar" in out
     assert "not found in this log: supply_pressure" in out
     assert "case.toml" in err
-    found = load_case(tmp_path / "case")
+    assert f"pamrs diagnose {tmp_path / 'case'} --allow-outside" in out + err
+    found = load_case(tmp_path / "case", allow_outside=True)
     assert found.channels == ("valve_command", "muscle_pressure", "joint_angle")
     assert (found.rig.name, file.read_bytes()) == ("shoulder", before)
     code, _, err = run(capsys, file, "--out", tmp_path / "case")
@@ -43,7 +44,8 @@ def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert code == 0
     text = (tmp_path / "a" / "b" / "case.toml").read_text(encoding="utf-8")
     assert 'rig = "../../mine.toml"' in text
-    assert load_case(tmp_path / "a" / "b").recordings[0].name == "run_bag"
+    found = load_case(tmp_path / "a" / "b", allow_outside=True)
+    assert found.recordings[0].name == "run_bag"
 
 
 def test_without_a_folder_it_is_printed(

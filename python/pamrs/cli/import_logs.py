@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs._files import is_inside
 from pamrs.cli._shared import as_given, exact, progress, rig_named, write
 
 if TYPE_CHECKING:
@@ -88,7 +89,10 @@ def import_command(
             contents[beside] = rigs.template(str(rig), str(rig))
     contents[file] = text
     write(contents)
-    typer.echo(f"look at {file}, then: pamrs diagnose {file.parent}")
+    used = [*log, *([rig] if rig is not None and rig.exists() else [])]
+    outside = any(not is_inside(file.parent, path) for path in used)
+    allowed = " --allow-outside" if outside else ""
+    typer.echo(f"look at {file}, then: pamrs diagnose {file.parent}{allowed}")
 
 
 def _show(item: LogProposal) -> None:
