@@ -276,3 +276,22 @@ def test_any_bytes_are_a_log_or_an_error_that_names_the_file(
     except RecordingError as error:
         told = str(error)
     assert f"any.{ending}" in told
+
+
+def test_tables_and_timetables_of_matlab(tmp_path: Path) -> None:
+    import warnings
+
+    import pandas as pd
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        from matio import save_to_mat
+    frame = pd.DataFrame({"p1": np.arange(30.0), "angle": np.arange(30.0)[::-1]})
+    steps = np.arange(30).astype("timedelta64[s]")
+    timed = frame.set_index(pd.TimedeltaIndex(steps))
+    save_to_mat(str(tmp_path / "run.mat"), {"lift": frame, "timed": timed})
+    log = read_log(tmp_path / "run.mat")
+    np.testing.assert_array_equal(log.find("lift/p1").values, np.arange(30.0))
+    time = log.find("timed/p1").time
+    assert time is not None
+    np.testing.assert_allclose(time, np.arange(30))

@@ -82,6 +82,23 @@ def test_channels_with_clocks_of_their_own(tmp_path: Path) -> None:
     assert fine.valid("muscle_pressure").mean() > 0.99
 
 
+@pytest.mark.parametrize("aside", [0.0, 0.0007, 0.0025, 0.004])
+@pytest.mark.parametrize("rate", [200.0, 1000.0, 333.0])
+def test_averages_delay_nothing(tmp_path: Path, aside: float, rate: float) -> None:
+    fast, slow = np.arange(2000) / rate, np.arange(400) * 0.01 + aside
+    file = npz(tmp_path, t=fast, p1=1.0 + fast, ta=slow, angle=np.sin(slow))
+    channels = {
+        "muscle_pressure": {"column": "p1", "unit": "bar", "time": "t"},
+        "joint_angle": {"column": "angle", "unit": "deg", "time": "ta"},
+    }
+    (got,) = load_recordings(file, channels=channels)
+    assert got.sample_time == 0.01
+    assert got.valid().all()
+    late = 1.0 + got.time + aside - got.channels["muscle_pressure"] / 1e5
+    assert np.abs(late).max() < 3e-4  # s, for one bar is one second here
+    assert abs(late.mean()) < 3e-5
+
+
 def test_gaps_of_one_clock_are_masked(tmp_path: Path) -> None:
     data = signals()
     keep = (data["t"] < 1.0) | (data["t"] > 1.5)

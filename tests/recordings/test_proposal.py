@@ -103,6 +103,20 @@ def test_events_are_held_and_clocks_in_milliseconds_are_seen(tmp_path: Path) -> 
     assert matches["valve_command"].time["column"] == "time valve"
     assert matches["muscle_pressure"].time == {"column": "daq time", "unit": "ms"}
     assert not matches["muscle_pressure"].hold
+    assert not any("sampled at" in text for text in item.remarks)
+
+
+def test_different_rates_are_told(tmp_path: Path) -> None:
+    slow = np.arange(1000) * 0.02
+    np.savez(
+        tmp_path / "run.npz",
+        **{"t p1": TIME, "p1 [bar]": LIFT, "t angle": slow, "angle [deg]": 20.0 + slow},
+    )
+    (item,) = propose([tmp_path / "run.npz"]).logs
+    assert "sampled at 50 to 200 Hz: all are laid on the 50 Hz of joint_angle" in item.remarks[0]
+    (tmp_path / "case.toml").write_text(propose([tmp_path / "run.npz"]).case_toml(tmp_path))
+    pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
+    assert load_case(tmp_path).recordings[0].sample_time == 0.02
 
 
 def test_a_sensor_in_volts_is_told(tmp_path: Path) -> None:

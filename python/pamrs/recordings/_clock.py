@@ -67,7 +67,7 @@ class Grid:
         self._left, self._right = right - 1, right
         span = stamps[self._right] - stamps[self._left]
         share = (self.time - stamps[self._left]) / span
-        near = _ON_SAMPLE * step
+        near = _ON_SAMPLE * min(step, usual)
         share = np.where(np.abs(self.time - stamps[self._left]) <= near, 0.0, share)
         self._share = np.where(np.abs(stamps[self._right] - self.time) <= near, 1.0, share)
         single = (self._share == 0.0) | (self._share == 1.0)

@@ -12,9 +12,11 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs._checks import positive
+from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
 from pamrs.recordings._matching import Match, channels_of, matched, words_of
+from pamrs.recordings._several_clocks import SLOW
 from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.rig import Rig
@@ -263,6 +265,7 @@ def _proposal(
                 f"{match.series.name} has few samples at uneven times: taken as logged on change "
                 "(hold)"
             )
+    remarks += _rates({m.channel: times[m.channel] for m in matches if not m.hold})
     remarks += _suspect(matches, rig)
     missing = [name for name in wanted if name not in times] if rig is not None else []
     if missing:
@@ -337,6 +340,22 @@ def _held(times: dict[str, Array]) -> set[str]:
         if 5 * len(time) < most and uneven:
             found.add(name)
     return found
+
+
+def _rates(times: dict[str, Array | None]) -> list[str]:
+    """What becomes of channels that were sampled at different rates."""
+    rates: dict[str, float] = {}
+    for name, time in times.items():
+        steps = np.diff(time) if time is not None else np.empty(0)
+        if np.any(steps > 0.0) and channel_of(name) not in SLOW:
+            rates[name] = 1.0 / usual_interval(steps[steps > 0.0], len(steps) + 1)
+    if not rates or max(rates.values()) < 1.01 * min(rates.values()):
+        return []
+    slowest = min(rates, key=lambda name: rates[name])
+    return [
+        f"sampled at {rates[slowest]:.4g} to {max(rates.values()):.4g} Hz: all are laid on the "
+        f"{rates[slowest]:.4g} Hz of {slowest} (sample_time in case.toml chooses another grid)"
+    ]
 
 
 def _suspect(matches: Sequence[Match], rig: Rig | None) -> list[str]:

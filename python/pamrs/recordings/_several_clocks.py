@@ -15,9 +15,10 @@ from pamrs.recordings._clock import Array, Event, Grid, Mask, gaps, usual_interv
 from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, judged
 
-__all__ = ["Sampled", "on_one_clock"]
+__all__ = ["SLOW", "Sampled", "on_one_clock"]
 
-_SLOW: Final = frozenset({"temperature"})  # does not say how fine the grid is
+_UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
+SLOW: Final = frozenset({"temperature"})  # does not say how fine the grid is
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most
 _CUT: Final = 2.0  # samples at the ends whose loss is not worth a word
 
@@ -48,20 +49,28 @@ class Sampled:
 
 
 class _Averaged(Grid):
-    """A grid that is coarser than the samples: the mean of those around each of its times."""
+    """A grid that is coarser than the samples: means with weights that fall to zero one step of
+    the grid away, which delay nothing and keep a straight line as it is.
+    """
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
-        """Means on the grid; NaN, and False in the mask, where nothing usable is near."""
-        half = 0.5 * self.sample_time
-        first = np.searchsorted(self._stamps, self.time - half, side="left")
-        last = np.searchsorted(self._stamps, self.time + half, side="left")
-        total = np.concatenate([[0.0], np.cumsum(np.where(usable, values, 0.0))])
-        count = np.concatenate([[0], np.cumsum(usable)])
-        number = count[last] - count[first]
-        mask: Mask = (number > 0) & (2 * number >= last - first)
-        laid = np.full(len(self.time), np.nan)
-        laid[mask] = (total[last] - total[first])[mask] / number[mask]
-        return laid, mask
+        """Means on the grid; where too little is on one side, what is recorded there."""
+        step = self.sample_time
+        first = np.searchsorted(self._stamps, self.time - step, side="left")
+        last = np.searchsorted(self._stamps, self.time + step, side="right")
+        weight, moment, total = (np.zeros(len(self.time)) for _ in range(3))
+        for offset in range(int(np.max(last - first, initial=0))):
+            place = np.minimum(first + offset, len(values) - 1)
+            away = self._stamps[place] - self.time
+            share = np.maximum(1.0 - np.abs(away) / step, 0.0)
+            share *= usable[place] & (first + offset < last)
+            weight += share
+            moment += share * away
+            total += share * np.where(usable[place], values[place], 0.0)
+        laid, mask = super().lay(values, usable)
+        even = (weight > 0.0) & (np.abs(moment) <= _UNEVEN * step * weight)
+        laid[even] = total[even] / weight[even]
+        return laid, mask | even
 
 
 class _Held(Grid):
@@ -125,7 +134,7 @@ def on_one_clock(
     for channel in stepped:
         intervals = np.diff(channel.time[rows[channel.name]])
         usual[channel.name] = usual_interval(intervals, len(channel.time))
-    telling = [each for each in stepped if channel_of(each.name) not in _SLOW] or stepped
+    telling = [each for each in stepped if channel_of(each.name) not in SLOW] or stepped
     step = sample_time or max(usual[channel.name] for channel in telling)
     start, time = _common(telling, step, source)
     issues: list[Issue] = []
