@@ -7,6 +7,7 @@ import os
 import tomllib
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import pamrs
@@ -14,6 +15,7 @@ from pamrs import _files
 from pamrs._files import parse_toml, read_file
 from pamrs.errors import CaseError, RecordingError, RigError
 from pamrs.recordings import load_case, load_recording, table
+from pamrs.recordings.logs import read_log
 
 HEADER = "time [s],force [N]\n"
 
@@ -26,6 +28,25 @@ def test_devices_and_pipes_are_refused_at_once(tmp_path: Path, ending: str) -> N
     for path in (device, pipe):
         with pytest.raises(RecordingError, match=rf"{path.name}: .* (regular file|pyarrow)"):
             load_recording(path)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".txt.gz", ".npz", ".mat", ".mf4"])
+def test_logs_are_regular_files_too(tmp_path: Path, ending: str) -> None:
+    device, pipe = tmp_path / f"zero{ending}", tmp_path / f"pipe{ending}"
+    device.symlink_to("/dev/zero")
+    os.mkfifo(pipe)
+    for path in (device, pipe):
+        with pytest.raises(RecordingError, match=rf"{path.name}: .* regular file"):
+            read_log(path)
+
+
+def test_logs_have_the_limits_of_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "long.npz"
+    np.savez(file, time=np.arange(300.0), force=np.zeros(300))
+    assert len(read_log(file).series) == 2
+    monkeypatch.setattr(table, "MOST_CELLS", 500)
+    with pytest.raises(RecordingError, match=r"long.npz: about 600 cells; at most 500 are read"):
+        read_log(file)
 
 
 def test_rigs_and_cases_are_regular_files_too(tmp_path: Path) -> None:
