@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
 
-__all__ = ["Event", "Grid", "gaps", "lay_grid", "usual_interval"]
+__all__ = ["GAP", "Event", "Grid", "gaps", "lay_grid", "usual_interval"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_GAP: Final = 1.6  # intervals longer than this many samples are holes
+GAP: Final = 1.6  # intervals longer than this many samples are holes
 _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pause is unknown
 _ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stands as it is
 _MOST_EVENTS: Final = 20
@@ -72,7 +72,7 @@ class Grid:
         self._share = np.where(np.abs(stamps[self._right] - self.time) <= near, 1.0, share)
         single = (self._share == 0.0) | (self._share == 1.0)
         self._reachable = single | (
-            (span <= _GAP * usual) & (self._share > 0.0) & (self._share < 1.0)
+            (span <= GAP * usual) & (self._share > 0.0) & (self._share < 1.0)
         )
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
@@ -145,7 +145,7 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
     rows = np.flatnonzero(np.concatenate([[True], intervals != 0.0]))
     kept = stamps[rows]
     intervals = np.diff(kept)
-    recorded = float(np.sum(intervals[(intervals > 0.0) & (intervals < _GAP * usual)]))
+    recorded = float(np.sum(intervals[(intervals > 0.0) & (intervals < GAP * usual)]))
     jumps = (intervals < 0.0) | (intervals > max(recorded, 1000.0 * usual))
     elapsed = np.where(jumps, (_JUMP_HOLE + 1) * usual, intervals)
     placed = np.concatenate([[0.0], np.cumsum(elapsed)])
@@ -189,7 +189,7 @@ def usual_interval(forward: Array, count: int) -> float:
         Seconds.
     """
     usual = float(np.median(forward))
-    return _plain(float(np.mean(forward[forward < _GAP * usual])), count)
+    return _plain(float(np.mean(forward[forward < GAP * usual])), count)
 
 
 def _plain(interval: float, count: int) -> float:
@@ -227,7 +227,7 @@ def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event
     -------
     list of Event
     """
-    holes = np.flatnonzero(~jumps & (elapsed > _GAP * usual))
+    holes = np.flatnonzero(~jumps & (elapsed > GAP * usual))
     missing = np.maximum(np.rint(elapsed[holes] / usual).astype(int) - 1, 1)
     if len(holes) > _MOST_EVENTS:
         total = int(missing.sum())

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
-from pamrs.recordings._clock import Array, Event, Grid, Mask, gaps, usual_interval
+from pamrs.recordings._clock import GAP, Array, Event, Grid, Mask, gaps, usual_interval
 from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, judged
 
@@ -100,6 +100,42 @@ class _Held(Grid):
         return laid, mask
 
 
+class _Commanded(_Held):
+    """Commands, which hold from one sample to the next: their mean over each step of the grid that
+    follows, so that what they did in all stays the same.
+    """
+
+    def __init__(
+        self,
+        stamps: Array,
+        rows: NDArray[np.intp],
+        step: float,
+        usual: float,
+        events: list[Event],
+        time: Array | None = None,
+    ) -> None:
+        super().__init__(stamps, rows, step, usual, events, time)
+        self._longest = GAP * usual
+
+    def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
+        """Means; NaN, and False in the mask, where the command was not recorded."""
+        _, mask = super().lay(values, usable)
+        near = 1e-6 * self.sample_time
+        lasting = np.diff(self._stamps)
+        lost = ~usable[:-1] | (lasting > self._longest)
+        safe = np.where(usable, values, 0.0)
+        total = np.concatenate([[0.0], np.cumsum(safe[:-1] * lasting)])
+        losses = np.concatenate([[0], np.cumsum(lost)])
+        edges = np.append(self.time, self.time[-1] + self.sample_time)
+        place = np.searchsorted(self._stamps, edges + near, side="right") - 1
+        place = np.clip(place, 0, len(values) - 1)
+        upto = total[place] + safe[place] * (edges - self._stamps[place])
+        mask = mask & (losses[np.minimum(place[1:], len(lasting))] == losses[place[:-1]])
+        same = place[1:] == place[:-1]
+        mean = np.where(same, safe[place[:-1]], np.diff(upto) / self.sample_time)
+        return np.where(mask, mean, np.nan), mask
+
+
 def on_one_clock(
     name: str, role: str, channels: Sequence[Sampled], source: str, sample_time: float | None
 ) -> Recording:
@@ -145,13 +181,15 @@ def on_one_clock(
         stamps = channel.time[own] - start
         interval = usual.get(channel.name, step)
         kind = Grid
-        if channel.hold:
+        if channel_of(channel.name) in COMMANDS and len(own) > 1:
+            kind = _Commanded
+        elif channel.hold:
             kind = _Held
-        elif 2.0 * interval <= step * 1.01 and channel_of(channel.name) not in COMMANDS:
+        elif 2.0 * interval <= step * 1.01:
             kind = _Averaged
         if not channel.hold:
             issues += _missing(channel.name, stamps, interval, time, step)
-        grid = kind(stamps, own, step, interval, [], time)
+        grid = kind(stamps, own, step, np.inf if channel.hold else interval, [], time)
         laid[channel.name], masks[channel.name] = judged(
             channel.name, channel.values[own], grid, source, issues, held=channel.hold
         )
