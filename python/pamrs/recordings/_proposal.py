@@ -142,7 +142,10 @@ class Proposal:
         """
         if not any(item.matches for item in self.logs):
             names = ", ".join(str(item.log.path) for item in self.logs)
-            raise RecordingError(f"{names}: no channel was recognised; write case.toml by hand")
+            raise RecordingError(
+                f"{names}: no channel was recognised; name the columns of a text without headings "
+                "(--columns, in Python TextFormat(columns=...)), or write case.toml by hand"
+            )
         lines = [
             "# Proposed by pamrs import from names, units and ranges: look at every line.",
             'schema = "pamrs.case/1"',

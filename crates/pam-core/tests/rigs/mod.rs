@@ -248,6 +248,12 @@ pub const FORMS: &[Typical] = &[
         &[("half_width", 0.0)],
     ),
     formed(
+        "tube_flow_restriction",
+        "pipe",
+        &[("conductance", 3e-9), ("tap", 0.25), ("laminar_pressure", 3e4)],
+        &[("conductance", 1.0)],
+    ),
+    formed(
         "valve_centre_leakage",
         "hyperbolic",
         &[("conductance", 1e-9), ("opening", 0.05)],
