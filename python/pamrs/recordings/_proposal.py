@@ -282,7 +282,8 @@ def _proposal(
 def _like_a_clock(series: Series) -> bool:
     """Whether a series is called like a time, and rises."""
     words = words_of(series.name)
-    if series.labels or not words or (words[-1] not in _TIMES and words[0] not in _TIMES):
+    called = bool(words) and (words[-1] in _TIMES or words[0] in _TIMES)
+    if series.labels or not (called or words == ["x", "value"]):  # LabVIEW calls its time X_Value
         return False
     steps = np.diff(series.values[np.isfinite(series.values)])
     return bool(len(steps)) and bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
