@@ -113,10 +113,12 @@ def test_different_rates_are_told(tmp_path: Path) -> None:
         **{"t p1": TIME, "p1 [bar]": LIFT, "t angle": slow, "angle [deg]": 20.0 + slow},
     )
     (item,) = propose([tmp_path / "run.npz"]).logs
-    assert "sampled at 50 to 200 Hz: all are laid on the 50 Hz of joint_angle" in item.remarks[0]
+    assert (
+        "sampled at 50 to 200 Hz: all are laid on the 200 Hz of muscle_pressure" in item.remarks[0]
+    )
     (tmp_path / "case.toml").write_text(propose([tmp_path / "run.npz"]).case_toml(tmp_path))
     pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
-    assert load_case(tmp_path).recordings[0].sample_time == 0.02
+    assert load_case(tmp_path).recordings[0].sample_time == 5e-3
 
 
 def test_a_sensor_in_volts_is_told(tmp_path: Path) -> None:
