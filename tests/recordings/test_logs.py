@@ -295,3 +295,18 @@ def test_tables_and_timetables_of_matlab(tmp_path: Path) -> None:
     time = log.find("timed/p1").time
     assert time is not None
     np.testing.assert_allclose(time, np.arange(30))
+
+
+def test_older_files_of_asam_that_are_called_dat(tmp_path: Path) -> None:
+    from asammdf import MDF, Signal
+
+    with MDF(version="3.30") as file:
+        file.append([Signal(np.arange(50.0), np.arange(50) * 0.1, name="p1", unit="bar")])
+        saved = Path(file.save(tmp_path / "run.mdf", overwrite=True))
+    saved.rename(tmp_path / "run.dat")
+    series = read_log(tmp_path / "run.dat").find("p1")
+    assert series.unit == "bar"
+    np.testing.assert_array_equal(series.values, np.arange(50.0))
+    rows = "".join(f"{0.1 * i:.1f} {i}\n" for i in range(30))
+    (tmp_path / "text.dat").write_text(rows, encoding="utf-8")
+    assert len(read_log(tmp_path / "text.dat").series) == 2

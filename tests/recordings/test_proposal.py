@@ -113,10 +113,12 @@ def test_different_rates_are_told(tmp_path: Path) -> None:
         **{"t p1": TIME, "p1 [bar]": LIFT, "t angle": slow, "angle [deg]": 20.0 + slow},
     )
     (item,) = propose([tmp_path / "run.npz"]).logs
-    assert "sampled at 50 to 200 Hz: all are laid on the 50 Hz of joint_angle" in item.remarks[0]
+    assert (
+        "sampled at 50 to 200 Hz: all are laid on the 200 Hz of muscle_pressure" in item.remarks[0]
+    )
     (tmp_path / "case.toml").write_text(propose([tmp_path / "run.npz"]).case_toml(tmp_path))
     pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
-    assert load_case(tmp_path).recordings[0].sample_time == 0.02
+    assert load_case(tmp_path).recordings[0].sample_time == 5e-3
 
 
 def test_a_sensor_in_volts_is_told(tmp_path: Path) -> None:
@@ -244,3 +246,38 @@ def test_suspicions_stand_in_the_case(tmp_path: Path) -> None:
     np.savez(tmp_path / "run.npz", t=TIME, **{"p_muscle [bar]": VENTED * 14.5})
     proposal = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder())
     assert "read as psi" in proposal.case_toml(tmp_path)
+
+
+PROGRAMS = {
+    "LabVIEW": (
+        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
+        "Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\n"
+        "Date\t2024/05/12\nTime\t10:31:08,5129\n***End_of_Header***\t\n\t\n"
+        "Channels\t2\t\t\nSamples\t40\t40\t\nDate\t2024/05/12\t2024/05/12\t\n"
+        "Y_Unit_Label\tbar\tdeg\t\nDelta_X\t0,010000\t0,010000\t\n***End_of_Header***\t\t\t\n"
+        "X_Value\tMuscle pressure\tElbow angle\tComment\n",
+        "\t",
+        ",",
+    ),
+    "PicoScope": ("Time,Muscle pressure,Elbow angle\n(s),(bar),(deg)\n\n", ",", "."),
+    "a script": ("# stand 4, 12 May\n# time [s] muscle_pressure [bar] angle [deg]\n", " ", "."),
+    "Excel": ("Zeit;Druck Muskel;Winkel Ellbogen\ns;bar;°\n", ";", ","),
+}
+
+
+@pytest.mark.parametrize("program", PROGRAMS)
+def test_tables_as_programs_write_them(tmp_path: Path, program: str) -> None:
+    head, mark, decimal = PROGRAMS[program]
+    rows = [
+        mark.join(f"{value:.4f}" for value in row).replace(".", decimal)
+        for row in zip(TIME[:200], 3.0 * LIFT[:200], 20.0 + 60.0 * LIFT[:200], strict=True)
+    ]
+    (tmp_path / "run.txt").write_text(head + "\n".join(rows) + "\n", encoding="cp1252")
+    pamrs.rigs.shoulder().to_toml(tmp_path / "rig.toml")
+    proposal = propose([tmp_path / "run.txt"], pamrs.rigs.shoulder())
+    (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")
+    (only,) = load_case(tmp_path).recordings
+    assert only.sample_time == 5e-3
+    assert set(only.channels) == {"muscle_pressure", "joint_angle"}
+    pressure = only.channels["muscle_pressure"]
+    np.testing.assert_allclose(pressure, 3e5 * LIFT[:200], atol=6.0)

@@ -278,13 +278,18 @@ def _unit_for(name: str, series: Series, rig: Rig | None) -> tuple[str, str]:
 
 
 def _pressure_unit(channel: str, top: float, rig: Rig | None) -> str:
-    """The unit in which the largest value is nearest to what the supply has, or usual stands."""
+    """The unit in which the largest value is what the supply has or less; a muscle may hardly have
+    been filled, which is thought of in bar alone.
+    """
     rated = (
         [float(table["initial_pressure"]) for table in rig.tables("supply").values()] if rig else []
     )
     reference = max([*rated, 0.0]) or 8e5
     least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
     for unit in PRESSURE_UNITS:
-        if least <= top * parse_unit(unit).scale / reference <= most:
+        share = top * parse_unit(unit).scale / reference
+        if least <= share <= most or (
+            unit == "bar" and channel != "supply_pressure" and share < most
+        ):
             return unit
     return "bar"

@@ -16,7 +16,7 @@ from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
 from pamrs.recordings._matching import Match, channels_of, matched, words_of
-from pamrs.recordings._several_clocks import SLOW
+from pamrs.recordings._several_clocks import UNTOLD
 from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.rig import Rig
@@ -285,7 +285,8 @@ def _proposal(
 def _like_a_clock(series: Series) -> bool:
     """Whether a series is called like a time, and rises."""
     words = words_of(series.name)
-    if series.labels or not words or (words[-1] not in _TIMES and words[0] not in _TIMES):
+    called = bool(words) and (words[-1] in _TIMES or words[0] in _TIMES)
+    if series.labels or not (called or words == ["x", "value"]):  # LabVIEW calls its time X_Value
         return False
     steps = np.diff(series.values[np.isfinite(series.values)])
     return bool(len(steps)) and bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
@@ -350,14 +351,14 @@ def _rates(times: dict[str, Array | None]) -> list[str]:
     rates: dict[str, float] = {}
     for name, time in times.items():
         steps = np.diff(time) if time is not None else np.empty(0)
-        if np.any(steps > 0.0) and channel_of(name) not in SLOW:
+        if np.any(steps > 0.0) and channel_of(name) not in UNTOLD:
             rates[name] = 1.0 / usual_interval(steps[steps > 0.0], len(steps) + 1)
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
         return []
-    slowest = min(rates, key=lambda name: rates[name])
+    fastest = max(rates, key=lambda name: rates[name])
     return [
-        f"sampled at {rates[slowest]:.4g} to {max(rates.values()):.4g} Hz: all are laid on the "
-        f"{rates[slowest]:.4g} Hz of {slowest} (sample_time in case.toml chooses another grid)"
+        f"sampled at {min(rates.values()):.4g} to {rates[fastest]:.4g} Hz: all are laid on the "
+        f"{rates[fastest]:.4g} Hz of {fastest} (sample_time in case.toml chooses another grid)"
     ]
 
 

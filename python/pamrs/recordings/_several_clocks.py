@@ -15,10 +15,12 @@ from pamrs.recordings._clock import GAP, Array, Event, Grid, Mask, gaps, usual_i
 from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, judged
 
-__all__ = ["SLOW", "Sampled", "on_one_clock"]
+__all__ = ["UNTOLD", "Sampled", "on_one_clock"]
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
-SLOW: Final = frozenset({"temperature"})  # does not say how fine the grid is
+SLOW: Final = frozenset({"temperature"})  # need not last as long as the others
+#: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
+UNTOLD: Final = SLOW | COMMANDS
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most
 _CUT: Final = 2.0  # samples at the ends whose loss is not worth a word
 
@@ -150,8 +152,9 @@ def on_one_clock(
     source : str
         The file, for messages.
     sample_time : float, optional
-        Spacing of the grid [s]; by default that of the slowest channel, temperatures left out, so
-        that no sample is made up. A channel twice as fast or faster is averaged over it.
+        Spacing of the grid [s]; by default that of the fastest measured channel (commands and
+        temperatures left out). On a coarser one a channel is averaged, on a finer one it is
+        interpolated between neighbours.
 
     Returns
     -------
@@ -170,9 +173,10 @@ def on_one_clock(
     for channel in stepped:
         intervals = np.diff(channel.time[rows[channel.name]])
         usual[channel.name] = usual_interval(intervals, len(channel.time))
-    telling = [each for each in stepped if channel_of(each.name) not in SLOW] or stepped
-    step = sample_time or max(usual[channel.name] for channel in telling)
-    start, time = _common(telling, step, source)
+    telling = [each for each in stepped if channel_of(each.name) not in UNTOLD] or stepped
+    step = sample_time or min(usual[channel.name] for channel in telling)
+    ended = [each for each in stepped if channel_of(each.name) not in SLOW] or stepped
+    start, time = _common(ended, step, source)
     issues: list[Issue] = []
     laid: dict[str, Array] = {}
     masks: dict[str, Mask] = {}

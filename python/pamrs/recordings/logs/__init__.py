@@ -76,6 +76,9 @@ def _format(path: Path) -> _Format:
     name = path.name.lower()
     ending = Path(name.removesuffix(".gz")).suffix
     form = _FORMATS.get(ending)
+    if ending == ".dat" and path.is_file():
+        with path.open("rb") as stream:  # measuring systems of cars call theirs so
+            form = _MDF if stream.read(8) == b"MDF     " else form
     if form is None or (name.endswith(".gz") and form is not _TEXT):
         raise RecordingError(
             f"{path}: the format {Path(name).suffix!r} is not read here; readable are "

@@ -62,6 +62,8 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
     lines = [line for line in text.splitlines() if line.strip()]
     kept = [line for line in lines if not line.lstrip().startswith(_COMMENTS)]
     dialect = _dialect(kept, form, path)
+    if dialect.delimiter == " ":  # a unit belongs to the word before it
+        lines, kept = ([re.sub(r"\s+\[", "[", line) for line in some] for some in (lines, kept))
     rows = [_stripped(row) for row in split_rows("\n".join(kept), dialect.delimiter)]
     rows = [row for row in rows if any(cell.strip() for cell in row)]
     first, width = _first_row(rows, dialect, form)
