@@ -81,6 +81,10 @@ class Candidate:
         """
         return sum(math.log(max(1.0, abs(self.fit.moved[name]) / walls)) for name in self.wrong)
 
+    def is_wrong(self, walls: float) -> bool:
+        """Whether everything that it calls wrong lies outside its tolerances, so many of them."""
+        return all(abs(self.fit.moved[name]) > walls for name in self.wrong)
+
     @property
     def misfit(self) -> float:
         """Sum over the blocks of the residual in units of its noise, squared, on the recordings to

@@ -307,7 +307,7 @@ def _beside_wrong(trial: Attempts, sets: list[Candidate], tell: Say) -> list[Can
         for name in strained_parameters(trial, candidate.fit):
             tell(f"trying {' + '.join(candidate.effects)} beside another {name}")
             beside = trial.beside_wrong(starts, candidate.fit, (name,))
-            if beside is not None and abs(beside.fit.moved[name]) > walls:
+            if beside is not None and beside.is_wrong(walls):
                 found.append(beside)
     return found
 
@@ -398,7 +398,9 @@ def _weighed(
         close and not explains(close[0], start, trial.suspects, settings.evidence)
     ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
-        candidates = [trial.polished(c) if c in close else c for c in candidates]
+        ended = [trial.polished(c) if c in close else c for c in candidates]
+        # what came back inside its tolerances on the way to the end is not wrong
+        candidates = [c for c in ended if c.is_wrong(settings.fit.most_tolerances)]
         found = weights(candidates)
     return candidates, found
 

@@ -122,9 +122,7 @@ def freed(
     found = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
     for names, candidate in _tried(trial, sets, baseline, say).items():
-        if candidate is not None and all(
-            abs(candidate.fit.moved[name]) > walls for name in names
-        ):  # else it is not wrong
+        if candidate is not None and candidate.is_wrong(walls):
             found.append(replace(candidate, gain=gains[names]))
     return found
 
