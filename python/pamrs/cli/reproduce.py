@@ -55,6 +55,8 @@ def reproduce_command(
     check_packages("plot", "matplotlib", "PIL")
     if search and "ch3" in chapters:
         check_packages("search", "deap", "cma")
+    if page is not None and not page.resolve().is_relative_to(output.resolve()):
+        check_writable(page)  # before a folder is made
     output.mkdir(parents=True, exist_ok=True)
     check_writable(page, output / "facts.csv")
     sections = []
