@@ -20,22 +20,24 @@ from pamrs.recordings.logs import read_log
 HEADER = "time [s],force [N]\n"
 
 
-@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet"])
-def test_devices_and_pipes_are_refused_at_once(tmp_path: Path, ending: str) -> None:
-    device, pipe = tmp_path / f"zero{ending}", tmp_path / f"pipe{ending}"
+def special(folder: Path, ending: str) -> tuple[Path, Path]:
+    """A device and a pipe that have the names of recordings."""
+    device, pipe = folder / f"zero{ending}", folder / f"pipe{ending}"
     device.symlink_to("/dev/zero")
     os.mkfifo(pipe)
-    for path in (device, pipe):
+    return device, pipe
+
+
+@pytest.mark.parametrize("ending", [".csv", ".csv.gz", ".parquet"])
+def test_devices_and_pipes_are_refused_at_once(tmp_path: Path, ending: str) -> None:
+    for path in special(tmp_path, ending):
         with pytest.raises(RecordingError, match=rf"{path.name}: .* (regular file|pyarrow)"):
             load_recording(path)
 
 
 @pytest.mark.parametrize("ending", [".csv", ".txt.gz", ".npz", ".mat", ".mf4"])
 def test_logs_are_regular_files_too(tmp_path: Path, ending: str) -> None:
-    device, pipe = tmp_path / f"zero{ending}", tmp_path / f"pipe{ending}"
-    device.symlink_to("/dev/zero")
-    os.mkfifo(pipe)
-    for path in (device, pipe):
+    for path in special(tmp_path, ending):
         with pytest.raises(RecordingError, match=rf"{path.name}: .* regular file"):
             read_log(path)
 
