@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Events, Problem, residuals
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.fit._lines import lines_of
+from pamrs.diagnosis.prepare import Residual, available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -27,8 +29,12 @@ def recordings(
     *,
     plant: pamrs.Rig | None = None,
     form: str = "",
+    own: dict[str, dict[str, float]] | None = None,
 ) -> list[Recording]:
-    """Recordings of a shoulder with an event each, with the noise of transducers."""
+    """Recordings of a shoulder with an event each, with the noise of transducers.
+
+    ``own`` has what happens in each recording, where that is no event at its time.
+    """
     found = []
     for number, (name, when) in enumerate(TIMES.items()):
         rng = np.random.default_rng([2014, number])
@@ -39,7 +45,8 @@ def recordings(
             + 0.25 * np.sin(2 * np.pi * 0.4 * time + number)
         )
         rig = plant or pamrs.rigs.shoulder()
-        rig = rig.with_effect(effect, make | {"time": when}, form=form)
+        here = {"time": when} if own is None else own[name]
+        rig = rig.with_effect(effect, make | here, form=form)
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
         channels = {
             "valve_command": command,
@@ -96,6 +103,42 @@ def test_a_payload_that_is_poured_is_told_as_a_ramp() -> None:
     assert found.fit["gap_closed"] > 0.8
     # the model that is written holds what it found, in its form
     assert [e["form"] for e in found.rig.effects] == ["ramp"]
+
+
+def test_a_vibration_is_found_with_another_phase_in_each_recording() -> None:
+    phases = {"lift": 0.3, "lower": 2.0, "again": 4.4}
+    shaken = {
+        name: {"torque": 2.0 * math.cos(phase), "torque_cosine": 2.0 * math.sin(phase)}
+        for name, phase in phases.items()
+    }
+    records = recordings("external_torque", {"frequency": 1.37}, form="vibration", own=shaken)
+    found = pamrs.diagnose(pamrs.Case("shaken", pamrs.rigs.shoulder(), records, Path()))
+    assert found.probabilities["external_torque"] > 0.8
+    (effect,) = found.effects
+    assert effect["form"] in ("vibration", "two_vibrations")
+    low, high = effect["parameters"]["frequency"]["interval"]
+    assert low <= 1.37 <= high
+    assert high - low < 0.01
+    told = {e["recording"]: e for e in effect["events"] if abs(e["frequency"] - 1.37) < 0.01}
+    for name, own in shaken.items():
+        for part, size in own.items():
+            assert abs(told[name][part] - size) < 0.15, (name, part)
+    assert found.fit["gap_closed"] > 0.8
+
+
+def test_lines_stand_out_of_a_red_spectrum() -> None:
+    rng = np.random.default_rng(7)
+    time = np.arange(0.0, 40.0, 0.01)
+    red = np.cumsum(rng.normal(0.0, 0.05, time.size))
+    value = red + 0.5 * np.sin(2 * np.pi * 0.83 * time) + 0.4 * np.cos(2 * np.pi * 2.41 * time)
+    rows = np.ones(time.size, dtype=bool)
+    rows[500:700] = False
+    kept = Residual(value, None, value, rows, 0.1)
+    lines = lines_of([(kept, 0.01)], 0.1, 25.0, 3)
+    for wanted in (0.83, 2.41):
+        assert min(abs(line - wanted) for line in lines) < 0.5 / 40.0
+    assert lines_of([], 0.1, 25.0, 3) == []
+    assert lines_of([(kept, 0.01)], 60.0, 90.0, 3) == []  # faster than the samples can tell
 
 
 def test_a_recording_without_the_event_has_no_slope_in_it() -> None:

@@ -193,10 +193,20 @@ class Form:
 
     @property
     def transient(self) -> bool:
-        """Whether it happens at times of its own in each recording, so that all recordings cannot
-        share its parameters.
+        """Whether it happens at times of its own, or with a phase of its own, in each recording, so
+        that all recordings cannot share its parameters.
         """
-        return any(parameter.role == "time" for parameter in self.parameters)
+        return self.periodic or any(parameter.role == "time" for parameter in self.parameters)
+
+    @property
+    def periodic(self) -> bool:
+        """Whether it repeats with a frequency; its phase is another one in each recording."""
+        return any(p.scan is not None and p.unit == "Hz" for p in self.parameters)
+
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """Names of the parameters that are the same in all recordings, whatever else is not."""
+        return tuple(p.name for p in self.parameters if p.same_everywhere)
 
 
 @dataclass(frozen=True, slots=True)

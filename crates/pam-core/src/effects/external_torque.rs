@@ -11,6 +11,8 @@
 //! frequency; with both parts the amplitude is linear and the phase free, as in M. Bodson, A. Sacks
 //! & P. Khosla, "Harmonic generation in adaptive feedforward cancellation schemes", IEEE Trans.
 //! Automatic Control 39, 1994.
+//!
+//! `two_vibrations`: the sum of two, each with its own frequency. Bodson et al. (1994).
 
 use super::{risen_over, Effect, EffectInfo, EffectParameter, Form, Port, Use};
 use crate::blocks::gas::Gas;
@@ -20,6 +22,14 @@ use std::f64::consts::TAU;
 
 const TORQUE: EffectParameter =
     EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0).starts(&[-5.0, 5.0]).off(0.0).tried(1.0);
+
+const COSINE: EffectParameter =
+    EffectParameter::new("torque_cosine", "N m", -1e9, 1e9, 0.0).starts(&[5.0]).off(0.0);
+
+const FREQUENCY: EffectParameter = EffectParameter::new("frequency", "Hz", 0.01, 1000.0, 2.0)
+    .starts(&[1.0, 4.0])
+    .scan(0.1, 25.0, 25)
+    .same_everywhere();
 
 const PUSHES: Form = Form {
     name: "pushes",
@@ -66,16 +76,21 @@ pub const INFO: EffectInfo = EffectInfo {
         Form { name: "constant", parameters: &[TORQUE], make: made_by!(steady), ..PUSHES },
         Form {
             name: "vibration",
+            parameters: &[TORQUE, COSINE, FREQUENCY],
+            make: made_by!(vibration),
+            ..PUSHES
+        },
+        Form {
+            name: "two_vibrations",
             parameters: &[
                 TORQUE,
-                EffectParameter::new("torque_cosine", "N m", -1e9, 1e9, 0.0)
-                    .starts(&[1.0])
-                    .off(0.0),
-                EffectParameter::new("frequency", "Hz", 0.01, 1000.0, 2.0)
-                    .starts(&[1.0, 4.0])
-                    .scan(0.25, 16.0, 25),
+                COSINE,
+                FREQUENCY,
+                EffectParameter { name: "torque_2", ..TORQUE }.again("torque"),
+                EffectParameter { name: "torque_cosine_2", ..COSINE }.again("torque_cosine"),
+                EffectParameter { name: "frequency_2", ..FREQUENCY }.again("frequency"),
             ],
-            make: made_by!(vibration),
+            make: made_by!(two_vibrations),
             ..PUSHES
         },
     ],
@@ -115,6 +130,10 @@ struct Vibration<S> {
     frequency: S,
 }
 
+/// Two of them at once.
+#[derive(Debug, Clone, Copy)]
+struct TwoVibrations<S>([Vibration<S>; 2]);
+
 fn steady<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
     let zero = constant(0.0);
     Box::new(Vibration { sine: zero, cosine: values[0], frequency: zero })
@@ -122,6 +141,24 @@ fn steady<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
 
 fn vibration<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
     Box::new(Vibration { sine: values[0], cosine: values[1], frequency: values[2] })
+}
+
+fn two_vibrations<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(TwoVibrations([0, 3].map(|k| Vibration {
+        sine: values[k],
+        cosine: values[k + 1],
+        frequency: values[k + 2],
+    })))
+}
+
+impl<S: Scalar> Effect<S> for TwoVibrations<S> {
+    fn push(&self, time: f64) -> S {
+        self.0[0].push(time) + self.0[1].push(time)
+    }
+
+    fn fastest(&self) -> f64 {
+        self.0.iter().map(Effect::fastest).fold(0.0, f64::max)
+    }
 }
 
 impl<S: Scalar> Effect<S> for Vibration<S> {
@@ -159,6 +196,10 @@ mod tests {
         assert!((most - 5.0).abs() < 1e-3);
         assert!((shaken.push(0.0) - 4.0).abs() < 1e-12 && (shaken.push(0.125) - 3.0).abs() < 1e-12);
         assert!((shaken.push(0.3) - shaken.push(1.3)).abs() < 1e-12);
+        let twice = made("two_vibrations", &[3.0, 4.0, 2.0, 1.0, -2.0, 0.5]);
+        let apart = [made("vibration", &[3.0, 4.0, 2.0]), made("vibration", &[1.0, -2.0, 0.5])];
+        let sum: f64 = apart.iter().map(|one| one.push(0.3)).sum();
+        assert!((twice.push(0.3) - sum).abs() < 1e-12);
         let steady = made("constant", &[-2.0]);
         assert_eq!([0.0, 0.3, 99.0].map(|now| steady.push(now)), [-2.0; 3]);
     }

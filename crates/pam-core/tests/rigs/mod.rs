@@ -357,6 +357,19 @@ pub const FORMS: &[Typical] = &[
         &[("torque", 8.0), ("torque_cosine", 4.0), ("frequency", 3.0)],
         &[("torque", 0.0), ("torque_cosine", 0.0)],
     ),
+    formed(
+        "external_torque",
+        "two_vibrations",
+        &[
+            ("torque", 8.0),
+            ("torque_cosine", 4.0),
+            ("frequency", 3.0),
+            ("torque_2", -5.0),
+            ("torque_cosine_2", 2.0),
+            ("frequency_2", 1.3),
+        ],
+        &[("torque", 0.0), ("torque_cosine", 0.0), ("torque_2", 0.0), ("torque_cosine_2", 0.0)],
+    ),
 ];
 
 const CLOSURE_SUPPLY: &[(&str, f64)] = &[

@@ -227,11 +227,10 @@ class Attempts:
         if self.same:
             return self.judged(effects, found)
         bare = found.rig.without_effect(effect)
-        leading = EFFECTS[effect].leading
-        size = found.values[f"{effect}.{leading.name}"] if leading.same_everywhere else None
         quiet = residuals(self.outer, bare)
         form = found.events.form if found.events else ""
-        events = look_for_events(effect, self.outer, bare, quiet, white, size, form)
+        known = {n: found.values[f"{effect}.{n}"] for n in EFFECTS[effect].form(form).shared}
+        events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
             return self.judged(effects, found, quiet)
         everywhere = replace(

@@ -6,9 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from pamrs.diagnosis.fit._fitting import Fit, Problem, bin_width, stacked
+from pamrs.diagnosis.fit._fitting import Fit, Key, Problem, bin_width, stacked
+from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["spread_over_pieces"]
+__all__ = ["pieces_of", "pieces_spread", "spread_over_pieces"]
 
 Array = NDArray[np.float64]
 
@@ -38,17 +39,41 @@ def spread_over_pieces(problem: Problem, found: Fit) -> dict[str, float]:
     if slopes is None or not names or slopes.shape[1] != len(names):
         return dict(found.std)
     scales = np.array([found.scales[name] for name in names])
-    jacobian = slopes * scales
-    pieces = _pieces(problem, found)
+    wide = scales * pieces_spread(
+        rows, slopes * scales, found.covariance, pieces_of(problem, found.residuals)
+    )
+    own = np.array([found.std[name] for name in names])
+    return found.std | dict(zip(names, np.maximum(own, wide).tolist(), strict=True))
+
+
+def pieces_spread(
+    rows: Array, jacobian: Array, covariance: Array, pieces: list[NDArray[np.intp]]
+) -> Array:
+    """Standard deviations by how much pieces of the residuals pull the parameters apart.
+
+    Parameters
+    ----------
+    rows : (n,) array
+        Stacked residuals, without priors.
+    jacobian : (n, k) array
+        Their sensitivities to the scaled parameters.
+    covariance : (k, k) array
+        Of the scaled parameters, by the fit, priors included.
+    pieces : list of array
+        Rows of each piece.
+
+    Returns
+    -------
+    (k,) array
+        Of the scaled parameters; zero where there are not two pieces.
+    """
     if len(pieces) < 2:
-        return dict(found.std)
-    size, axes = np.linalg.eigh(found.covariance)
+        return np.zeros(covariance.shape[0])
+    size, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.clip(size, 0.0, None)) @ axes.T
     pulls = np.array([_pull(root, jacobian[at], rows[at]) for at in pieces])
     few = float(t.ppf(0.975, len(pieces) - 1) / norm.ppf(0.975))
-    wide = few * np.sqrt(np.sum(pulls**2, axis=0)) * scales
-    own = np.array([found.std[name] for name in names])
-    return found.std | dict(zip(names, np.maximum(own, wide).tolist(), strict=True))
+    return np.asarray(few * np.sqrt(np.sum(pulls**2, axis=0)), dtype=np.float64)
 
 
 def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
@@ -61,7 +86,7 @@ def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
     return pull
 
 
-def _pieces(problem: Problem, found: Fit) -> list[NDArray[np.intp]]:
+def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[NDArray[np.intp]]:
     """Rows of the stacked residuals in each piece of a recording, all blocks together."""
     noise = problem.settings.noise
     count = 0
@@ -70,7 +95,7 @@ def _pieces(problem: Problem, found: Fit) -> list[NDArray[np.intp]]:
         width = bin_width(prepared, noise.fit_bin_time)
         own: dict[int, list[NDArray[np.intp]]] = {}
         for block in problem.blocks:
-            rows = found.residuals[block.name, prepared.recording.name].rows
+            rows = found[block.name, prepared.recording.name].rows
             bins = np.arange(rows.size // width)
             at = (bins * width * prepared.dt / noise.piece_time).astype(int)
             for k in np.unique(at):

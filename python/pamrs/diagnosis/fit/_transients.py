@@ -1,16 +1,17 @@
 """Effects that happen at times of their own in every recording: pushes from outside, a payload that
-changes.
+changes; and those that repeat, with a phase of their own: a vibration.
 
 No parameter that all recordings share can describe them. In each recording a pulse or a step of a
 typical size is moved through time; where its signature takes most of the residual a fit begins. On
 a held-out recording the times are looked for again, since nothing can predict them; what the event
-is (a mass) is not. Pushes have no property that carries over, so they are accepted only if little
-is left.
+is (a mass, a frequency) is not. Pushes have no property that carries over, so they are accepted
+only if little is left.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from threading import Event
@@ -29,6 +30,8 @@ from pamrs.diagnosis.fit._fitting import (
     stacked,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._shaken import Shaken
+from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.diagnosis.settings import TransientSettings
 from pamrs.effects import EFFECTS, EffectParameter, find_parameter
@@ -51,8 +54,13 @@ def events_of(effect: str, form: str = "") -> list[list[EffectParameter]]:
     form : str
         Its form; the usual one where it is empty.
     """
-    own, leading = EFFECTS[effect].form(form).parameters, EFFECTS[effect].leading.name
-    first = [p for p in own if p.name == leading or p.role in ("time", "duration")]
+    shape, leading = EFFECTS[effect].form(form), EFFECTS[effect].leading.name
+    own = shape.parameters
+    first = [
+        p
+        for p in own
+        if not p.repeats and (shape.periodic or p.name == leading or p.role in ("time", "duration"))
+    ]
     every = [[p, *(q for q in own if q.repeats == p.name)] for p in first]
     return [list(one) for one in zip(*every, strict=True)]
 
@@ -75,7 +83,9 @@ def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
         "duration": settings.duration_scale,
         "rise": settings.rise_scale,
     }
-    return scales.get(_first_of(effect, parameter).role, _tried(EFFECTS[effect].leading))
+    first = _first_of(effect, parameter)
+    usual = settings.frequency_scale if first.unit == "Hz" else _tried(EFFECTS[effect].leading)
+    return scales.get(first.role, usual)
 
 
 def fit_events(
@@ -102,21 +112,15 @@ def fit_events(
         With ``events``; its ``values`` hold the parameters of the first recording that has one.
         None where nothing was found.
     """
-    found = look_for_events(effect, problem, baseline.rig, baseline.residuals, inflation)
-    if found is None:
-        return None
-    last = _jointly(found, problem, nominal, baseline, inflation)
-    if last is None or last.events is None:
-        return None
-    for form in EFFECTS[effect].forms[1:]:
-        if not form.transient:
-            continue
-        again = _jointly(
-            _in_form(last.events or found, form.name), problem, nominal, baseline, inflation
-        )
-        least = problem.settings.transients.least_gain
-        if again is not None and 2.0 * (last.cost - again.cost) > least:
+    least, last = problem.settings.transients.least_gain, None
+    for begun in _begun(effect, problem, baseline, inflation):
+        # events that were fitted in the usual form say where those of another one are
+        near = begun if last is None or last.events is None else _near(begun, last.events)
+        again = _jointly(near, problem, nominal, baseline, inflation)
+        if again is not None and (last is None or 2.0 * (last.cost - again.cost) > least):
             last = again
+    if last is None:
+        return None
     assert last.events is not None
     first = next(iter(last.events.values.values()))
     values = {f"{effect}.{name}": value for name, value in first.items()}
@@ -126,6 +130,31 @@ def fit_events(
         rig=last.rig.with_effect(effect, first, form=last.events.form),
         values=last.values | values,
     )
+
+
+def _begun(
+    effect: str, problem: Problem, baseline: Fit, inflation: dict[str, float]
+) -> Iterator[Events]:
+    """Where the fits of an effect's events begin, one in each form; the usual form first."""
+    rig, base = baseline.rig, baseline.residuals
+    forms = [form for form in EFFECTS[effect].forms if form.transient]
+    found = look_for_events(effect, problem, rig, base, inflation)
+    if found is not None:
+        yield found
+        yield from (_in_form(found, form.name) for form in forms[1:] if not form.periodic)
+    periodic = [form for form in forms if form.periodic]
+    if periodic:
+        shaken = Shaken.of(effect, problem, rig, base, inflation)
+        for form in periodic:
+            begun = shaken.best(form.name)
+            if begun is not None:
+                yield begun
+
+
+def _near(begun: Events, found: Events) -> Events:
+    """Where a form begins, from events that were fitted: what repeats begins where it was found."""
+    periodic = any(EFFECTS[e.effect].form(e.form).periodic for e in (begun, found))
+    return begun if periodic else _in_form(found, begun.form)
 
 
 def _in_form(events: Events, form: str) -> Events:
@@ -149,7 +178,7 @@ def look_for_events(
     rig: Rig,
     base: dict[Key, Residual],
     inflation: dict[str, float],
-    size: float | None = None,
+    known: Mapping[str, float] | None = None,
     form: str = "",
 ) -> Events | None:
     """The events of an effect in each recording, at a model that stays.
@@ -166,27 +195,43 @@ def look_for_events(
         Its residuals.
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
-    size : float, optional
-        Size that is known; times alone are looked for.
+    known : mapping of str to float, optional
+        Parameters that are known, since all recordings share them: a mass, a frequency [SI].
     form : str, optional
-        Form in which they are fitted; they are looked for in the usual one.
+        Form in which they are fitted; those that do not repeat are looked for in the usual one.
 
     Returns
     -------
     Events or None
         None where no recording has one.
     """
+    known = dict(known or {})
+    size = known.get(EFFECTS[effect].leading.name)
+    shaken = None
+    if EFFECTS[effect].form(form).periodic:
+        shaken = Shaken.of(effect, problem, rig, base, inflation, known).best(form)
 
-    def one(prepared: Prepared) -> dict[str, float] | None:
-        alone = replace(problem, recordings=[prepared])
-        own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
+    def begun_in(
+        alone: Problem, prepared: Prepared, own: dict[Key, Residual]
+    ) -> dict[str, float] | None:
+        """Where the events of one recording begin, in the form that is asked for."""
         name = prepared.recording.name
+        if EFFECTS[effect].form(form).periodic:
+            return None if shaken is None else shaken.values.get(name)
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
         if not started:
             return None
         begun = Events(effect, {name: started})
-        begun = _in_form(begun, form) if form else begun
-        return _fitted(begun, alone, prepared, rig, inflation, size is not None, stopped)
+        return (_in_form(begun, form) if form else begun).values[name]
+
+    def one(prepared: Prepared) -> dict[str, float] | None:
+        alone = replace(problem, recordings=[prepared])
+        own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
+        started = begun_in(alone, prepared, own)
+        if started is None:
+            return None
+        begun = Events(effect, {prepared.recording.name: started}, form)
+        return _fitted(begun, alone, prepared, rig, inflation, known, stopped)
 
     stopped = Event()
     with ThreadPoolExecutor(max_workers=2) as pool:
@@ -309,15 +354,15 @@ def _fitted(
     prepared: Prepared,
     rig: Rig,
     inflation: dict[str, float],
-    keep_size: bool,
+    known: Mapping[str, float],
     stopped: Event,
 ) -> dict[str, float] | None:
     """Events of one recording fitted alone, at a model that stays; None where the model leaves its
     range.
     """
     effect, start = begun.effect, begun.values[prepared.recording.name]
-    settings, leading = alone.settings, EFFECTS[effect].leading
-    free = [p for p in start if not (keep_size and _first_of(effect, p).name == leading.name)]
+    settings = alone.settings
+    free = [p for p in start if p not in known and _first_of(effect, p).name not in known]
     scale = np.array([_scale(effect, p, settings.transients) for p in free])
     limits = [_limits(effect, p, prepared, settings.transients) for p in free]
     low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
@@ -378,9 +423,12 @@ def _jointly(
         )
     except SimulationError:
         return None
-    spread = np.sqrt(
-        np.clip(np.diag(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)), 0.0, None)
+    covariance = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True))
+    measured = values.size - count  # priors stand behind
+    wide = pieces_spread(
+        values[:measured], jacobian[:measured], covariance, pieces_of(problem, found)
     )
+    spread = np.maximum(wide, np.sqrt(np.clip(np.diag(covariance), 0.0, None)))
     told_std = {
         place: float(s) for place, s in zip(joint.places, spread[count:] * joint.scale, strict=True)
     }
@@ -444,15 +492,11 @@ class _Joint:
     ) -> _Joint:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
-        leading, shared = EFFECTS[effect].leading.name, EFFECTS[effect].leading.same_everywhere
+        shared = EFFECTS[effect].form(events.form).shared
         names = list(baseline.moved)
-        places = [
-            (name, p)
-            for name, values in events.values.items()
-            for p in values
-            if not (shared and p == leading)
+        places = [("", p) for p in shared] + [
+            (name, p) for name, own in events.values.items() for p in own if p not in shared
         ]
-        places = ([("", leading)] if shared else []) + places
         scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
         kept = []
         for prepared in problem.recordings:
@@ -500,14 +544,15 @@ class _Joint:
 
     def begin(self, baseline: Fit) -> Array:
         """Where the fit begins: the baseline as it was, each event where it was found."""
-        leading = EFFECTS[self.events.effect].leading.name
         start = [
             (baseline.values[n] - self.scaling.centre[n]) / self.scaling.scale[n]
             for n in self.names
         ]
-        sizes = [own[leading] for own in self.events.values.values()]
-        median = float(np.median(sizes))
-        begun = [median if name == "" else self.events.values[name][p] for name, p in self.places]
+        every = self.events.values
+        begun = [
+            float(np.median([own[p] for own in every.values()])) if name == "" else every[name][p]
+            for name, p in self.places
+        ]
         return np.concatenate([start, np.array(begun) / self.scale])
 
     def bounds(self) -> tuple[Array, Array]:

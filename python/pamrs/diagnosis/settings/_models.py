@@ -229,6 +229,16 @@ class TransientSettings(SettingsGroup):
     rise_scale: float = setting(
         0.2, unit="s", above=0.0, reason="scale of the time of its edges", origin="judgement"
     )
+    most_lines: int = setting(
+        5,
+        unit="count",
+        least=1,
+        reason="lines of the residual's spectrum at which a vibration is looked for",
+        origin="judgement: two that shake, and what the drive itself leaves",
+    )
+    frequency_scale: float = setting(
+        0.01, unit="Hz", above=0.0, reason="scale of a frequency in a fit", origin="judgement"
+    )
     least_duration: float = setting(
         0.05, unit="s", above=0.0, reason="shortest duration of an event", origin="judgement"
     )

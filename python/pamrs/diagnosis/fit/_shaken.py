@@ -1,0 +1,160 @@
+"""Where the fit of a vibration begins: frequencies that stand out of the residual's spectrum, and
+the sizes (and so the phases) that each recording asks for.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fit._acting import acts_in
+from pamrs.diagnosis.fit._fitting import Events, Key, Problem, changes, stacked
+from pamrs.diagnosis.fit._lines import lines_of
+from pamrs.diagnosis.prepare import Residual
+from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["Shaken"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Shaken:
+    """What a vibration of each of some frequencies does to the residuals of each recording.
+
+    Attributes
+    ----------
+    effect : str
+        Which effect repeats.
+    rows : dict of str to (n,) array
+        Stacked residuals by recording.
+    columns : dict of float to dict of str to (n, k) array
+        By frequency [Hz] and recording: their change per unit of each size [1/SI].
+    """
+
+    effect: str
+    rows: dict[str, Array]
+    columns: dict[float, dict[str, Array]]
+
+    @staticmethod
+    def of(
+        effect: str,
+        problem: Problem,
+        rig: Rig,
+        base: dict[Key, Residual],
+        inflation: dict[str, float],
+        known: Mapping[str, float] | None = None,
+    ) -> Shaken:
+        """Signatures at a model that stays.
+
+        Parameters
+        ----------
+        effect : str
+            An effect with a form that repeats.
+        problem : Problem
+            Blocks and recordings.
+        rig : Rig
+            The model.
+        base : dict
+            Its residuals.
+        inflation : dict of str to float
+            As in :func:`pamrs.diagnosis.fit.fit`.
+        known : mapping of str to float, optional
+            Frequencies that are known; otherwise the lines of the residual's spectrum are taken.
+        """
+        form = next(f for f in EFFECTS[effect].forms if f.periodic)
+        (scanned,) = (p for p in form.parameters if p.scan is not None)
+        frequencies = [v for n, v in (known or {}).items() if n.startswith(scanned.name)]
+        if not frequencies:
+            frequencies = _lines(effect, scanned, problem, base)
+        sizes = [p for p in form.parameters if p.role_in(sealed=False) == "size"]
+        rows = _by_recording(problem, base, inflation)
+        columns: dict[float, dict[str, Array]] = {}
+        for frequency in frequencies:
+            found = []
+            for size in sizes:
+                unit = size.default or max(size.starts)
+                alone = {p.name: unit if p is size else 0.0 for p in sizes}
+                try:
+                    model = rig.with_effect(
+                        effect, alone | {scanned.name: frequency}, form=form.name
+                    )
+                    moved = _by_recording(problem, changes(problem, model, base, effect), inflation)
+                except SimulationError:
+                    break  # so large a torque leaves the range in which the model holds
+                found.append({name: (moved[name] - rows[name]) / unit for name in rows})
+            if len(found) == len(sizes):
+                columns[frequency] = {
+                    name: np.stack([one[name] for one in found], axis=1) for name in rows
+                }
+        return Shaken(effect, rows, columns)
+
+    def best(self, form: str) -> Events | None:
+        """The frequencies that take most of the residuals, with the sizes of each recording; None
+        where there are not as many as the form has.
+        """
+        own = EFFECTS[self.effect].form(form)
+        places = [p.name for p in own.parameters if p.scan is not None]
+        sizes = [p.name for p in own.parameters if p.scan is None]
+        chosen = itertools.combinations(self.columns, len(places))
+        best = max(chosen, key=lambda lines: sum(self._gains(lines).values()), default=None)
+        if best is None:
+            return None
+        told = dict(zip(places, best, strict=True))
+        values = {
+            name: dict(zip(sizes, map(float, self._solved(best, name)), strict=True)) | told
+            for name in self.rows
+        }
+        order = [p.name for p in own.parameters]
+        return Events(self.effect, {n: {p: v[p] for p in order} for n, v in values.items()}, form)
+
+    def _solved(self, lines: tuple[float, ...], name: str) -> Array:
+        """The sizes that one recording asks for, in the order of the lines."""
+        columns = np.concatenate([self.columns[line][name] for line in lines], axis=1)
+        return np.asarray(np.linalg.lstsq(columns, -self.rows[name], rcond=1e-9)[0])
+
+    def _gains(self, lines: tuple[float, ...]) -> dict[str, float]:
+        """What these lines take of the sum of squares of each recording."""
+        found = {}
+        for name, rows in self.rows.items():
+            columns = np.concatenate([self.columns[line][name] for line in lines], axis=1)
+            left = rows + columns @ self._solved(lines, name)
+            found[name] = float(rows @ rows - left @ left)
+        return found
+
+
+def _by_recording(
+    problem: Problem, found: dict[Key, Residual], inflation: dict[str, float]
+) -> dict[str, Array]:
+    """Stacked residuals of each recording."""
+    return {
+        p.recording.name: stacked(_alone(problem, p.recording.name), found, inflation)[0]
+        for p in problem.recordings
+    }
+
+
+def _alone(problem: Problem, name: str) -> Problem:
+    """A problem with one of its recordings."""
+    recordings = [p for p in problem.recordings if p.recording.name == name]
+    return Problem(problem.blocks, recordings, problem.core, problem.settings, problem.stopped)
+
+
+def _lines(
+    effect: str, scanned: EffectParameter, problem: Problem, base: dict[Key, Residual]
+) -> list[float]:
+    """Lines of the spectrum of what is left in the blocks in which an effect acts [Hz]."""
+    there = [
+        (base[b.name, p.recording.name], p.dt)
+        for b in problem.blocks
+        for p in problem.recordings
+        if acts_in(effect, b)
+    ]
+    assert scanned.scan is not None
+    low, high, _ = scanned.scan
+    return lines_of(there, low, high, problem.settings.transients.most_lines)
