@@ -77,7 +77,7 @@ fn sensitivities_agree_with_differences() {
         "heat_transfer",
         &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0), ("share", 0.4)],
     )];
-    let cases: [(&RigSpec, Block, &[&str]); 4] = [
+    let cases: [(&RigSpec, Block, &[&str]); 5] = [
         (
             &with_effects,
             Block::Supply(0),
@@ -104,6 +104,17 @@ fn sensitivities_agree_with_differences() {
                 "muscle_hysteresis.friction_pressure",
                 "muscle_hysteresis.presliding",
                 "sensors.pressure_zero",
+            ],
+        ),
+        (
+            &with_effects,
+            Block::Pull(0),
+            &[
+                "muscle.modulus_scale",
+                "muscle_hysteresis.friction_pressure",
+                "muscle_hysteresis.presliding",
+                "sensors.pressure_zero",
+                "sensors.angle_zero",
             ],
         ),
         (

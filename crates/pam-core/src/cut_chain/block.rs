@@ -16,17 +16,25 @@ pub enum Block {
     /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the
     /// muscle on a linear load.
     Arm(usize),
+    /// Chamber pressures and the measured motion to what the muscles put on a joint (a torque), or
+    /// on a linear load (a force).
+    Pull(usize),
 }
 
 impl Block {
     /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name
-    /// of the supply, chamber or joint behind it where it has one (`chamber.flexor`).
+    /// of the supply, chamber or joint behind it where it has one (`chamber.flexor`); `torque` of a
+    /// joint in the same way, `force` of a linear load.
     ///
     /// # Errors
     /// [`Error::Model`] for another name.
     pub fn from_name(rig: &Rig, name: &str) -> Result<Self> {
         let spec = rig.spec();
-        let joints = rig.names().coordinates.iter().map(|n| n.replacen("joint", "arm", 1));
+        let coordinates = &rig.names().coordinates;
+        let joints = coordinates.iter().map(|n| n.replacen("joint", "arm", 1));
+        let pulls = coordinates
+            .iter()
+            .map(|n| n.replacen("joint", "torque", 1).replacen("load", "force", 1));
         let blocks = (spec
             .supplies
             .iter()
@@ -38,7 +46,8 @@ impl Block {
                 .enumerate()
                 .map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))),
         )
-        .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))));
+        .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))))
+        .chain(pulls.enumerate().map(|(k, name)| (name, Self::Pull(k))));
         let blocks: Vec<_> = blocks.collect();
         blocks.iter().find(|(n, _)| n == name).map(|(_, block)| *block).ok_or_else(|| {
             let names: Vec<_> = blocks.iter().map(|(n, _)| n.as_str()).collect();
@@ -49,31 +58,37 @@ impl Block {
     /// Longest stable step [s] while its neighbours are driven.
     pub fn longest_step(self, rig: &Rig) -> f64 {
         match self {
-            Self::Arm(_) => rig.body_step(),
+            Self::Arm(_) | Self::Pull(_) => rig.body_step(),
             Self::Supply(_) | Self::Chamber(_) => rig.gas_step(),
         }
     }
 
-    /// Place of the predicted state.
-    pub(super) fn output(self, layout: &Layout) -> usize {
+    /// Place of the predicted state; none for what muscles pull, which is no state.
+    pub(super) fn output(self, layout: &Layout) -> Option<usize> {
         match self {
-            Self::Supply(k) => layout.supply(k),
-            Self::Chamber(k) => layout.pressure(k),
-            Self::Arm(k) => layout.angle(k),
+            Self::Supply(k) => Some(layout.supply(k)),
+            Self::Chamber(k) => Some(layout.pressure(k)),
+            Self::Arm(k) => Some(layout.angle(k)),
+            Self::Pull(_) => None,
         }
     }
 
     /// States of the block that a window starts from, in the order of their sensitivities.
     pub(super) fn initial_states(self, layout: &Layout) -> Vec<usize> {
         match self {
-            Self::Supply(_) | Self::Chamber(_) => vec![self.output(layout)],
+            Self::Supply(_) | Self::Chamber(_) => self.output(layout).into_iter().collect(),
             Self::Arm(_) => (layout.angle(0)..layout.effect(0)).collect(),
+            Self::Pull(_) => Vec::new(),
         }
     }
 
-    /// Number of initial states per window.
+    /// Number of initial states per window; what a load cell or a torque sensor reads at rest is
+    /// one.
     pub fn initial_count(self, rig: &Rig) -> usize {
-        self.initial_states(rig.layout()).len()
+        match self {
+            Self::Pull(_) => 1,
+            _ => self.initial_states(rig.layout()).len(),
+        }
     }
 
     /// States that are integrated: the block's, and those of line inlets, which nobody measures.
@@ -93,6 +108,11 @@ impl Block {
                 places.extend(effect_states(rig, Place::Gas(k)));
             }
             Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
+            Self::Pull(_) => {
+                let groups = 0..rig.wiring.groups.len();
+                places.extend(groups.flat_map(|k| effect_states(rig, Place::Group(k))));
+                return Simulated::only(rig, &places).pulling();
+            }
         }
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
@@ -166,17 +186,18 @@ pub(super) fn check(
 fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
     let (layout, wiring) = (rig.layout(), &rig.wiring);
     let mut places: Vec<usize> = (layout.angle(0)..layout.rate(0)).collect();
-    places.push(block.output(layout));
-    if matches!(block, Block::Arm(_)) {
+    let output = block.output(layout);
+    places.extend(output);
+    if matches!(block, Block::Arm(_) | Block::Pull(_)) {
         places.extend(wiring.groups.iter().map(|g| layout.pressure(g.chamber)));
         return places;
     }
     let valves = wiring.valves.iter().map(|v| (v.from.place(layout), Some(layout.pressure(v.to))));
     let lines = wiring.lines.iter().map(|l| (l.from.place(layout), l.to.place(layout)));
     for (a, b) in valves.chain(lines) {
-        if a == Some(block.output(layout)) {
+        if a == output {
             places.extend(b);
-        } else if b == Some(block.output(layout)) {
+        } else if b == output {
             places.extend(a);
         }
     }

@@ -171,7 +171,8 @@ pub(super) fn driven<'a, S: Scalar>(
             lag: lag(plant, *place),
             rest,
             // a block's own clock is that of what it predicts
-            shifted: plant.skewed() && (*place < layout.angle(0)) == matches!(block, Block::Arm(_)),
+            shifted: plant.skewed()
+                && (*place < layout.angle(0)) == matches!(block, Block::Arm(_) | Block::Pull(_)),
         }
     };
     measured.signals.iter().map(driver).collect()
@@ -248,7 +249,7 @@ pub(super) fn taps<S: Scalar>(
     let (rig, layout) = (plant.rig(), plant.rig().layout());
     let known = |place: usize| {
         let constant = rig.spec().supplies.get(place).is_some_and(|s| s.kind == "constant");
-        constant || place == block.output(layout) || measured.signal(place).is_some()
+        constant || Some(place) == block.output(layout) || measured.signal(place).is_some()
     };
     let fed = plant.taps().filter(|(gas, _)| measured.signal(layout.pressure(*gas)).is_some());
     fed.filter(|(_, valve)| rig.wiring.valves[*valve].from.place(layout).is_none_or(known))

@@ -21,7 +21,9 @@ impl<S: Scalar> Clocks<S> {
         }
         let (pressures, angles) = plant.skew(time);
         match block {
-            Block::Arm(_) => Self { neighbour: pressures - angles, command: angles },
+            Block::Arm(_) | Block::Pull(_) => {
+                Self { neighbour: pressures - angles, command: angles }
+            }
             Block::Supply(_) | Block::Chamber(_) => {
                 Self { neighbour: angles - pressures, command: pressures }
             }

@@ -92,7 +92,7 @@ pub fn closure_terms(
     let at = match block {
         Block::Supply(k) => Place::Supply(k),
         Block::Chamber(k) => Place::Gas(k),
-        Block::Arm(k) => Place::Joint(k),
+        Block::Arm(k) | Block::Pull(k) => Place::Joint(k),
     };
     let plant = Plant::new(rig, rig.parameters().lift(), false)?;
     let (mut found, mut count) = (Vec::new(), 0);

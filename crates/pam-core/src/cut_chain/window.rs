@@ -30,8 +30,16 @@ pub(super) struct Cut<'a, S> {
     output: Output<S>,
 }
 
-/// How the predicted channel is read off the state.
-struct Output<S> {
+/// How the predicted channel is read off the plant.
+enum Output<S> {
+    /// Off the state.
+    State(Reading<S>),
+    /// What the muscles at a joint or load pull, beside what the sensor reads at rest.
+    Pull(usize, S),
+}
+
+/// How it is read off the state.
+struct Reading<S> {
     /// Place of what is read.
     reading: usize,
     /// The same of a sensor that lags, whose reading a window starts from too.
@@ -62,7 +70,8 @@ impl<'a, S: Number> Cut<'a, S> {
         let rig = plant.rig();
         let own = block.initial_states(rig.layout());
         let (drivers, taps) = (driven(&plant, block, measured), taps(&plant, block, measured));
-        let (output, simulated) = (Output::new(&plant, block), block.simulated(rig, measured));
+        let (output, simulated) =
+            (Output::new(&plant, block, &bumps), block.simulated(rig, measured));
         let mut stepper = Stepper::new(plant);
         // a block that neither moves nor has muscles around it does not see the angles
         let unseen = if simulated.sees_angles() { usize::MAX } else { rig.layout().angle(0) };
@@ -110,12 +119,22 @@ impl<'a, S: Number> Cut<'a, S> {
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
             self.command(k, time, &clocks, &mut controls);
-            sink(k, self.output.read(&course.state), &self.stepper, &course.state, &controls);
+            let value = self.read(&course);
+            sink(k, value, &self.stepper, &course.state, &controls);
             if k + 1 < n {
                 self.sample(k, &mut course, clocks, &mut controls);
             }
         }
         Ok(())
+    }
+
+    /// The channel that is predicted.
+    fn read(&mut self, course: &Course<S>) -> S {
+        let Stepper { plant, scratch, .. } = &mut self.stepper;
+        match &self.output {
+            Output::State(reading) => reading.read(&course.state),
+            Output::Pull(k, rest) => plant.pull(*k, &course.state, &course.memory, scratch) + *rest,
+        }
     }
 
     /// What nobody measures begins at rest, and stays there unless it is a line's inlet.
@@ -161,9 +180,11 @@ impl<'a, S: Number> Cut<'a, S> {
         }
         let state = &mut course.state;
         plant.read_taps(state, &course.last);
-        let signal = self.measured.signal(self.block.output(layout));
-        if let (Some(reading), Some(signal)) = (self.output.lagging, signal) {
-            state[reading] = self.bumps[0] - self.output.offset + signal.value[k];
+        let signal = self.block.output(layout).and_then(|place| self.measured.signal(place));
+        if let (Output::State(Reading { lagging: Some(reading), offset, .. }), Some(signal)) =
+            (&self.output, signal)
+        {
+            state[*reading] = self.bumps[0] - *offset + signal.value[k];
         }
     }
 
@@ -267,23 +288,28 @@ impl<'a, S: Number> Cut<'a, S> {
 }
 
 impl<S: Scalar> Output<S> {
-    fn new(plant: &Plant<'_, S>, block: Block) -> Self {
+    fn new(plant: &Plant<'_, S>, block: Block, bumps: &[S]) -> Self {
         let rig = plant.rig();
-        let place = block.output(rig.layout());
+        let (Block::Supply(k) | Block::Chamber(k) | Block::Arm(k) | Block::Pull(k)) = block;
+        let Some(place) = block.output(rig.layout()) else {
+            return Self::Pull(k, bumps[0]);
+        };
         let zero = zero(plant, place);
         let gas = match block {
             Block::Chamber(k) => Some(k),
             _ => None,
         };
         let arm = matches!(block, Block::Arm(_));
-        Self {
+        Self::State(Reading {
             reading: gas.map_or(place, |k| plant.reading(k)),
             lagging: gas.and_then(|k| plant.lagging(k)).map(|(reading, _)| reading),
             offset: if arm { zero } else { zero - rig.gas.ambient_pressure },
             mirrored: rest_length(rig).filter(|_| arm),
-        }
+        })
     }
+}
 
+impl<S: Scalar> Reading<S> {
     /// The channel at a state.
     fn read(&self, state: &[S]) -> S {
         self.mirrored.map_or(state[self.reading], |rest| -state[self.reading] + rest) + self.offset

@@ -32,7 +32,7 @@ pub const INFO: EffectInfo = EffectInfo {
         without: "rate",
         held: &[("angle_share", 1.0)],
     }),
-    acts_in: &["supply", "chamber", "arm"],
+    acts_in: &["supply", "chamber", "arm", "pull"],
     source: "Mills (1991), offset and skew of clocks",
     forms: &[Form {
         name: "offset_and_drift",

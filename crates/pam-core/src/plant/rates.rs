@@ -35,6 +35,8 @@ pub struct Simulated {
     effects: bool,
     /// Somebody needs the volumes of the gases: all that asks for the muscles' shape without motion.
     volumes: bool,
+    /// Somebody asks what the muscles pull.
+    forces: bool,
 }
 
 impl Simulated {
@@ -51,6 +53,7 @@ impl Simulated {
         Self {
             gas: some(0, layout.angle(0)),
             motion: some(layout.angle(0), end),
+            forces: some(layout.angle(0), end),
             effects: some(end, layout.states()),
             volumes: some(layout.pressure(0), layout.angle(0))
                 || effects.any(|(at, _)| matches!(at, Place::Gas(_))),
@@ -66,6 +69,12 @@ impl Simulated {
         Self::all_but(rig, &others)
     }
 
+    /// The same, and somebody asks what the muscles pull.
+    #[must_use]
+    pub fn pulling(self) -> Self {
+        Self { forces: true, ..self }
+    }
+
     /// The places that are integrated, neighbours together.
     pub fn runs(&self) -> &[Range<usize>] {
         &self.runs
@@ -73,7 +82,7 @@ impl Simulated {
 
     /// Whether anything is moved by angles or asks for them.
     pub fn sees_angles(&self) -> bool {
-        self.motion || self.volumes
+        self.forces || self.volumes
     }
 
     /// Whether the state at a place is integrated.
@@ -387,6 +396,21 @@ impl<'a, S: Scalar> Plant<'a, S> {
         here.volume_rate.fill(constant(0.0));
     }
 
+    /// What the muscles at a joint put on it [N m], or on a linear load [N].
+    pub fn pull(
+        &self,
+        coordinate: usize,
+        state: &[S],
+        memory: &[Memory<S>],
+        here: &mut Scratch<S>,
+    ) -> S {
+        let mut now = std::mem::take(&mut here.now);
+        self.contractions(state, &mut now);
+        self.mechanics(state, memory, &now, true, here);
+        here.now = now;
+        here.torque[coordinate]
+    }
+
     /// Wall area of the gases without muscles [m2]: the cube of their volume.
     fn cubes(&self, here: &mut Scratch<S>) {
         for (k, balance) in self.wiring.ports.balance.iter().enumerate() {
@@ -420,7 +444,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Whether anybody asks what the muscles pull.
     #[inline]
     pub fn pulls(&self, simulated: &Simulated) -> bool {
-        simulated.motion || self.balanced
+        simulated.forces || self.balanced
     }
 
     /// Time derivative of the state; entries of driven states are zero.
