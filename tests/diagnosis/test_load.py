@@ -16,7 +16,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
 from pamrs.diagnosis.next_experiment import library, propose
 from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
-from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.errors import SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
@@ -205,8 +205,3 @@ def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
     }
     with pytest.raises((SimulationError, ValueError), match="frame"):
         core_rig(bench).predict("load", {}, DT, DT, [0], [], signals, 64)
-    still = Recording(
-        "held", "fit", DT * np.arange(64), DT, {n: v for n, (v, _) in signals.items()}, {}, [], {}
-    )
-    with pytest.raises(DiagnosisError, match="a frame holds the length"):
-        pamrs.diagnose(pamrs.Case("held", bench, [still], Path()))

@@ -73,7 +73,7 @@ def _unsettled(rig: Rig) -> list[str]:
 
 def _capped(group: Group, factor: float) -> Group:
     """A group of joints whose names have a smaller probability, the rest going to ``unlisted``."""
-    if group.mismatch is None or group.mismatch.kind != "arm":
+    if group.mismatch is None or not group.mismatch.mechanical:
         return group
     kept = {k: p if k in ("", "unlisted") else factor * p for k, p in group.probabilities.items()}
     kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
@@ -132,6 +132,7 @@ def _wanted(rig: Rig) -> str:
     names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
     names += [dotted("joint_angle", name) for name in rig.tables("joint")]
     names += ["length"] if rig.model["load"] else []
+    names += ["force"] if (rig.model["load"] or {}).get("kind") == "frame" else []
     return ", ".join([*names, *core_rig(rig).inputs])
 
 
@@ -209,7 +210,8 @@ def diagnose(
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, left_out = _problems(case, chosen)
     blocks = inner.blocks
-    gas, motion = [b for b in blocks if b.kind != "arm"], [b for b in blocks if b.kind == "arm"]
+    gas = [b for b in blocks if not b.mechanical]
+    motion = [b for b in blocks if b.mechanical]
     with _in_range(case.name):
         groups = _examined(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
         unsettled = _unsettled(case.rig) if motion else []
@@ -254,13 +256,13 @@ def _examined(
 
 
 def _check_rig(case: Case) -> None:
-    """Refuse rigs that cannot be diagnosed."""
+    """Refuse cases of which no block of their rig can be judged."""
     rig = case.rig
-    if (rig.model["load"] or {}).get("kind") == "frame":
+    if (rig.model["load"] or {}).get("kind") == "frame" and "force" not in case.channels:
         raise DiagnosisError(
-            f"load.kind = 'frame' of case {case.name!r} is not allowed: a frame holds the length, "
-            "and its force is for pamrs fit; 'mass', or a rig with [joint] and [arm], or without a "
-            "muscle, can be diagnosed"
+            f"load.kind = 'frame' of case {case.name!r} holds the length, so that only its force "
+            f"can be judged: every recording needs the channel force; all have "
+            f"{', '.join(case.channels)}"
         )
 
 

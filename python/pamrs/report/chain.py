@@ -31,13 +31,19 @@ CHANNELS = {
     "line": ("line_pressure",),
     "chamber": ("muscle_pressure",),
     "muscle": ("muscle_force",),
-    "joint": ("joint_angle",),
+    "joint": ("joint_angle", "joint_torque"),
     "load": ("length", "force"),
 }
 """Channels that a block can have a sensor, or a command, for."""
 
 ALWAYS = ("supply_pressure", "valve_command", "muscle_pressure", "joint_angle", "length")
 """Channels that are shown where nothing measured them, too."""
+
+MOVED = {"arm": "joint", "torque": "joint", "force": "load"}
+"""Box at which the muscles of a block of the diagnosis end, where it has not the block's name."""
+
+PULLS = ("force", "torque")
+"""Blocks of the diagnosis that are what muscles pull; their residual stands under their boxes."""
 
 ELSEWHERE = {
     "line": ("valve", "supply", "chamber"),
@@ -228,6 +234,7 @@ class _Drawing:
         body += [self._box(p, lines[p.full], *place[p.full], height[p.full]) for p in parts]
         width = max(x for x, _ in place.values()) + BOX + PAD + 5.0
         tall = max(y + height[full] for full, (_, y) in place.items()) + PAD + 6.0
+        tall += 20.0 if any(n.partition(".")[0] in PULLS for n, *_ in self._judged()) else 0.0
         return (
             f'<svg class="chain" viewBox="0 0 {width:.0f} {tall:.0f}" role="img" '
             f'style="min-width:{0.75 * width:.0f}px;max-width:{1.15 * width:.0f}px" '
@@ -268,12 +275,13 @@ class _Drawing:
 
     def _inside(self, kind: str, name: str) -> Iterable[str]:
         """Boxes of a block of the diagnosis: a chamber with what feeds it, a joint or a load with
-        its muscles.
+        its muscles; of a force or torque the muscles alone.
         """
-        target = dotted("joint" if kind in ("arm", "joint") else kind, name)
+        target = dotted(MOVED.get(kind, kind), name)
         if target not in self.parts:
             return
-        yield target
+        if kind not in PULLS:
+            yield target
         if kind == "chamber":  # an outlet that leads nowhere else
             led = {a for p in self.parts.values() for a in p.after}
             outlets = (p for p in self.parts.values() if p.kind == "line" and target in p.after)
@@ -294,10 +302,13 @@ class _Drawing:
     ) -> str:
         """Frame around what is judged together, with its residual."""
         name, inside, mismatch = judged
-        x = min(place[n][0] for n in inside) - PAD
-        y = min(place[n][1] for n in inside) - PAD - 20.0
-        right = max(place[n][0] for n in inside) + BOX + PAD
-        low = max(place[n][1] + height[n] for n in inside) + PAD
+        under = name.partition(".")[0] in PULLS
+        pad = 0.5 * PAD if under else PAD
+        x = min(place[n][0] for n in inside) - pad
+        y = min(place[n][1] for n in inside) - pad - (0.0 if under else 20.0)
+        right = max(place[n][0] for n in inside) + BOX + pad
+        low = max(place[n][1] + height[n] for n in inside) + pad + (20.0 if under else 0.0)
+        title = low - 8.0 if under else y + 17.0
         lit = name == self.diagnosis.where.block
         verdict = next(
             (b.verdict for b in self.diagnosis.blocks if name in b.blocks), "effects" if lit else ""
@@ -314,7 +325,7 @@ class _Drawing:
         return (
             f'<rect x="{x:.1f}" y="{y:.1f}" width="{right - x:.1f}" height="{low - y:.1f}" rx="9" '
             f'fill="{fill}" stroke="{colour}" stroke-width="{2.4 if lit else 1.2}"/>'
-            f'<text x="{x + 9:.1f}" y="{y + 17:.1f}" fill="{"#a33f00" if lit else "#57606a"}" '
+            f'<text x="{x + 9:.1f}" y="{title:.1f}" fill="{"#a33f00" if lit else "#57606a"}" '
             f'font-weight="{700 if lit else 400}">{escape(text)}</text>'
         )
 

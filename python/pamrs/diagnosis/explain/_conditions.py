@@ -75,7 +75,7 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
         )
     for valve, table in rig.tables("valve").items():
         name = dotted("valve_command", valve)
-        if name in prepared.recording.channels and (name in involved or block.kind == "arm"):
+        if name in prepared.recording.channels and (name in involved or block.mechanical):
             opening = np.clip(
                 (prepared.commands[name] - table["null_voltage"]) / table["half_range"], -1, 1
             )

@@ -99,7 +99,7 @@ _BLOWN = replace(
 
 def _telling(block: Block, rig: Rig) -> _Telling:
     """What tells most about a block of a rig whatever is missing there."""
-    if block.kind == "arm":
+    if block.mechanical:
         return _LOOPS
     if is_sealed(rig):
         lines = rig.tables("line") or rig.tables("muscle") or len(rig.tables("chamber")) > 1

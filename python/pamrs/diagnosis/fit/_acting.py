@@ -13,7 +13,7 @@ ACTS: dict[str, tuple[str, ...]] = {
     "valve": ("supply", "chamber"),
     "line": ("supply", "chamber"),
     "chamber": ("chamber",),
-    "muscle": ("arm",),
+    "muscle": ("arm", "pull"),
     "joint": ("arm",),
     "arm": ("arm",),
 }

@@ -191,7 +191,7 @@ def _drive_errors(block: Block, prepared: Prepared, stated: Stated) -> dict[str,
         largest = float(np.abs(prepared.signals[name][0]).max())
         error = stated.get(name, stated.get(channel_of(name), {}))
         sizes = [error.get("size", 0.0), error.get("share", 0.0) * largest]
-        if block.kind == "arm" and channel_of(name) == "muscle_pressure":
+        if block.mechanical and channel_of(name) == "muscle_pressure":
             sizes += [share * largest for share in pulls]
         if any(sizes):
             found[name] = math.hypot(*sizes)

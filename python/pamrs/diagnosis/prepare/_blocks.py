@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
-from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._signals import DRIVES, Prepared
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -54,11 +54,16 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber`` or ``arm`` (of a hanging load too): its name without that of the
-        tank, chamber or joint.
+        """``supply``, ``chamber``, ``arm`` (of a hanging load too) or ``pull`` (what the muscles
+        put on a joint or a load): its name without that of the tank, chamber or joint.
         """
         kind = self.name.partition(".")[0]
-        return "arm" if kind == "load" else kind
+        return {"load": "arm", "force": "pull", "torque": "pull"}.get(kind, kind)
+
+    @property
+    def mechanical(self) -> bool:
+        """Whether muscles and what they move make its output, and not air alone."""
+        return self.kind in ("arm", "pull")
 
 
 _SUPPLY = ("volume", "time_constant", "droop")
@@ -301,6 +306,29 @@ class _Map:
         window, step = self.settings.arm_window, self.settings.arm_step
         return Block("load", "length", drives, window, frozenset(names), step, "muscle and load")
 
+    def pull(self, joint: str) -> Block | None:
+        """The block of what the muscles put on a joint or a load, where that is measured: their
+        pressures and the motion to a torque or a force.
+        """
+        loaded = bool(self.rig.model["load"])
+        channel = "force" if loaded else dotted("joint_torque", joint)
+        pulling = [m for m in self.pulling if loaded or self.joint_of[m] == joint]
+        drives = tuple(dict.fromkeys(dotted("muscle_pressure", self.pulling[m]) for m in pulling))
+        moving = ("length",) if loaded else (dotted("joint_angle", joint),)
+        if not pulling or not {channel, *drives, *self.angles} <= self.has:
+            return None
+        names = {f"{qualified('muscle', m)}.{key}" for m in pulling for key in _MUSCLE}
+        names |= self.zeros([self.pulling[m] for m in pulling], [joint])
+        return Block(
+            "force" if loaded else qualified("torque", joint),
+            channel,
+            (*drives, *moving),
+            None,  # nothing is integrated that could drift
+            frozenset(names),
+            self.settings.arm_step,
+            "muscle" + _called(joint),
+        )
+
 
 def _called(name: str) -> str:
     return f" of {name}" if name else ""
@@ -311,7 +339,8 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     each in the order of the rig file.
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
-    measured channels next to it, with the baseline parameters of what it stands for. A rig with
+    measured channels next to it, with the baseline parameters of what it stands for; and so are
+    muscles whose force (or torque at a joint) is measured. A rig with
     joints or a load and without valves and supplies is driven by the pressures of its muscles:
     these are given, and only what they move is judged.
 
@@ -333,6 +362,7 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     found += [have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
     found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
+    found += [have.pull(name) for name in ([""] if rig.model["load"] else rig.tables("joint"))]
     return [block for block in found if block is not None]
 
 
@@ -405,7 +435,8 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
         for n in prepared.signals
         if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")
     ]
-    return prepared.signals | {name: prepared.begun(name, starts) for name in state}
+    drives = {n: s for n, s in prepared.signals.items() if channel_of(n) in DRIVES}
+    return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
 
 
 def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:

@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
+PULLS = ("force", "joint_torque")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
 COMMANDS = ("valve_command", "supply_command")
 
@@ -273,8 +274,8 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
     signals, raw, noise = {}, {}, {}
-    for name in core.channels:
-        if channel_of(name) not in DRIVES or name not in recording.channels:
+    for name in dict.fromkeys([*core.channels, *pulls_of(rig)]):
+        if channel_of(name) not in (*DRIVES, *PULLS) or name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
         if mask.sum() < max(own.least_channel_samples, own.least_channel_share * mask.size):
@@ -289,6 +290,13 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
     commands = {name: _command(recording, rig, name) for name in core.inputs}
     return Prepared(recording, commands, signals, raw, noise, settings)
+
+
+def pulls_of(rig: Rig) -> list[str]:
+    """Channels of what the muscles of a rig put on its load (a force) or joints (torques)."""
+    if rig.model["load"]:
+        return ["force"]
+    return [dotted("joint_torque", name) for name in rig.tables("joint")]
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:

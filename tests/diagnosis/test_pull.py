@@ -1,0 +1,151 @@
+"""What muscles pull is a block of its own where it is measured: a force on a load frame, a torque
+at a joint.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.errors import DiagnosisError
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+
+SETTINGS = DiagnosisSettings()
+DT = 0.005
+MUSCLE = pamrs.rigs.shoulder().muscle
+assert MUSCLE is not None
+BENCH = pamrs.rigs.bench(MUSCLE)
+REST = BENCH.parameter("muscle.rest_length").value
+ROLES = {"slow": "fit", "fast": "fit", "other": "held_out"}
+
+
+def recorded(name: str, values: dict[str, np.ndarray], noise: dict[str, float]) -> Recording:
+    """A recording with the noise of transducers."""
+    rng = np.random.default_rng([17, list(ROLES).index(name)])
+    channels = {n: v + rng.normal(0.0, noise.get(n, 0.0), v.size) for n, v in values.items()}
+    size = next(iter(values.values())).size
+    mask = {n: np.ones(size, dtype=bool) for n in channels}
+    return Recording(
+        name, ROLES[name], DT * np.arange(size), DT, channels, mask, [], dict.fromkeys(channels, "")
+    )
+
+
+def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
+    """A muscle whose length a frame moves while its pressure goes up and down; the load cell reads
+    ``tare`` [N] at rest.
+    """
+    found = []
+    for k, name in enumerate(ROLES):
+        time = np.arange(0.0, 20.0, DT)
+        length = REST * (
+            0.88
+            + 0.06 * np.sin(2 * np.pi * (0.11 + 0.05 * k) * time)
+            + 0.02 * np.sin(2 * np.pi * 0.37 * time + k)
+        )
+        pressure = 2.2e5 + 1.3e5 * np.sin(2 * np.pi * (0.07 + 0.03 * k) * time + 0.5 * k)
+        run = pamrs.simulate(true, length=length, pressure=pressure, sample_time=DT)
+        channels = {
+            "muscle_pressure": run["muscle_pressure"],
+            "length": length,
+            "force": run["muscle_force"] + tare * (1 + k),
+        }
+        noise = {"muscle_pressure": 300.0, "length": 2e-5, "force": 1.0}
+        found.append(recorded(name, channels, noise))
+    return pamrs.Case("bench", BENCH, found, Path())
+
+
+def test_the_force_is_that_of_a_simulation() -> None:
+    case = pulled(BENCH)
+    (block,) = available_blocks(BENCH, case.channels, SETTINGS.prepare)
+    assert (block.name, block.kind, block.channel) == ("force", "pull", "force")
+    time = np.arange(0.0, 4.0, DT)
+    length, slope = 0.25 + 0.01 * np.sin(time), 0.01 * np.cos(time)
+    pressure, rise = 2e5 + 5e4 * np.sin(2 * time), 1e5 * np.cos(2 * time)
+    signals = {"muscle_pressure": (pressure, rise), "length": (length, slope)}
+    rig = BENCH.with_effect("muscle_hysteresis", {"friction_constant": 5.0, "presliding": 1e-3})
+    found, slopes = core_rig(rig).predict(
+        "force", {}, DT, DT, [0], ["muscle.modulus_scale"], signals, time.size
+    )
+    run = pamrs.simulate(rig, length=length, pressure=pressure, sample_time=DT)
+    np.testing.assert_allclose(found, run["muscle_force"], rtol=1e-3, atol=0.02)
+    assert slopes is not None
+    assert np.all(slopes[:, -1] == 1.0)  # what the load cell reads at rest
+
+
+def test_a_load_cell_that_is_not_zeroed_is_no_missing_physics() -> None:
+    found = pamrs.diagnose(pulled(BENCH, tare=12.0))
+    assert found.verdict in ("none", "parameters")
+    assert found.fit["held_out"]["force"].after < 1.3
+
+
+@pytest.mark.parametrize(
+    ("effect", "values"),
+    [
+        ("muscle_hysteresis", {"friction_constant": 6.0, "friction_pressure": 6e-5}),
+        ("activation_pressure", {"threshold": 2e4}),
+    ],
+)
+def test_what_a_force_lacks_is_named(effect: str, values: dict[str, float]) -> None:
+    found = pamrs.diagnose(pulled(BENCH.with_effect(effect, values)))
+    assert found.verdict == "effects"
+    assert found.probabilities[effect] > 0.9
+    assert found.where["block"] == "force"
+    for name, value in values.items():
+        told = found.effects[0]["parameters"][name]
+        assert abs(told["value"] - value) < 4.0 * told["std"] + 0.02 * value
+    assert found.fit["gap_closed"] > 0.9
+
+
+def test_a_frame_without_its_force_is_refused() -> None:
+    case = pulled(BENCH)
+    bare = [
+        Recording(
+            r.name,
+            r.role,
+            r.time,
+            DT,
+            {n: v for n, v in r.channels.items() if n != "force"},
+            {n: m for n, m in r.mask.items() if n != "force"},
+            [],
+            {},
+        )
+        for r in case.recordings
+    ]
+    with pytest.raises(DiagnosisError, match="every recording needs the channel force"):
+        pamrs.diagnose(pamrs.Case("bench", BENCH, bare, Path()))
+
+
+def turned(true: pamrs.Rig) -> pamrs.Case:
+    """A shoulder that its valve moves, with a torque sensor between the muscles and the joint."""
+    found = []
+    for k, name in enumerate(ROLES):
+        time = np.arange(0.0, 12.0, DT)
+        command = (
+            5.0
+            + (0.35 + 0.1 * k) * np.sin(2 * np.pi * 0.15 * time)
+            + 0.25 * np.sin(2 * np.pi * 0.4 * time + k)
+        )
+        run = pamrs.simulate(true, command, sample_time=DT)
+        measured = ("supply_pressure", "muscle_pressure", "joint_angle", "joint_torque")
+        noise = dict(zip(measured, (400.0, 400.0, 3e-4, 0.3), strict=True))
+        found.append(
+            recorded(name, {"valve_command": command} | {n: run[n] for n in measured}, noise)
+        )
+    return pamrs.Case("torque", pamrs.rigs.shoulder(), found, Path())
+
+
+def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
+    true = pamrs.rigs.shoulder().with_effect(
+        "joint_coulomb_stribeck", {"stiction": 3.0, "stribeck_speed": 0.08}
+    )
+    found = pamrs.diagnose(turned(true))
+    assert found.probabilities["joint_coulomb_stribeck"] > 0.9
+    assert found.where["block"] == "arm"
+    torque = next(m for b in found.blocks for m in b.mismatch if m.block == "torque")
+    assert not torque.fitted.refit.more_than_noise
