@@ -265,6 +265,15 @@ def _check_rig(case: Case) -> None:
             f"{', '.join(case.channels)}"
         )
 
+    varying = set(core_rig(rig).parameter_names)
+    for recording in case.recordings:
+        fixed = [name for name in recording.parameters if name not in varying]
+        if fixed:
+            raise DiagnosisError(
+                f"parameters of recording {recording.name!r}: {', '.join(fixed)} cannot differ "
+                f"between recordings of a diagnosis; what can: {', '.join(sorted(varying))}"
+            )
+
 
 def _said_of_held(rig: Rig) -> list[str]:
     """What the model holds already, and what of it cannot be held, in words."""

@@ -284,6 +284,8 @@ class RecordingUsed(Entry):
         Channels that were recorded and not used, and why.
     masked : dict of str to float
         Share of samples of a channel that could not be used, where there are any.
+    parameters : dict of str to float
+        Parameters of the rig that had another value in it than in the rig file, SI.
     """
 
     recording: str
@@ -295,6 +297,7 @@ class RecordingUsed(Entry):
     used: list[str]
     unused: dict[str, str]
     masked: dict[str, float]
+    parameters: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

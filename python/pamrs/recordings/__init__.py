@@ -13,7 +13,7 @@ from __future__ import annotations
 from pamrs.recordings._case import Case, load_case
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._proposal import LogProposal, Proposal, propose
-from pamrs.recordings._recording import CHANNELS, Issue, Recording, load_recording
+from pamrs.recordings._recording import CHANNELS, Issue, OwnValue, Recording, load_recording
 from pamrs.recordings._suspicion import Suspicion, suspicions
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "Case",
     "Issue",
     "LogProposal",
+    "OwnValue",
     "Proposal",
     "Recording",
     "Suspicion",

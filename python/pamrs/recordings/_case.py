@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import Any, Final
 
 from pamrs._files import is_inside, parse_toml, read_toml
-from pamrs.errors import CaseError, RecordingError, RigError, joined
+from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
-from pamrs.recordings._recording import Recording, load_recording
+from pamrs.recordings._recording import OwnValue, Recording, load_recording
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
+from pamrs.units import to_si
 
 __all__ = ["SCHEMA", "Case", "load_case"]
 
@@ -27,7 +28,8 @@ _FORMAT: Final = ("columns", "delimiter", "header", "thousands", "sample_time", 
 _LOG: Final = ("channels", "time", "split", "pieces")
 _DIALECT: Final = ("delimiter", "decimal", "thousands", "header")
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
-_ENTRY: Final = ("file", "name", "role", "start", "stop", *_FORMAT, *_LOG)
+_ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
+_ERRORS: Final = ("same", "proportional", "none")
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +129,7 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     if outside:  # nothing there is opened
         raise CaseError(joined(str(file), [*problems, *outside]))
     rig = _rig(problems, home, _text(problems, document, "rig", "rig.toml"))
-    recordings = _recordings(problems, home, document.get("recording"), source)
+    recordings = _recordings(problems, home, document.get("recording"), source, rig)
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
     return Case(name, rig, recordings, home, description)
@@ -207,7 +209,9 @@ def _rig(problems: list[str], home: Path, name: str) -> Rig | None:
         return None
 
 
-def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> list[Recording]:
+def _recordings(
+    problems: list[str], home: Path, entries: Any, source: str, rig: Rig | None
+) -> list[Recording]:
     if (
         not isinstance(entries, list)
         or not entries
@@ -231,6 +235,7 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
         if role not in _ROLES:
             problems.append(f"{label}role = {role!r} is not allowed: 'fit' or 'held_out'")
         _formats(problems, label, entry)
+        own = _own_values(problems, label, entry.get("parameters", {}), rig)
         if len(problems) > before:
             continue
         file = home / str(name)
@@ -243,10 +248,11 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
         options = {key: entry[key] for key in _FORMAT if key in entry}
         try:
             if "channels" in entry:
-                recordings += _from_log(file, role, entry, logs)
-                continue
-            recording = load_recording(file, role=role, name=entry.get("name"), **options)
-            recordings.append(recording.between(entry.get("start"), entry.get("stop")))
+                parts = _from_log(file, role, entry, logs)
+            else:
+                whole = load_recording(file, role=role, name=entry.get("name"), **options)
+                parts = [whole.between(entry.get("start"), entry.get("stop"))]
+            recordings += [replace(part, parameters=own) for part in parts]
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
@@ -262,6 +268,50 @@ def _recordings(problems: list[str], home: Path, entries: Any, source: str) -> l
     ):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
+
+
+def _own_values(
+    problems: list[str], label: str, given: Any, rig: Rig | None
+) -> dict[str, OwnValue]:
+    """Parameters that had another value in a recording."""
+    if not isinstance(given, Mapping):
+        problems.append(
+            f"{label}parameters = {given!r} is not allowed: a table of parameters of the rig, such "
+            'as { "arm.payload" = { value = 12, unit = "kg" } }, is needed'
+        )
+        return {}
+    found: dict[str, OwnValue] = {}
+    for name, entry in given.items():
+        where = f"{label}parameters.{name}"
+        try:
+            found[name] = _own_value(name, entry, rig)
+        except ParameterError as error:
+            problems.append(f"{where}: {error}")
+    return found
+
+
+def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
+    """One of them."""
+    table = dict(entry) if isinstance(entry, Mapping) else {"value": entry}
+    value, unit, error = (table.pop(key, None) for key in ("value", "unit", "error"))
+    if table or isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ParameterError(
+            f"{entry!r} is not allowed: a table with value, unit and maybe error is needed"
+        )
+    if error is not None and error not in _ERRORS:
+        raise ParameterError(f"error = {error!r} is not allowed: {', '.join(_ERRORS)}")
+    if rig is None:  # said already
+        return OwnValue(float(value), float(value))
+    known = rig.parameter(name)
+    if not isinstance(unit, str):
+        raise ParameterError(
+            f"unit = {unit!r} is not allowed: a unit like {known.unit!r} is needed"
+        )
+    found = OwnValue(to_si(float(value), unit, known.unit), known.value, error or "same")
+    if error == "proportional" and known.value == 0.0:
+        raise ParameterError("error = 'proportional' needs a value in the rig file that is not 0")
+    rig.with_parameters({name: found.value})  # says what is possible
+    return found
 
 
 def _check_logs(home: Path, entries: list[Mapping[str, Any]]) -> None:

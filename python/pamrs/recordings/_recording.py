@@ -29,6 +29,8 @@ from pamrs.units import parse_unit, to_si
 if TYPE_CHECKING:
     import pandas as pd
 
+    from pamrs.rig import Rig
+
 __all__ = [
     "CHANNELS",
     "REFERENCE_UNITS",
@@ -98,6 +100,39 @@ class Issue:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class OwnValue:
+    """A parameter of the rig that had another value in one recording.
+
+    Attributes
+    ----------
+    value : float
+        Its value there, SI.
+    nominal : float
+        What the rig file of the case says, SI.
+    error : str
+        What the rig file is wrong by there: ``same`` (a fit moves it by as much as elsewhere),
+        ``proportional`` (by the same share), or ``none`` (its value is exact).
+    """
+
+    value: float
+    nominal: float
+    error: str = "same"
+
+    def at(self, elsewhere: float) -> float:
+        """Its value in this recording where a model has another one elsewhere, SI."""
+        if self.error == "none":
+            return self.value
+        if self.error == "proportional":
+            return self.value * elsewhere / self.nominal
+        return self.value + elsewhere - self.nominal
+
+    @property
+    def slope(self) -> float:
+        """How much it changes in this recording with its value elsewhere."""
+        return {"none": 0.0, "proportional": self.value / self.nominal}.get(self.error, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One recording on a uniform grid.
@@ -122,6 +157,8 @@ class Recording:
         SI unit of each channel.
     source : str
         The file that it was read from.
+    parameters : dict of str to OwnValue
+        Parameters of the rig that had another value in it than in the rig file, by dotted name.
     """
 
     name: str
@@ -133,6 +170,7 @@ class Recording:
     issues: list[Issue] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
     source: str = ""
+    parameters: dict[str, OwnValue] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -147,6 +185,26 @@ class Recording:
     def duration(self) -> float:
         """Time of the last sample [s]."""
         return float(self.time[-1])
+
+    def rig_there(self, rig: Rig) -> Rig:
+        """A rig as it was in this recording: with the values that it had there.
+
+        Parameters
+        ----------
+        rig : Rig
+            A model with the values elsewhere.
+
+        Returns
+        -------
+        Rig
+
+        Raises
+        ------
+        ParameterError
+            If the rig has no such parameter, or it cannot have that value.
+        """
+        values = {n: own.at(rig.parameter(n).value) for n, own in self.parameters.items()}
+        return rig.with_parameters(values) if values else rig
 
     def valid(self, *channels: str) -> Mask:
         """Where all these channels may be used; without names, where all that there are may be.

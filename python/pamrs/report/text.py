@@ -611,6 +611,11 @@ def data_sentence(diagnosis: Findings) -> str:
     count = f"{len(data)} recording{'s' if len(data) > 1 else ''}"
     used = dict.fromkeys(name for own in data for name in own.used)
     text = f"Data: {count}, {seconds:.4g} s at {' and '.join(rates)}; used: {', '.join(used)}"
+    text += "".join(
+        f"; {own.recording} with {', '.join(f'{n} = {v:.4g}' for n, v in own.parameters.items())}"
+        for own in data
+        if own.parameters
+    )
     unused = {name: why for own in data for name, why in own.unused.items()}
     if not unused:
         return text

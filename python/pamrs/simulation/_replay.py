@@ -38,7 +38,7 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
 
     Commands of valves and regulators come from the recording, the length of a load frame and the
     pressures of chambers that nothing feeds as well; what a recording leaves unusable holds its
-    last usable value.
+    last usable value. Parameters that had another value in the recording have it.
 
     Parameters
     ----------
@@ -60,6 +60,7 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
     ParameterError
         As :func:`pamrs.simulate`.
     """
+    rig = recording.rig_there(rig)
     drive = _drive(rig, recording)
     prescribed = {"muscle_pressure": drive.get("pressure", {}), "length": drive.get("length")}
     initial = {}

@@ -80,6 +80,7 @@ def data_used(
                     for name, mask in recording.mask.items()
                     if (share := float(np.mean(~mask))) > 0.0
                 },
+                parameters={name: own.value for name, own in recording.parameters.items()},
             )
         )
     return found

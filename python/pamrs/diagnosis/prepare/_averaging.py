@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,14 +108,10 @@ def averaged(recording: Recording, count: int) -> Recording:
         means = parts.sum(axis=1) / np.maximum(good.sum(axis=1), 1)
         channels[name], masks[name] = np.where(usable, means, np.nan), usable
     step = count * recording.sample_time
-    return Recording(
-        recording.name,
-        recording.role,
-        np.arange(size, dtype=np.float64) * step,
-        step,
-        channels,
-        masks,
-        recording.issues,
-        recording.units,
-        recording.source,
+    return replace(
+        recording,
+        time=np.arange(size, dtype=np.float64) * step,
+        sample_time=step,
+        channels=channels,
+        mask=masks,
     )

@@ -439,6 +439,18 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
     return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
 
 
+def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
+    """A compiled rig with the values that it had in a recording."""
+    own = prepared.recording.parameters
+    if not own:
+        return core
+    known = dict(zip(core.parameter_names, core.values.tolist(), strict=True))
+    there = core.revalued({name: value.at(known[name]) for name, value in own.items()})
+    if there is None:
+        raise AssertionError("values of a recording are those of parameters that can vary")
+    return there
+
+
 def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
     """A block's output over a recording, every window from its measured start.
 
@@ -456,6 +468,7 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
     (n,) array
         In the channel's unit.
     """
+    core = _there(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     prediction, _ = core.predict(
         block.name,
@@ -484,6 +497,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     parameters : list of str
         Dotted names for the jacobian, may be empty.
     """
+    core = _there(core, prepared)
     starts = prepared.starts(block.window, block.drives)
     least = prepared.settings.prepare.window_samples_per_state
     # without parameters a free null direction is still wanted for the window's start: ask for one
@@ -506,6 +520,9 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")
+    for name, own in prepared.recording.parameters.items():
+        if name in parameters:
+            jacobian[:, names.index(name)] *= own.slope
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
     )
