@@ -106,6 +106,10 @@ impl Block {
             Self::Chamber(k) => {
                 places.push(layout.mass(k));
                 places.extend(effect_states(rig, Place::Gas(k)));
+                for supply in unread(rig, self, measured) {
+                    places.push(layout.supply(supply));
+                    places.extend(effect_states(rig, Place::Supply(supply)));
+                }
             }
             Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
             Self::Pull(_) => {
@@ -139,6 +143,17 @@ pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     inlets.filter(|place| measured.signal(*place).is_none()).collect()
 }
 
+/// Regulators next to a chamber whose outlet nobody measured: their command says what it is.
+pub(super) fn unread(rig: &Rig, block: Block, measured: &Measured<'_>) -> Vec<usize> {
+    if !matches!(block, Block::Chamber(_)) {
+        return Vec::new();
+    }
+    let spec = &rig.spec().supplies;
+    let near = neighbours(rig, block).into_iter().filter(|place| *place < spec.len());
+    let unread = near.filter(|place| measured.signal(*place).is_none());
+    unread.filter(|place| spec[*place].kind == "regulator").collect()
+}
+
 pub(super) fn check(
     rig: &Rig,
     block: Block,
@@ -164,7 +179,8 @@ pub(super) fn check(
             "the block load cannot be predicted: a frame holds the length".into(),
         ));
     }
-    let hidden = hidden(rig.layout(), measured);
+    let mut hidden = hidden(rig.layout(), measured);
+    hidden.extend(unread(rig, block, measured).into_iter().map(|k| rig.layout().supply(k)));
     for place in neighbours(rig, block) {
         if measured.signal(place).is_none() && !hidden.contains(&place) {
             let name = rig

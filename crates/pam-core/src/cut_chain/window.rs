@@ -1,7 +1,7 @@
 //! The windows of a prediction: each starts from the measurement, and measured neighbours drive the
 //! block through it.
 
-use super::block::Block;
+use super::block::{unread, Block};
 use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
 use super::clock::Clocks;
 use crate::effects::Number;
@@ -196,6 +196,14 @@ impl<'a, S: Number> Cut<'a, S> {
             let place = layout.pressure(rig.wiring.chambers + inlet);
             if let (None, Some(end)) = (self.measured.signal(place), end.place(layout)) {
                 state[place] = state[end];
+            }
+        }
+        // at rest what nobody measures of a regulator's outlet is what it feeds
+        if let (Block::Chamber(gas), regulators) =
+            (self.block, unread(rig, self.block, self.measured))
+        {
+            for supply in regulators {
+                state[layout.supply(supply)] = state[layout.pressure(gas)];
             }
         }
         for gas in 0..layout.gases {

@@ -38,7 +38,8 @@ def depends(block: Block, name: str) -> bool:
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
     info = EFFECTS[effect]
-    return block.kind in (info.acts_in or ACTS.get(info.block, ()))
+    places = info.acts_in or ACTS.get(info.block, ())
+    return any(kind in places for kind in (block.kind, *block.beside))
 
 
 def fits(rig: Rig, effect: str) -> bool:

@@ -42,6 +42,9 @@ class Block:
         Longest integration step [s].
     covers : str
         Blocks of the rig that it stands for, in words.
+    beside : tuple of str
+        Kinds of block that it simulates as well, since nobody measured them: a regulator whose
+        outlet has no gauge.
     """
 
     name: str
@@ -51,6 +54,7 @@ class Block:
     parameters: frozenset[str]
     step: float
     covers: str
+    beside: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -152,14 +156,33 @@ class _Map:
             for name in way.between
         ]
         known = [
-            end for end in others if self._constant(end) and self.pressure(end) not in self.has
+            end
+            for end in others
+            if (self._constant(end) or self._regulator(end)) and self.pressure(end) not in self.has
         ]
         wanted = [self.pressure(end) for end in others if end not in known]
         return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
 
     def _constant(self, block: str) -> bool:
+        return self._kind_of_supply(block) == "constant"
+
+    def _regulator(self, block: str) -> bool:
+        return self._kind_of_supply(block) == "regulator"
+
+    def _kind_of_supply(self, block: str) -> str:
         kind, _, name = block.partition(".")
-        return kind == "supply" and self.rig.tables("supply")[name]["kind"] == "constant"
+        return str(self.rig.tables("supply")[name]["kind"]) if kind == "supply" else ""
+
+    def unread(self, block: str) -> list[str]:
+        """Names of the regulators next to a chamber whose outlet nobody measured: their command
+        says what it is.
+        """
+        ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
+        return [
+            end.partition(".")[2]
+            for end in ends
+            if self._regulator(end) and self.pressure(end) not in self.has
+        ]
 
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
@@ -234,7 +257,7 @@ class _Map:
         pressure is then what is given.
         """
         full = qualified("chamber", name)
-        fed = bool(self.neighbours(full) or self.commands(full))
+        fed = bool(self.neighbours(full) or self.commands(full) or self.unread(full))
         joints = tuple(
             dict.fromkeys(
                 self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
@@ -242,9 +265,11 @@ class _Map:
         )
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return None
+        unread = self.unread(full)
         drives = (
             *self.neighbours(full),
             *self.commands(full),
+            *(dotted("supply_command", supply) for supply in unread),
             *(a for a in self.angles if a.partition(".")[2] in joints),
         )
         if not {self.pressure(full), *drives, *self.angles} <= self.has:
@@ -252,6 +277,7 @@ class _Map:
         names = (
             self.of_ways(full)
             | {f"{full}.{key}" for key in _CHAMBER}
+            | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
             | self.zeros(self.chambers_at(full), joints or [""])
         )
         covers = (
@@ -259,6 +285,7 @@ class _Map:
             if fed
             else "chamber"
         )
+        covers = f"regulator, {covers}" if unread else covers
         step = self.settings.gas_step if fed else self.settings.sealed_step
         window = self.settings.chamber_window if fed else None
         return Block(
@@ -269,6 +296,7 @@ class _Map:
             frozenset(names),
             step,
             covers + _called(name),
+            ("supply",) if unread else (),
         )
 
     def arm(self, joint: str) -> Block | None:

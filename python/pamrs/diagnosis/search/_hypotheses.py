@@ -618,10 +618,15 @@ def _with_same_data(
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
         alike = same_recordings(own, effect, seconds, trial.settings.evidence)
-        if same is not None and alike and (same.effect,) not in there:
+        possible = same is not None and fits(trial.nominal, same.effect)
+        if same is not None and possible and alike and (same.effect,) not in there:
             others.append(_as_other(trial, start, own, same))
         twins = [
-            i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect
+            i
+            for i in EFFECTS.values()
+            if i.same_data is not None
+            and i.same_data.effect == effect
+            and fits(trial.nominal, i.id)
         ]
         others += [_as_twin(trial, start, own, twin) for twin in twins if (twin.id,) not in there]
     return [*found, *(c for c in others if c is not None)]
