@@ -1,0 +1,120 @@
+"""``pamrs replay``: the recordings of a case beside the whole rig simulated from its inputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from pamrs.channels import unit_of
+from pamrs.cli._shared import check_packages, check_writable, progress, rig_named, write
+
+if TYPE_CHECKING:
+    from pamrs.recordings import Case, Recording
+    from pamrs.rig import Rig
+    from pamrs.simulation import Simulation
+
+__all__ = ["replay_command"]
+
+
+def replay_command(
+    case: Annotated[
+        Path,
+        typer.Argument(help="Case folder, or a model that a diagnosis wrote (--model) of one."),
+    ],
+    rig: Annotated[
+        Path | None,
+        typer.Option(help="Model beside the case's own: a file, or a rig of the package."),
+    ] = None,
+    recording: Annotated[
+        str, typer.Option(help="Replay this recording alone; by default all.")
+    ] = "",
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            help="Draw recorded and simulated channels of the recording (PNG); without "
+            "--recording the first held-out one."
+        ),
+    ] = None,
+    allow_outside: Annotated[
+        bool,
+        typer.Option("--allow-outside", help="Read files that lie outside the case folder."),
+    ] = False,
+) -> None:
+    """Simulate the whole rig from what went into it in each recording of a case (commands, and
+    pressures or lengths where nothing drives them), and compare: free-running, from the first
+    sample on. With a diagnosed model its errors stand beside those of the case's own rig.
+    """
+    check_writable(plot)
+    check_packages("plot", *(["matplotlib"] if plot else []))
+    found, model = _loaded(case, rig, allow_outside)
+    chosen = _chosen(found, recording)
+    shown = next((r for r in chosen if r.role == "held_out"), chosen[0])
+    drawn: Simulation | None = None
+    for one in chosen:
+        typer.echo(f"{one.name} ({one.role.replace('_', ' ')}, {one.duration:.4g} s)")
+        with progress(f"simulating {one.name}"):
+            nominal, own = _run(found.rig, one), None if model is None else _run(model, one)
+        for line in _lines(nominal, own, one):
+            typer.echo(line)
+        if one is shown:
+            drawn = own or nominal
+    if plot is not None and drawn is not None:
+        result = drawn
+        recorded = {
+            name: (shown.time[rows], shown.channels[name][rows])
+            for name, rows in shown.mask.items()
+        }
+        write({plot: lambda path: result.plot(path, recorded=recorded)})
+
+
+def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
+    """A case with its own rig, and the model beside it, if there is one."""
+    from pamrs.recordings import load_case
+    from pamrs.rig import load_rig
+
+    if place.is_file() and place.name != "case.toml":
+        own = load_case(place, allow_outside=allow_outside)
+        model = own.rig if rig is None else rig_named(rig)
+        return load_case(own.path, allow_outside=allow_outside), model
+    found = load_case(place, allow_outside=allow_outside)
+    return found, None if rig is None else (rig_named(rig) if rig.suffix == "" else load_rig(rig))
+
+
+def _chosen(case: Case, name: str) -> list[Recording]:
+    """The recordings that are wanted."""
+    from pamrs.errors import ParameterError
+
+    found = [r for r in case.recordings if name in ("", r.name)]
+    if not found:
+        raise ParameterError(
+            f"--recording = {name!r} is not allowed: one of "
+            f"{', '.join(r.name for r in case.recordings)} is needed"
+        )
+    return found
+
+
+def _run(rig: Rig, recording: Recording) -> Simulation | None:
+    """A free run; None, with the reason on standard error, where the rig cannot be run so."""
+    from pamrs.errors import RecordingError, SimulationError
+    from pamrs.simulation import replay
+
+    try:
+        return replay(rig, recording)
+    except (RecordingError, SimulationError) as error:
+        typer.echo(f"{recording.name}: {rig.name} cannot be run: {error}", err=True)
+        return None
+
+
+def _lines(nominal: Simulation | None, own: Simulation | None, recording: Recording) -> list[str]:
+    """One line for each channel that was recorded and simulated."""
+    from pamrs.simulation import differences
+
+    before = {} if nominal is None else differences(nominal, recording)
+    after = {} if own is None else differences(own, recording)
+    found = []
+    for name in before | after:
+        told = [f"{errors[name]:.4g}" for errors in (before, after) if name in errors]
+        found.append(f"  {name}: rms difference {' -> '.join(told)} {unit_of(name)}")
+    return found

@@ -1,0 +1,77 @@
+"""``pamrs replay``: recordings of a case beside the whole rig."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli
+
+DT = 0.01
+
+
+@pytest.fixture
+def case(tmp_path: Path) -> Path:
+    """A case of a shoulder whose muscles lose air, and beside it the model with the leak."""
+    rig = pamrs.rigs.shoulder()
+    true = rig.with_effect("leak_muscle", {"conductance": 2e-9})
+    folder = tmp_path / "case"
+    folder.mkdir()
+    rig.to_toml(folder / "rig.toml")
+    entries = ""
+    for k, (name, role) in enumerate((("waves", "fit"), ("steps", "held_out"))):
+        time = np.arange(0.0, 4.0, DT)
+        command = 5.0 + 0.5 * np.sin((2.0 + k) * time)
+        run = pamrs.simulate(true, command, sample_time=DT)
+        columns = ("supply_pressure", "muscle_pressure", "joint_angle")
+        table = np.column_stack([time, command, *(run[c] for c in columns)])
+        units = ("time [s]", "valve_command [V]", "supply_pressure [Pa]", "muscle_pressure [Pa]")
+        header = ",".join([*units, "joint_angle [rad]"])
+        np.savetxt(folder / f"{name}.csv", table, delimiter=",", header=header, comments="")
+        entries += f'[[recording]]\nfile = "{name}.csv"\nrole = "{role}"\n'
+    (folder / "case.toml").write_text(f'schema = "pamrs.case/1"\n{entries}')
+    true.with_case("case").to_toml(tmp_path / "model.toml")
+    return folder
+
+
+def run(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    code = cli.main([str(word) for word in words])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(
+    capsys: pytest.CaptureFixture[str], case: Path
+) -> None:
+    plot = case.parent / "out.png"
+    code, out, _ = run(capsys, "replay", case.parent / "model.toml", "--plot", plot)
+    assert code == 0
+    assert re.findall(r"^(\w+) \(", out, re.MULTILINE) == ["waves", "steps"]
+    errors = re.findall(r"muscle_pressure: rms difference (\S+) -> (\S+) Pa", out)
+    assert len(errors) == 2
+    for before, after in errors:
+        assert float(before) > 1000.0
+        assert float(after) < 1.0
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
+def test_one_recording_with_the_rig_of_the_case(
+    capsys: pytest.CaptureFixture[str], case: Path
+) -> None:
+    code, out, _ = run(capsys, "replay", case, "--recording", "steps")
+    assert code == 0
+    assert out.startswith("steps (held out")
+    assert "waves" not in out
+    assert "->" not in out
+
+
+def test_a_recording_that_is_not_there_is_named(
+    capsys: pytest.CaptureFixture[str], case: Path
+) -> None:
+    code, _, err = run(capsys, "replay", case, "--recording", "ramps")
+    assert code == 2
+    assert "--recording = 'ramps' is not allowed: one of waves, steps is needed" in err
