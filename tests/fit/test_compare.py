@@ -10,7 +10,7 @@ import pytest
 from pamrs import Muscle
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, compare_models, fit_friction, fit_muscle
-from pamrs.fit._compare import effective_size
+from pamrs.fit._compare import effective_size, recommend
 from tests.fit.cases import REST, TOLERANCE, measure, muscle
 
 
@@ -35,6 +35,32 @@ def test_more_unknowns_win_in_the_fit_but_not_in_the_recommendation():
     assert row(comparison, "kothera", 4)["rms"] < row(comparison, "kothera", 1)["rms"]
     assert comparison.recommended.order == 1
     assert row(comparison, "kothera", 1)["bic"] < row(comparison, "kothera", 4)["bic"]
+
+
+def test_of_equal_predictions_the_plausible_geometry_is_recommended():
+    rows = [
+        {"moved": 5.8, "nvarys": 4, "lopo_rms": 0.0100},
+        {"moved": 1.2, "nvarys": 9, "lopo_rms": 0.0111},
+        {"moved": 0.9, "nvarys": 7, "lopo_rms": 0.0112},
+    ]
+    assert recommend(rows) is rows[2]
+    assert recommend(rows[:1]) is rows[0]  # none is plausible
+
+
+def test_how_far_the_geometry_moved_is_told():
+    real = muscle("kothera", 1)
+    nominal = float(real.parameters["braid_angle"])
+    comparison = compare_models(
+        measure(real, noise=1.0),
+        muscle("kothera", 1, braid_angle=nominal - 0.04),
+        models=["kothera"],
+        free=["braid_angle"],
+        tolerance={"braid_angle": 0.005},
+    )
+    told = row(comparison, "kothera", 1)["moved"]
+    fitted = comparison.fits["kothera", 1].params["braid_angle"].value
+    assert told == pytest.approx(abs(fitted - nominal + 0.04) / 0.005)
+    assert told > 3.0
 
 
 def test_orders_that_the_data_do_not_determine_are_listed_and_not_ranked():

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pamrs.fit._estimate import Estimate, Problem
 from pamrs.fit._statistics import FitParameter
 
-__all__ = ["cautions", "outlying"]
+__all__ = ["FAR", "cautions", "outlying"]
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -24,7 +24,8 @@ Parameters = Mapping[str, FitParameter]
 _LARGE_CONDITION: Final = 1e4
 _NARROW: Final = 0.02  # of the rest length
 _UNINFORMED: Final = 0.9  # of the tolerance
-_FAR: Final = 3.0  # tolerances
+FAR: Final = 3.0
+"""Tolerances from what was known of a size beyond which it is no longer plausible."""
 _MOVED: Final = 0.3  # of the nominal value
 _FEW_SPARE: Final = 5  # points beyond the unknowns
 _STIFF: Final = 1e9  # [Pa], beyond any rubber
@@ -136,7 +137,7 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
                 f"{free.tolerance:.3g} {item.unit})"
             )
         away = abs(item.value - free.nominal) / free.tolerance
-        if away > _FAR:
+        if away > FAR:
             notes.append(
                 f"{place} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} "
                 f"{item.unit}"

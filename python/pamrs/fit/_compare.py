@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import FitError, ParameterError
+from pamrs.fit._cautions import FAR
 from pamrs.fit._design import CONSTANTS, template
 from pamrs.fit._engine import fit_muscle
 from pamrs.fit._result import MuscleFit
@@ -19,6 +20,7 @@ from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODEL
 
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
+    from pamrs.fit._estimate import Free
     from pamrs.rig import Muscle
 
 __all__ = ["ModelComparison", "compare_models"]
@@ -47,7 +49,8 @@ class ModelComparison:
         and its standard error, in squares of the map's largest force; ``aicc``, ``bic``: with the
         effective sample size, ``aicc`` None when that is too small for the number of unknowns;
         ``subset_rms``, ``subset_max``: fitted to the chosen levels only, error on the others, with
-        ``subset_reason`` when impossible; ``recommended``: True for one candidate.
+        ``subset_reason`` when impossible; ``moved``: how far the farthest fitted size lies from
+        what was known of it [tolerances]; ``recommended``: True for one candidate.
     fits : dict of (model, order) to MuscleFit
         The fits of all levels.
     effective_size : float
@@ -74,8 +77,8 @@ class ModelComparison:
 
     @property
     def recommended(self) -> MuscleFit:
-        """The fit with the fewest unknowns of those that predict no worse than the best, see
-        :func:`compare_models`.
+        """The fit with the fewest unknowns of those that predict no worse than the best and whose
+        geometry is plausible, see :func:`compare_models`.
         """
         return self._fit(next(row for row in self.rows if row["recommended"]))
 
@@ -178,9 +181,11 @@ def compare_models(
     best-ranked candidate, and at least the number of pressure levels.
 
     Recommended is the candidate with the fewest unknowns among those that predict no worse than the
-    first rank: the squared errors of each level left out are subtracted level by level, and the
-    mean of these differences may be one standard error at most. Differences of pairs do not know
-    the scatter that all candidates share, such as hysteresis or noise.
+    first rank; one whose fitted geometry lies within three tolerances of what was known of it goes
+    before one whose does not. No worse means: the squared errors of each level left out are
+    subtracted level by level, and the mean of these differences may be one standard error at most.
+    Differences of pairs do not know the scatter that all candidates share, such as hysteresis or
+    noise.
 
     Parameters
     ----------
@@ -284,8 +289,20 @@ def _ranked(
         for row in ranked
         if row["lopo_excess"] <= row["lopo_excess_stderr"] and row["lopo_rms"] <= near
     ]
-    min(eligible, key=lambda row: (row["nvarys"], row["lopo_rms"]))["recommended"] = True
+    recommend(eligible)["recommended"] = True
     return ranked, size
+
+
+def recommend(eligible: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Of candidates that predict equally well: one whose geometry is what it was measured to be, if
+    there is one; of these the one with the fewest unknowns.
+
+    Parameters
+    ----------
+    eligible : sequence of dict
+        Rows of a comparison with ``moved``, ``nvarys`` and ``lopo_rms``.
+    """
+    return min(eligible, key=lambda row: (row["moved"] > FAR, row["nvarys"], row["lopo_rms"]))
 
 
 def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, ...]:
@@ -325,6 +342,7 @@ _EMPTY: dict[str, Any] = dict.fromkeys(
         ("subset_rms"),
         ("subset_max"),
         ("subset_reason"),
+        ("moved"),
     )
 )
 
@@ -342,6 +360,12 @@ def _level_squares(fit: MuscleFit) -> Array:
 def _paired(difference: Array) -> tuple[float, float]:
     """Mean over the levels and its standard error."""
     return float(difference.mean()), float(np.std(difference, ddof=1)) / math.sqrt(len(difference))
+
+
+def _moved(fit: MuscleFit, free: Free) -> float:
+    """How far a fitted size lies from what was known of it, in tolerances; 0 where nothing was."""
+    away = abs(fit.params[free.name].value - free.nominal)
+    return 0.0 if math.isinf(free.tolerance) else float(away / free.tolerance)
 
 
 def _candidate(
@@ -369,6 +393,7 @@ def _candidate(
         "lopo_stderr": cross.rms_stderr,
         "lopo_interior_rms": cross.interior_rms,
         "lopo_end_rms": cross.end_rms,
+        "moved": max((_moved(fit, free) for free in fit.free), default=0.0),
     }
     if levels is not None:
         try:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import FitError
+from pamrs.fit._cautions import FAR
 from pamrs.report.text import format_number
 
 if TYPE_CHECKING:
@@ -328,6 +329,10 @@ def ranking_words(comparison: ModelComparison) -> str:
     if chosen is not best:
         text += (
             f" {title(chosen)} does as well within the uncertainty of that error with "
-            f"{chosen.nvarys} unknowns: take that one."
+            f"{chosen.nvarys} unknowns"
         )
+        moved = next(row["moved"] for row in comparison.rows if row["rank"] == 1)
+        if moved > FAR:
+            text += f", and not with a geometry that is {moved:.1f} tolerances off"
+        text += ": take that one."
     return text
