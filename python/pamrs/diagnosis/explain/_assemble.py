@@ -635,7 +635,8 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectPar
             value,
             std,
             parameter.unit,
-            not unknown_volume and std < max(abs(value), 1e-300),
+            # a pure number does not change with a volume that nobody knows
+            (parameter.unit == "1" or not unknown_volume) and std < max(abs(value), 1e-300),
             parameter.lower,
         )
     if (

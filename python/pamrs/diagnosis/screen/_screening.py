@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -193,7 +193,13 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
 
 
 def screen(
-    problem: Problem, fitted: Fit, effects: list[str], inflation: dict[str, float], *, sealed: bool
+    problem: Problem,
+    fitted: Fit,
+    effects: list[str],
+    inflation: dict[str, float],
+    *,
+    sealed: bool,
+    strong: bool = False,
 ) -> Screen:
     """Signatures of effects at a fitted model.
 
@@ -209,25 +215,75 @@ def screen(
         As in :func:`pamrs.diagnosis.fit.fit`.
     sealed : bool
         Whether the rig has no valve.
+    strong : bool, optional
+        Whether so much is left that a signature at one size tells little of another: each start is
+        then looked at in several.
     """
-    stand, settings = stand_of(fitted, problem, inflation), problem.settings.screen
-    signatures: list[Signature] = []
+    looking = _Looking(problem, fitted, inflation, stand_of(fitted, problem, inflation), strong)
+    for effect in effects:
+        starts = starts_of(effect, sealed=sealed)
+        for form in dict.fromkeys(start.form for start in starts):
+            looking.at([start for start in starts if start.form == form])
+    return Screen(looking.stand, looking.signatures, looking.settings)
 
-    def try_(start: Start, looks: int = settings.most_signatures) -> float:
+
+@dataclass(frozen=True, eq=False)
+class _Looking:
+    """A fitted model at which signatures are taken.
+
+    Attributes
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    fitted : Fit
+        The model.
+    inflation : dict of str to float
+        As in :func:`pamrs.diagnosis.fit.fit`.
+    stand : Stand
+        Where the model stands.
+    strong : bool
+        As in :func:`screen`.
+    signatures : list of (effect, start, (n,) array)
+        Those that were taken.
+    """
+
+    problem: Problem
+    fitted: Fit
+    inflation: dict[str, float]
+    stand: Stand
+    strong: bool
+    signatures: list[Signature] = field(default_factory=list)
+
+    @property
+    def settings(self) -> ScreenSettings:
+        """What it is done by."""
+        return self.problem.settings.screen
+
+    def at(self, starts: list[Start]) -> None:
+        """Add the signatures of one form of an effect, given all its starts."""
+        first = starts[0]
+        parameters = EFFECTS[first.effect].form(first.form).parameters
+        if any(p.scan for p in parameters):
+            for start in _nearest(first, lambda start: self.try_(start, 1), self.signatures):
+                self.try_(start)
+        elif any(p.role == "threshold" for p in parameters):
+            before = len(self.signatures)
+            best = _switched(first, self.problem, lambda start: self.try_(start, 1))
+            self.signatures[before:] = [s for s in self.signatures[before:] if s[1] is best]
+        else:
+            for start in _placed(starts, self.problem, self.fitted.rig):
+                self.try_(start)
+
+    def try_(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; what it would bring."""
-        tried, entry, score = start, None, None
-        for _ in range(looks):
-            try:
-                found = changes(problem, tried.applied(fitted.rig), fitted.residuals, start.effect)
-            except SimulationError:
-                break  # this size leaves the range in which the model holds
-            moved, _ = stacked(problem, found, inflation)
-            entry = (start.effect, tried, moved - stand.rows)
-            scores = Screen(stand, [entry], settings).scores()
-            score = max(scores, key=lambda s: s.gain, default=None)
-            if score is None or score.gain <= 0.0 or not start.scalable:
+        tried, best = start, None
+        for _ in range(self.settings.most_signatures if looks is None else looks):
+            seen = self._look(tried)
+            if seen is None:
                 break
-            if settings.repeat_below <= abs(score.size) < settings.most_size:
+            best = seen
+            score = seen[1]
+            if score is None or score.gain <= 0.0 or not start.scalable or self._placed(score):
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at
             # where it would be
@@ -235,26 +291,41 @@ def screen(
             if wanted == tried:
                 break  # its bounds hold it
             tried = wanted
-        if entry is not None:
-            signatures.append(entry)
-        return -math.inf if score is None else score.gain
+        if self.strong and start.scalable and looks is None:
+            others = [self._look(start.scaled(size)) for size in self.settings.strong_sizes]
+            # what a signature says of other sizes than its own is not relied on
+            known = [seen for seen in (best, *others) if seen is not None]
+            best = max(known, key=lambda seen: self._taken(seen[0]), default=None)
+        if best is None:
+            return -math.inf
+        self.signatures.append(best[0])
+        return _gain(best)
 
-    for effect in effects:
-        starts = starts_of(effect, sealed=sealed)
-        for form in dict.fromkeys(start.form for start in starts):
-            own = [start for start in starts if start.form == form]
-            parameters = EFFECTS[effect].form(form).parameters
-            if any(p.scan for p in parameters):
-                for start in _nearest(own[0], lambda start: try_(start, 1), signatures):
-                    try_(start)
-            elif any(p.role == "threshold" for p in parameters):
-                before = len(signatures)
-                best = _switched(own[0], problem, lambda start: try_(start, 1))
-                signatures[before:] = [entry for entry in signatures[before:] if entry[1] is best]
-            else:
-                for start in _placed(own, problem, fitted.rig):
-                    try_(start)
-    return Screen(stand, signatures, settings)
+    def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
+        """The signature of a start and its score; None where the model cannot be run so."""
+        fitted = self.fitted
+        try:
+            found = changes(self.problem, start.applied(fitted.rig), fitted.residuals, start.effect)
+        except SimulationError:
+            return None  # this size leaves the range in which the model holds
+        rows, _ = stacked(self.problem, found, self.inflation)
+        entry = (start.effect, start, rows - self.stand.rows)
+        return entry, next(iter(Screen(self.stand, [entry], self.settings).scores()), None)
+
+    def _placed(self, score: Score) -> bool:
+        """Whether a signature says that its effect has about the size at which it was taken."""
+        return self.settings.repeat_below <= abs(score.size) < self.settings.most_size
+
+    def _taken(self, entry: Signature) -> float:
+        """What a start takes of the chi-square at its own size."""
+        signature = entry[2]
+        along = float(self.stand.left @ signature)
+        return -2.0 * along - self.stand.power(signature)
+
+
+def _gain(seen: tuple[Signature, Score | None]) -> float:
+    """What a start would bring by its signature."""
+    return -math.inf if seen[1] is None else seen[1].gain
 
 
 def _seen(problem: Problem, channel: str) -> Array | None:

@@ -208,7 +208,11 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     persistent = [e for e in acting if EFFECTS[e].lasting]
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
-    screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed)
+    strong = any(
+        max(kept[b.name].ratio for kept in (now, trial.out)) > settings.search.strong_ratio
+        for b in suspects
+    )
+    screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed, strong=strong)
     terms = _Terms(
         probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
         max(p.n * p.dt for p in trial.inner.recordings),
@@ -582,15 +586,19 @@ def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
 
 
 def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
-    """The starts of an effect that are fitted: the best of each form that comes near, and further
-    ones of the best form.
+    """The starts of an effect that are fitted: the best of each form (and choice in it) that comes
+    near, and further ones of the best.
 
     A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
     """
-    best = {score.start.form: score for score in reversed(scores)}
+
+    def kind(score: Score) -> tuple[str, frozenset[tuple[str, float]]]:
+        return score.start.form, frozenset(score.start.held.items())
+
+    best = {kind(score): score for score in reversed(scores)}
     forms = [s for s in best.values() if s.gain > settings.near_form * scores[0].gain]
     forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
-    alike = [s for s in scores if s.start.form == scores[0].start.form]
+    alike = [s for s in scores if kind(s) == kind(scores[0])]
     near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
     return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
 

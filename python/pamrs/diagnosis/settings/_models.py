@@ -316,6 +316,13 @@ class ScreenSettings(SettingsGroup):
         reason="signatures of one start at the most, each at the size that the last one suggested",
         origin="judgement",
     )
+    strong_sizes: tuple[float, ...] = setting(
+        (0.05, 0.3, 4.0, 20.0),
+        unit="typical sizes",
+        above=0.0,
+        reason="sizes at which each start is looked at beside a strong mismatch",
+        origin="docs/decisions/0049",
+    )
     invisible: float = setting(
         1e-6,
         unit="noise levels^2",

@@ -62,6 +62,14 @@ class SearchSettings(SettingsGroup):
         "explains one of them: no name is then more probable than its absence",
         origin="docs/decisions/0024",
     )
+    strong_ratio: float = setting(
+        100.0,
+        unit="1",
+        above=1.0,
+        reason="variance over that of the noise from which a mismatch is strong: linear signatures "
+        "then say little of an effect's size",
+        origin="ten times the noise; docs/decisions/0049",
+    )
     least_gain: float = setting(
         12.0,
         unit="chi-square",
