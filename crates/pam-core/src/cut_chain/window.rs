@@ -38,6 +38,8 @@ struct Output<S> {
     lagging: Option<usize>,
     /// What the sensor adds.
     offset: S,
+    /// Coordinate whose angle is read.
+    coordinate: Option<usize>,
     /// Length of the muscles at rest [m], where a length is read in the place of a shortening.
     mirrored: Option<f64>,
 }
@@ -110,7 +112,8 @@ impl<'a, S: Number> Cut<'a, S> {
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
             self.command(k, time, &clocks, &mut controls);
-            sink(k, self.output.read(&course.state), &self.stepper, &course.state, &controls);
+            let value = self.output.read(&self.stepper.plant, &course.state);
+            sink(k, value, &self.stepper, &course.state, &controls);
             if k + 1 < n {
                 self.sample(k, &mut course, clocks, &mut controls);
             }
@@ -141,12 +144,12 @@ impl<'a, S: Number> Cut<'a, S> {
     /// Start a window from the measurement.
     fn start_window(&self, k: usize, course: &mut Course<S>) {
         let plant = &self.stepper.plant;
-        let (rig, layout) = (plant.rig(), plant.rig().layout());
+        let layout = plant.rig().layout();
         let before = course.state.clone();
         let state = &mut course.state;
         let dt = self.timing.sample_time;
         let shift = Clocks::of(plant, self.block, k as f64 * dt).neighbour;
-        self.drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, shift, state));
+        self.drivers.iter().for_each(|driver| driver.write(plant, k, 0.0, dt, shift, state));
         for (gas, valve) in &self.taps {
             let place = layout.pressure(*gas);
             state[place] = plant.behind_tube(*gas, state[place], state, course.last.spool[*valve]);
@@ -245,7 +248,7 @@ impl<'a, S: Number> Cut<'a, S> {
                 |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
                     let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
                     for driver in driving {
-                        driver.write(rig, k, share, dt, clocks.neighbour, y);
+                        driver.write(plant, k, share, dt, clocks.neighbour, y);
                     }
                     for (gas, valve) in taps {
                         let place = rig.layout().pressure(*gas);
@@ -275,8 +278,13 @@ impl<S: Scalar> Output<S> {
             Block::Chamber(k) => Some(k),
             _ => None,
         };
-        let arm = matches!(block, Block::Arm(_));
+        let coordinate = match block {
+            Block::Arm(k) => Some(k),
+            _ => None,
+        };
+        let arm = coordinate.is_some();
         Self {
+            coordinate,
             reading: gas.map_or(place, |k| plant.reading(k)),
             lagging: gas.and_then(|k| plant.lagging(k)).map(|(reading, _)| reading),
             offset: if arm { zero } else { zero - rig.gas.ambient_pressure },
@@ -285,7 +293,13 @@ impl<S: Scalar> Output<S> {
     }
 
     /// The channel at a state.
-    fn read(&self, state: &[S]) -> S {
-        self.mirrored.map_or(state[self.reading], |rest| -state[self.reading] + rest) + self.offset
+    fn read(&self, plant: &Plant<'_, S>, state: &[S]) -> S {
+        let value = state[self.reading];
+        let value = match (self.coordinate, self.mirrored) {
+            (_, Some(rest)) => -value + rest,
+            (Some(k), None) => plant.read_angle(k, value),
+            _ => value,
+        };
+        value + self.offset
     }
 }
