@@ -32,6 +32,7 @@ __all__ = [
     "play",
     "restriction",
     "supply_leak",
+    "two_areas",
 ]
 
 #: The arm between two stops, so that the muscle's volume does not change.
@@ -263,6 +264,15 @@ def input_lag(sheet: Sheet) -> None:
 
 def restriction(sheet: Sheet) -> None:
     """Fills and vents at three openings, and the flow at every opening."""
+    _openings(sheet, "flow at 4 bar: short at large openings, both ways")
+
+
+def two_areas(sheet: Sheet) -> None:
+    """The same, of a valve that fills faster than it vents."""
+    _openings(sheet, "flow at 4 bar: more where it fills, less where it vents")
+
+
+def _openings(sheet: Sheet, title: str) -> None:
     axes = sheet.axes("px;vx", width_ratios=[1, 1.1])
     time = clock(0.6, 0.002)
     for letter, start, volts in (("p", 0.5e5, (10.0, 7.0, 6.0)), ("v", 6e5, (0.0, 3.0, 4.0))):
@@ -289,7 +299,7 @@ def restriction(sheet: Sheet) -> None:
         axes["x"].plot(every, [flow(run)[0] for run in maps], color=colour, label=words)
     label(
         axes["x"],
-        "flow at 4 bar: short at large openings, both ways",
+        title,
         "valve [V]",
         "air into the muscle [g/s]",
         "upper left",

@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from fingerprints.sheet import WITH, WITHOUT, Sheet, angle, clock, hold, label, pressure
+from fingerprints.sheet import (
+    BAR,
+    WITH,
+    WITHOUT,
+    Sheet,
+    angle,
+    clock,
+    hold,
+    label,
+    pressure,
+    through,
+)
 
-__all__ = ["late_clock", "late_pressure"]
+__all__ = ["erring_encoder", "late_clock", "late_pressure"]
 
 NAMES = ("without", "with the effect")
 
@@ -35,6 +46,36 @@ def late_pressure(sheet: Sheet) -> None:
         "angle [deg]",
         "muscle [bar]",
         "upper right",
+    )
+
+
+def erring_encoder(sheet: Sheet) -> None:
+    """Slow triangles of the pressure, with the payload and with half of it."""
+    time = clock(60.0, 0.02)
+    axes = sheet.axes("xe", width_ratios=[1.2, 1])
+    for payload, style, words in ((9.07, "-", "payload 9 kg"), (4.5, "--", "payload 4.5 kg")):
+        runs = sheet.run(
+            {"arm.payload": payload},
+            supply_command=BAR * through(time, (0.0, 0.5), (30.0, 3.2), (60.0, 0.5)),
+            sample_time=0.02,
+        )
+        for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
+            axes["x"].plot(pressure(run), angle(run), style, color=colour, label=f"{name}, {words}")
+        axes["e"].plot(angle(runs[0]), angle(runs[1]) - angle(runs[0]), style, color=WITH)
+        axes["e"].plot([], [], style, color=WITH, label=words)
+    label(
+        axes["x"],
+        "what is read, against the pressure",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
+    label(
+        axes["e"],
+        "error of the reading: one curve over the angle",
+        "angle [deg]",
+        "reading less angle [deg]",
+        "lower left",
     )
 
 

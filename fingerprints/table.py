@@ -68,6 +68,14 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"conductance": 1e-10},
         ),
         Experiment(
+            "valve_area",
+            "shoulder",
+            "fills and vents at three openings, and the flow at every opening (the arm held)",
+            "every fill is faster than modelled, every vent slower, by the same share",
+            air.two_areas,
+            {"excess": 0.2},
+        ),
+        Experiment(
             "input_path_lag",
             "shoulder",
             "a large fill, a small fill and a vent, at 0.5 ms (the arm held)",
@@ -213,6 +221,14 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             "the recorded pressure is late, also where motion makes it with the valve shut",
             sensors.late_pressure,
             {"time_constant": 0.02},
+        ),
+        Experiment(
+            "encoder_error",
+            "regulated_joint",
+            "slow triangles of the pressure, with the payload and with half of it",
+            "the error is one curve over the angle, whatever the load and the way",
+            sensors.erring_encoder,
+            {"sine": 0.02, "cosine": 0.01},
         ),
         Experiment(
             "clock_skew",

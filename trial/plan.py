@@ -39,7 +39,7 @@ _SMALL: tuple[tuple[str, tuple[str, ...]], ...] = (
 #: plan `blocks`: effects of the gas blocks, and effects of no catalogue that act in the arm
 GAS = (
     "supply_leak", "compressor_cut_in", "valve_dead_zone", "valve_hysteresis",
-    "valve_centre_leakage", "input_path_lag",
+    "valve_centre_leakage", "valve_area", "input_path_lag",
     "tube_flow_restriction", "leak_muscle", "heat_transfer",
 )  # fmt: skip
 ARM = (
@@ -48,7 +48,6 @@ ARM = (
     "encoder_gear_lash",
     "hose_torque",
     "moment_arm_error",
-    "encoder_eccentricity",
 )
 #: plan `blocks`: parameters that are put far off, by how many tolerances, and the least share of
 #: the nominal value
@@ -92,7 +91,7 @@ def blocks(rng: np.random.Generator, rig: Path | None = None) -> list[Planned]:
     """Cases of plan `blocks`, in no particular order.
 
     Every effect of the gas blocks at medium and strong, alone and beside an effect of no catalogue
-    in the arm at strong and at heavy: 54 cases in groups of three, which share the seed and so the
+    in the arm at strong and at heavy: 60 cases in groups of three, which share the seed and so the
     baseline, the noise and the first effect. Eight parameters far off, upwards and downwards, of
     three sizes: 48. Six nulls and six with parameters only.
     """

@@ -28,7 +28,7 @@ _ACTS = {
     "joint": "arm",
     "arm": "arm",
     "encoder_gear_lash": "arm",
-    "encoder_eccentricity": "arm",
+    "encoder_error": "arm",
     "pressure_lag": "chamber",
     "pressure_zero_drift": "chamber",
 }

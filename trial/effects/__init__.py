@@ -16,7 +16,7 @@ from .base import RECORDING_PERIOD, Effect, Env, Setting, Start
 from .chamber import HeatTransfer, Leak
 from .joint import EndStop, HoseTorque, MomentArm, Stribeck, TendonCompliance
 from .muscle import ActivationPressure, Buckling, Creep, Crowding, Hysteresis, Mullins, RateDamping
-from .sensors import ClockSkew, Eccentricity, GearLash, PressureDrift, PressureLag
+from .sensors import ClockSkew, EncoderError, GearLash, PressureDrift, PressureLag
 from .supply import Compressor, SupplyCooling, SupplyLeak
 from .valve import (
     CentreLeakage,
@@ -25,27 +25,28 @@ from .valve import (
     InputLag,
     NullDrift,
     TubeRestriction,
+    ValveArea,
     ValveHysteresis,
 )
 
 _LISTED: tuple[type[Effect], ...] = (
-    SupplyLeak, Compressor, DeadZone, ValveHysteresis, CentreLeakage, InputLag, TubeRestriction,
-    Leak, HeatTransfer,
+    SupplyLeak, Compressor, DeadZone, ValveHysteresis, CentreLeakage, ValveArea, InputLag,
+    TubeRestriction, Leak, HeatTransfer,
     Hysteresis, Creep, RateDamping, ActivationPressure, Mullins, Crowding, Stribeck, EndStop,
     PayloadSwing,
-    PayloadChange, ExternalTorque, BaseFlexibility, PressureLag, ClockSkew,
+    PayloadChange, ExternalTorque, BaseFlexibility, PressureLag, EncoderError, ClockSkew,
 )  # fmt: skip
 _UNLISTED: tuple[type[Effect], ...] = (
     TendonCompliance, NullDrift, Buckling, GearLash, HoseTorque, SupplyCooling, ExhaustBackPressure,
     MomentArm,
-    Eccentricity, PressureDrift,
+    PressureDrift,
 )  # fmt: skip
 TYPES: dict[str, type[Effect]] = {t.id: t for t in (*_LISTED, *_UNLISTED)}
 LISTED = tuple(t.id for t in _LISTED)
 UNLISTED = tuple(t.id for t in _UNLISTED)
 KINDS = ("none", "parameters", *LISTED, *UNLISTED)
 #: order in which the command passes through the effects of the valve
-_SHAPERS = ("valve_null_drift", "valve_hysteresis", "valve_dead_zone")
+_SHAPERS = ("valve_null_drift", "valve_hysteresis", "valve_dead_zone", "valve_area")
 
 
 class Effects:

@@ -124,16 +124,17 @@ class GearLash(Effect):
 
 
 @dataclass(frozen=True)
-class Eccentricity(Effect):
-    """Encoder disc off centre: the angle reads ``a + A sin(a + phase) + B sin(2 a + phase)`` (in no
-    catalogue); A, B [rad].
+class EncoderError(Effect):
+    """Magnetic encoder off its axis: the angle reads ``a + A sin(a + phase) + B sin(2 a + phase) +
+    C sin(4 a)``, the last by the iron around it; A, B [rad], C in parts of A.
     """
 
-    id: ClassVar[str] = "encoder_eccentricity"
+    id: ClassVar[str] = "encoder_error"
     block: ClassVar[str] = "sensors"
     graded: ClassVar[tuple[str, ...]] = ("first", "second")
     first: float
     second: float
+    fourth: float
     phase: float
 
     @classmethod
@@ -141,15 +142,17 @@ class Eccentricity(Effect):
         return cls(
             math.radians(uniform(rng, 0.05, 0.08)),
             math.radians(uniform(rng, 0.01, 0.04)),
+            uniform(rng, 0.1, 0.2),
             uniform(rng, 0.0, 2.0 * math.pi),
         )
 
     def read(self, env: Env, first: int) -> Port:
         a, b, phase, sin = self.first, self.second, self.phase, math.sin
+        c = self.fourth * a
         return lambda p, ps, angle, y: (
             p,
             ps,
-            angle + a * sin(angle + phase) + b * sin(2.0 * angle + phase),
+            angle + a * sin(angle + phase) + b * sin(2.0 * angle + phase) + c * sin(4.0 * angle),
         )
 
 

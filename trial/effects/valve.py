@@ -116,6 +116,38 @@ class CentreLeakage(Effect):
 
 
 @dataclass(frozen=True)
+class ValveArea(Effect):
+    """Window of the sleeve that narrows beyond a knee: a share `excess` more opening per stroke
+    below `knee` (a part of half the stroke), less above it, the same at the end; `venting` of it on
+    the side that vents.
+    """
+
+    id: ClassVar[str] = "valve_area"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("excess",)
+    excess: float
+    knee: float
+    venting: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        return cls(uniform(rng, 0.1, 0.3), uniform(rng, 0.25, 0.5), uniform(rng, 0.5, 1.0))
+
+    def most(self) -> float:
+        return 0.8 * (1.0 / self.knee - 1.0) / max(self.excess, 1e-9)
+
+    def opening(self, x: float) -> float:
+        """Effective opening, -1..1, of a normalised spool command."""
+        size = abs(x)
+        more = self.excess if x > 0.0 else self.excess * self.venting
+        low, high = size / self.knee, (1.0 - size) / (1.0 - self.knee)
+        return x + math.copysign(more * self.knee * max(min(low, high), 0.0), x)
+
+    def shaper(self, env: Env) -> Port:
+        return lambda x, t: self.opening(x)
+
+
+@dataclass(frozen=True)
 class InputLag(Effect):
     """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s],
     slower for big steps.

@@ -127,6 +127,8 @@ _KNOWN: tuple[Form, ...] = (
          lambda e, p: {"half_width": e.half_width}),
     Form("valve_centre_leakage", "exponential", KNOWN, _own(more.FadingLeakage), True,
          lambda e, p: {"conductance": e.conductance, "opening": e.reach}),
+    Form("valve_area", "two_areas", KNOWN, _own(more.TwoOpenings)),
+    Form("valve_area", "bend", KNOWN, _own(more.BentOpening)),
     Form("input_path_lag", "dead_time", KNOWN, _plain("input_path_lag", lag=0.0), True,
          lambda e, p: {"delay": e.pure}),
     Form("input_path_lag", "delay_slew", KNOWN, _plain("input_path_lag")),
@@ -167,6 +169,7 @@ _KNOWN: tuple[Form, ...] = (
          lambda e, p: {"compliance": e.compliance, "damping_ratio": e.damping}),
     Form("pressure_lag", "first_order", KNOWN, _own(more.FirstOrderReading), True,
          lambda e, p: {"time_constant": e.lag}),
+    Form("encoder_error", "first_and_second", KNOWN, _plain("encoder_error", fourth=0.0)),
     Form("clock_skew", "offset_rate", KNOWN, _plain("clock_skew"), True,
          lambda e, p: {"offset": e.offset, "rate": e.skew}),
 )  # fmt: skip
@@ -175,6 +178,7 @@ _OTHER: tuple[Form, ...] = (
     Form("compressor_cut_in", "pulsating", OTHER, _plain("compressor_cut_in")),
     Form("valve_dead_zone", "rounded", OTHER, _plain("valve_dead_zone")),
     Form("valve_hysteresis", "dahl", OTHER, _plain("valve_hysteresis")),
+    Form("valve_area", "knee", OTHER, _plain("valve_area")),
     Form("valve_centre_leakage", "lengthening", OTHER, _plain("valve_centre_leakage")),
     Form("input_path_lag", "jitter", OTHER, _own(more.JitterDelay)),
     Form("tube_flow_restriction", "elastic_hose", OTHER, _own(more.ElasticHose)),
@@ -196,9 +200,10 @@ _OTHER: tuple[Form, ...] = (
     Form("external_torque", "wind", OTHER, _wind),
     Form("base_flexibility", "hardening", OTHER, _post),
     Form("pressure_lag", "snubber", OTHER, _plain("pressure_lag")),
+    Form("encoder_error", "fourth", OTHER, _plain("encoder_error")),
     Form("clock_skew", "jitter", OTHER, _own(more.ClockJitter)),
 )  # fmt: skip
-#: families of no catalogue; gear lash, eccentricity and drifts of the first plans are left out,
+#: families of no catalogue; gear lash and drifts of the first plans are left out,
 #: since a catalogue is to have them
 _NO_CATALOGUE = (
     "tendon_compliance",

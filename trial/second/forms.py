@@ -532,6 +532,51 @@ class Waves(Effect):
 
 
 @dataclass(frozen=True)
+class TwoOpenings(Effect):
+    """A share `difference` more opening where the valve fills, less where it vents; no wider than
+    the stroke.
+    """
+
+    id: ClassVar[str] = "valve_area"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("difference",)
+    difference: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        sign = 1.0 if rng.random() < 0.5 else -1.0
+        return cls(sign * uniform(rng, 0.05, 0.15))
+
+    def most(self) -> float:
+        return 0.8 / max(abs(self.difference), 1e-9)
+
+    def shaper(self, env: Env) -> Port:
+        more, less = 1.0 + self.difference, 1.0 - self.difference
+        return lambda x, t: min(x * more, 1.0) if x > 0.0 else max(x * less, -1.0)
+
+
+@dataclass(frozen=True)
+class BentOpening(Effect):
+    """Opening that bends over the stroke, ``x (1 + b (1 - |x|))``; the ends stay."""
+
+    id: ClassVar[str] = "valve_area"
+    block: ClassVar[str] = "valve"
+    graded: ClassVar[tuple[str, ...]] = ("bend",)
+    bend: float
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
+        sign = 1.0 if rng.random() < 0.5 else -1.0
+        return cls(sign * uniform(rng, 0.1, 0.3))
+
+    def most(self) -> float:
+        return 0.8 / max(abs(self.bend), 1e-9)
+
+    def shaper(self, env: Env) -> Port:
+        return lambda x, t: x * (1.0 + self.bend * max(1.0 - abs(x), 0.0))
+
+
+@dataclass(frozen=True)
 class FirstOrderReading(Effect):
     """First-order lag [s] of the transducer of the muscle pressure."""
 

@@ -209,8 +209,16 @@ impl<S: Scalar> Driven<'_, S> {
     /// True state at a fraction of sample `k`, read so much later [s] where another clock records
     /// it; an angle brings its rate along.
     #[inline]
-    pub fn write(&self, rig: &Rig, k: usize, fraction: f64, dt: f64, shift: S, state: &mut [S]) {
-        let layout = rig.layout();
+    pub fn write(
+        &self,
+        plant: &Plant<'_, S>,
+        k: usize,
+        fraction: f64,
+        dt: f64,
+        shift: S,
+        state: &mut [S],
+    ) {
+        let (rig, layout) = (plant.rig(), plant.rig().layout());
         let (cell, t, inside) = if self.shifted {
             self.signal.later(k, fraction, dt, shift.re())
         } else {
@@ -235,6 +243,13 @@ impl<S: Scalar> Driven<'_, S> {
                 state[self.place] += more * slope;
                 state[self.place + layout.coordinates] += more * bend;
             }
+        }
+        let coordinate = self.place.checked_sub(layout.angle(0));
+        if let Some(k) = coordinate.filter(|k| plant.misreads(*k)) {
+            let angle = plant.true_angle(k, state[self.place]);
+            state[self.place] = angle;
+            let rate = state[self.place + layout.coordinates];
+            state[self.place + layout.coordinates] = rate / plant.encoder_gain(k, angle);
         }
     }
 }

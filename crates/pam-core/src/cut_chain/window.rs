@@ -46,6 +46,8 @@ struct Reading<S> {
     lagging: Option<usize>,
     /// What the sensor adds.
     offset: S,
+    /// Coordinate whose angle is read.
+    coordinate: Option<usize>,
     /// Length of the muscles at rest [m], where a length is read in the place of a shortening.
     mirrored: Option<f64>,
 }
@@ -132,7 +134,7 @@ impl<'a, S: Number> Cut<'a, S> {
     fn read(&mut self, course: &Course<S>) -> S {
         let Stepper { plant, scratch, .. } = &mut self.stepper;
         match &self.output {
-            Output::State(reading) => reading.read(&course.state),
+            Output::State(reading) => reading.read(plant, &course.state),
             Output::Pull(k, rest) => plant.pull(*k, &course.state, &course.memory, scratch) + *rest,
         }
     }
@@ -160,12 +162,12 @@ impl<'a, S: Number> Cut<'a, S> {
     /// Start a window from the measurement.
     fn start_window(&self, k: usize, course: &mut Course<S>) {
         let plant = &self.stepper.plant;
-        let (rig, layout) = (plant.rig(), plant.rig().layout());
+        let layout = plant.rig().layout();
         let before = course.state.clone();
         let state = &mut course.state;
         let dt = self.timing.sample_time;
         let shift = Clocks::of(plant, self.block, k as f64 * dt).neighbour;
-        self.drivers.iter().for_each(|driver| driver.write(rig, k, 0.0, dt, shift, state));
+        self.drivers.iter().for_each(|driver| driver.write(plant, k, 0.0, dt, shift, state));
         for (gas, valve) in &self.taps {
             let place = layout.pressure(*gas);
             state[place] = plant.behind_tube(*gas, state[place], state, course.last.spool[*valve]);
@@ -274,7 +276,7 @@ impl<'a, S: Number> Cut<'a, S> {
                 |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
                     let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
                     for driver in driving {
-                        driver.write(rig, k, share, dt, clocks.neighbour, y);
+                        driver.write(plant, k, share, dt, clocks.neighbour, y);
                     }
                     for (gas, valve) in taps {
                         let place = rig.layout().pressure(*gas);
@@ -307,8 +309,13 @@ impl<S: Scalar> Output<S> {
             Block::Chamber(k) => Some(k),
             _ => None,
         };
-        let arm = matches!(block, Block::Arm(_));
+        let coordinate = match block {
+            Block::Arm(k) => Some(k),
+            _ => None,
+        };
+        let arm = coordinate.is_some();
         Self::State(Reading {
+            coordinate,
             reading: gas.map_or(place, |k| plant.reading(k)),
             lagging: gas.and_then(|k| plant.lagging(k)).map(|(reading, _)| reading),
             offset: if arm { zero } else { zero - rig.gas.ambient_pressure },
@@ -319,7 +326,13 @@ impl<S: Scalar> Output<S> {
 
 impl<S: Scalar> Reading<S> {
     /// The channel at a state.
-    fn read(&self, state: &[S]) -> S {
-        self.mirrored.map_or(state[self.reading], |rest| -state[self.reading] + rest) + self.offset
+    fn read(&self, plant: &Plant<'_, S>, state: &[S]) -> S {
+        let value = state[self.reading];
+        let value = match (self.coordinate, self.mirrored) {
+            (_, Some(rest)) => -value + rest,
+            (Some(k), None) => plant.read_angle(k, value),
+            _ => value,
+        };
+        value + self.offset
     }
 }

@@ -36,6 +36,7 @@ catalogue! {
     valve_dead_zone,
     valve_hysteresis,
     valve_centre_leakage,
+    valve_area,
     input_path_lag,
     tube_flow_restriction,
     leak_muscle,
@@ -53,6 +54,7 @@ catalogue! {
     external_torque,
     base_flexibility,
     pressure_lag,
+    encoder_error,
     clock_skew,
     #[cfg(feature = "toy")]
     toy_joint_spring = "../../tests/toy/toy_spring.rs",

@@ -13,6 +13,8 @@ use std::fmt::Debug;
 pub enum Port {
     /// Valve: the way from the command to the opening.
     Command,
+    /// Valve: the share of its largest area that an opening gives. One effect at most.
+    Area,
     /// Valve: what its flow passes through. One effect at most, with one state: what a pressure
     /// sensor in front of it reads.
     Passage,
@@ -46,6 +48,8 @@ pub enum Port {
     Mounting,
     /// Chamber: what its pressure sensor reads. One effect at most, with one state: the reading.
     Reading,
+    /// Joint: what the sensor of its angle reads. One effect at most.
+    Encoder,
     /// The clock of what is recorded.
     Clock,
 }
@@ -205,6 +209,12 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         self.position(own, input, step)
     }
 
+    /// [`Port::Area`]: share of the largest area [1] where the table says `share`, above zero where
+    /// that is.
+    fn area(&self, share: S, _venting: bool) -> S {
+        share
+    }
+
     /// [`Port::Passage`]: mass flow [kg/s] through an area [m2] between two pressures; against the
     /// arrow where it vents.
     fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, _venting: bool) -> S {
@@ -338,6 +348,12 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// [`Port::Reading`]: how far the sensor lags [s].
     fn lag(&self) -> S {
         constant(0.0)
+    }
+
+    /// [`Port::Encoder`]: what the sensor adds to a true angle [rad], and its slope by the angle,
+    /// which is above -1.
+    fn misread(&self, _angle: S) -> (S, S) {
+        (constant(0.0), constant(0.0))
     }
 
     /// [`Port::Clock`]: how late pressures and angles are recorded at a time [s].

@@ -38,12 +38,12 @@ impl<S: Scalar> Plant<'_, S> {
             let spool = controls.spool[k];
             let pressure = state[self.layout.pressure(unit.to)];
             if spool.re() > 0.0 {
-                let area = valve.area * unit.table.eval(spool);
+                let area = valve.area * self.share(k, unit.table.eval(spool), false);
                 let upstream = self.pressure_at(unit.from, state);
                 let flow = self.valve_flow(k, area, upstream, pressure, false);
                 here.pass(unit.from, Node::Gas(unit.to), flow);
             } else if spool.re() < 0.0 {
-                let area = valve.area * unit.table.eval(-spool);
+                let area = valve.area * self.share(k, unit.table.eval(-spool), true);
                 let flow = self.valve_flow(k, area, pressure, ambient, true);
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
@@ -58,6 +58,24 @@ impl<S: Scalar> Plant<'_, S> {
         }
         if self.altered.flows {
             self.effect_flows(state, controls, here);
+        }
+    }
+
+    /// Share of a valve's largest area where its table gives one [1].
+    #[inline(always)]
+    pub(super) fn share(&self, valve: usize, share: S, venting: bool) -> S {
+        if self.altered.areas {
+            self.altered_share(valve, share, venting)
+        } else {
+            share
+        }
+    }
+
+    #[inline(never)]
+    fn altered_share(&self, valve: usize, share: S, venting: bool) -> S {
+        match &self.wiring.ports.area[valve] {
+            None => share,
+            Some(acting) => self.effect(acting).area(share, venting),
         }
     }
 
@@ -246,8 +264,10 @@ impl Plant<'_, f64> {
                 Node::Ambient => {}
             }
         };
-        for (unit, valve) in wiring.valves.iter().zip(&self.valves) {
-            let slope = gas.steepest(valve.area * unit.table.eval(1.0));
+        for (k, (unit, valve)) in wiring.valves.iter().zip(&self.valves).enumerate() {
+            let full = unit.table.eval(1.0);
+            let most = self.share(k, full, false).max(self.share(k, full, true));
+            let slope = gas.steepest(valve.area * most);
             add(Node::Gas(unit.to), unit.from, slope);
             add(unit.from, Node::Gas(unit.to), slope);
         }

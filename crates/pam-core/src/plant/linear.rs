@@ -164,7 +164,8 @@ impl Rig {
             }
         }
         let named = self.names.initial.len();
-        let c = (0..named).flat_map(|k| self.reading_of(k, &moving)).collect();
+        let plant = Plant::new(self, self.parameters().lift::<f64>(), false)?;
+        let c = (0..named).flat_map(|k| plant.reading_of(k, &moving, state)).collect();
         let inputs = self.names.inputs[commands].to_vec();
         let outputs = self.names.initial.iter().map(|(name, _)| name.clone()).collect();
         Ok(LinearModel {
@@ -248,14 +249,18 @@ impl Rig {
         }
         Ok(())
     }
+}
 
-    /// What the sensor of a named state reads, by all states of the model.
-    fn reading_of(&self, named: usize, moving: &[Moving]) -> Vec<f64> {
-        let (layout, place) = (&self.layout, self.names.initial[named].1);
+impl Plant<'_, f64> {
+    /// What the sensor of a named state reads, by all states of the model, about a state of rest.
+    fn reading_of(&self, named: usize, moving: &[Moving], state: &[f64]) -> Vec<f64> {
+        let (layout, place) = (&self.layout, self.rig.names.initial[named].1);
         let gas = place.checked_sub(layout.pressure(0)).filter(|gas| *gas < layout.gases);
         let lagging = gas.and_then(|gas| self.wiring.ports.reading[gas]);
         let read = lagging.map_or(place, |acting| layout.effect(acting.first));
-        moving.iter().map(|m| f64::from(u8::from(m.place == read))).collect()
+        let moves = place.checked_sub(layout.angle(0)).map(|k| k % layout.coordinates);
+        let gain = moves.map_or(1.0, |k| self.encoder_gain(k, state[layout.angle(k)]));
+        moving.iter().map(|m| if m.place == read { gain } else { 0.0 }).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 mod air;
 mod body;
 mod discrete;
+mod encoder;
 pub mod layout;
 pub mod linear;
 pub mod memory;

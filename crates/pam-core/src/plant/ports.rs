@@ -66,6 +66,7 @@ pub(crate) struct Ports {
     pub all: Vec<(Place, Acting)>,
     /// Of each valve.
     pub command: Vec<Vec<Acting>>,
+    pub area: Vec<Option<Acting>>,
     pub passage: Vec<Option<Acting>>,
     pub flows: Vec<(Flow, Acting)>,
     /// Of each supply.
@@ -84,6 +85,8 @@ pub(crate) struct Ports {
     pub payload: Vec<(usize, Acting)>,
     pub hanging: Option<(usize, Acting)>,
     pub mounting: Option<Acting>,
+    /// Of each coordinate.
+    pub encoder: Vec<Option<Acting>>,
     pub clock: Vec<Acting>,
     /// States of all effects.
     pub states: usize,
@@ -188,6 +191,7 @@ pub(super) fn switch_on(
 ) -> Result<()> {
     let mut ports = Ports {
         command: vec![Vec::new(); wiring.valves.len()],
+        area: vec![None; wiring.valves.len()],
         passage: vec![None; wiring.valves.len()],
         feed: vec![Vec::new(); wiring.supplies.len()],
         balance: vec![None; wiring.gases.len()],
@@ -196,6 +200,7 @@ pub(super) fn switch_on(
         muscles: vec![MusclePorts::default(); wiring.groups.len()],
         torque: vec![Vec::new(); wiring.coordinates.len()],
         push: vec![Vec::new(); wiring.coordinates.len()],
+        encoder: vec![None; wiring.coordinates.len()],
         ..Ports::default()
     };
     let mut places = Vec::new();
@@ -419,6 +424,7 @@ impl Ports {
         self.needs_states(port, acting)?;
         let taken = match (port, place) {
             (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
+            (Port::Area, Place::Valve(k)) => self.area[k].replace(acting),
             (Port::Passage, Place::Valve(k)) => {
                 let gas = wiring.valves[k].to;
                 self.tap[gas] = self.tap[gas].or(Some((k, acting)));
@@ -459,6 +465,7 @@ impl Ports {
             (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
             (Port::Hanging, Place::Joint(k)) => self.hang(k, acting, wiring, spec)?,
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
+            (Port::Encoder, Place::Joint(k)) => self.encoder[k].replace(acting),
             (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
             _ => {
                 let id = self.effects[acting.effect].info.id;

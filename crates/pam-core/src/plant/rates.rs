@@ -151,6 +151,7 @@ pub struct Plant<'a, S> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Altered {
     pub supplies: bool,
+    pub areas: bool,
     pub passages: bool,
     pub flows: bool,
     pub balances: bool,
@@ -163,6 +164,7 @@ impl Altered {
     fn at(ports: &Ports) -> Self {
         Self {
             supplies: ports.on_supplies(),
+            areas: ports.area.iter().any(Option::is_some),
             passages: ports.passage.iter().any(Option::is_some),
             flows: !ports.flows.is_empty(),
             balances: ports.on_balance(),
@@ -552,8 +554,13 @@ impl Plant<'_, f64> {
                 Channel::Pressure(k) => {
                     state[self.reading(k)] - ambient + zero(wiring.gases[k].pressure_zero)
                 }
-                Channel::Angle(k) => state[layout.angle(k)] + zero(wiring.coordinates[k].zero),
-                Channel::Rate(k) => state[layout.rate(k)],
+                Channel::Angle(k) => {
+                    self.read_angle(k, state[layout.angle(k)]) + zero(wiring.coordinates[k].zero)
+                }
+                Channel::Rate(k) => {
+                    let gain = self.encoder_gain(k, state[layout.angle(k)]);
+                    state[layout.rate(k)] * gain
+                }
                 Channel::Length => {
                     wiring.groups[0].rest_length - state[layout.angle(0)]
                         + zero(wiring.coordinates[0].zero)

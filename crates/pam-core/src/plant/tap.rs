@@ -90,6 +90,7 @@ impl<S: Scalar> Plant<'_, S> {
         if spool.re() == 0.0 {
             return (constant(0.0), filling);
         }
-        (self.valves[valve].area * table.eval(if filling { spool } else { -spool }), filling)
+        let share = table.eval(if filling { spool } else { -spool });
+        (self.valves[valve].area * self.share(valve, share, !filling), filling)
     }
 }

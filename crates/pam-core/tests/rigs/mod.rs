@@ -141,6 +141,7 @@ pub const TYPICAL: &[Typical] = &[
         &[("conductance", 1e-9), ("opening", 0.05)],
         &[("conductance", 0.0)],
     ),
+    typical("valve_area", &[("excess", 0.15)], &[("excess", 0.0)]),
     typical(
         "input_path_lag",
         &[("time_constant", 0.012), ("delay", 0.015)],
@@ -223,6 +224,11 @@ pub const TYPICAL: &[Typical] = &[
     ),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
     typical(
+        "encoder_error",
+        &[("sine", 0.01), ("cosine", -0.02)],
+        &[("sine", 0.0), ("cosine", 0.0)],
+    ),
+    typical(
         "clock_skew",
         &[("offset", 0.012), ("rate", 1e-3), ("angle_share", 0.4)],
         &[("offset", 0.0), ("rate", 0.0)],
@@ -259,6 +265,7 @@ pub const FORMS: &[Typical] = &[
         &[("conductance", 1e-9), ("opening", 0.05)],
         &[("conductance", 0.0)],
     ),
+    formed("valve_area", "bend", &[("excess", 0.3)], &[("excess", 0.0)]),
     formed(
         "leak_muscle",
         "power",
@@ -349,6 +356,12 @@ pub const FORMS: &[Typical] = &[
         "ramp",
         &[("mass_change", 1.5), ("time", 0.153), ("duration", 0.402)],
         &[("mass_change", 0.0)],
+    ),
+    formed(
+        "encoder_error",
+        "first_and_second",
+        &[("sine", 0.01), ("cosine", -0.02), ("sine_2", 0.003), ("cosine_2", 0.004)],
+        &[("sine", 0.0), ("cosine", 0.0), ("sine_2", 0.0), ("cosine_2", 0.0)],
     ),
     formed("external_torque", "constant", &[("torque", 6.0)], &[("torque", 0.0)]),
     formed(
