@@ -561,12 +561,33 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     for place, effect in enumerate(chosen):
         several = place < settings.effects_with_starts
         near = _near(ranked[effect], settings) if several else ranked[effect][:1]
-        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near]
+        begun = [s.start.scaled(s.size) for s in near]
+        tried = [trial.fitted([start], baseline, white) for start in begun]
+        tried += [trial.fitted([start], baseline, white) for start in _larger(begun, tried)]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
             alike = trial.settings.evidence.form_share_alike
             found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
     return found
+
+
+def _larger(begun: list[Start], tried: list[Candidate | None]) -> list[Start]:
+    """Starts of other forms whose fit did not move, as much larger as the best form became.
+
+    The size of a start is that of a linear signature. Of an effect that moves a signal by most of
+    its range it falls short many times, and the slopes there lead nowhere.
+    """
+    pairs = [(start, c) for start, c in zip(begun, tried, strict=True) if c is not None]
+    if not pairs:
+        return []
+    best, grown = min(pairs, key=lambda pair: _left_everywhere(pair[1]))
+    still = [
+        start
+        for start, c in pairs
+        if start.form != best.form and all(c.fit.values[n] == v for n, v in start.free.items())
+    ]
+    times = [grown.fit.values[n] / best.free[n] for n in best.sizes if best.free[n]]
+    return [start.scaled(times[0]) for start in still if times and times[0] > 1.0]
 
 
 def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
