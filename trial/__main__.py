@@ -1,5 +1,5 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``,
-``blocks``, ``real`` and ``selfcheck``.
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks``
+and ``selfcheck``.
 """
 
 from __future__ import annotations
@@ -47,15 +47,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m trial", description="Blinded trial of the diagnosis on concealed data."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    for add in (
-        _add_write,
-        _add_make,
-        _add_score,
-        _add_report,
-        _add_blocks,
-        _add_real,
-        _add_selfcheck,
-    ):
+    for add in (_add_write, _add_make, _add_score, _add_report, _add_blocks, _add_selfcheck):
         add(commands.add_parser)
     return parser
 
@@ -312,33 +304,6 @@ def _blocks(args: argparse.Namespace) -> None:
         raise ValueError(f"--first {args.first} is not allowed: at least 1")
     results = args.results or args.folder / "results"
     print(f"written: {blocks_page(args.folder, results, args.out, args.words, first=args.first)}")
-
-
-# ------------------------------------------------------------------------------ real
-
-
-def _add_real(add: Add) -> None:
-    real = add("real", help="diagnose the recordings of others and write their budgets as a page")
-    real.add_argument("out", type=Path, help="folder for the arm's cases and the results")
-    real.add_argument("--cases", type=Path, default=Path("cases"), help="(default: cases)")
-    real.add_argument(
-        "--recordings",
-        type=Path,
-        default=Path("../shared/recordings"),
-        help="where they are (default: ../shared/recordings)",
-    )
-    real.add_argument("--page", type=Path, required=True, help="the page")
-    real.set_defaults(run=_real)
-
-
-def _real(args: argparse.Namespace) -> None:
-    from .real import page
-
-    def say(text: str) -> None:
-        print(text, file=sys.stderr, flush=True)
-
-    write(args.page, page(args.cases, args.recordings, args.out, say))
-    print(f"written: {args.page}")
 
 
 # ------------------------------------------------------------------------- selfcheck

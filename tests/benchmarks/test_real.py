@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from trial.real import (
+from benchmarks.real import (
     CHAMBERS,
     LEAKING,
     arm_text,

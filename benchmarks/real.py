@@ -1,4 +1,5 @@
-"""The recordings of others: what the diagnosis says about each, as one page of budgets.
+"""``python -m benchmarks.real OUT --page PAGE``: what the diagnosis says about the recordings of
+others, as one page of budgets.
 
 Seven sealed chambers and four cylinders (Zillen, TU Delft) and the base joint of a four-joint arm
 (Shaj et al., on the arm of Buechler et al.). The recordings are read where they are; nothing of
@@ -8,8 +9,10 @@ them is written. No key exists: what is known of a rig is a sentence, and the ma
 
 from __future__ import annotations
 
+import argparse
 import importlib.util
 import json
+import sys
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,14 +25,13 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.errors import RecordingError
+from pamrs.errors import PamrsError, RecordingError
 from pamrs.fit.cylinder.compare import compare_friction_laws
 from pamrs.fit.cylinder.friction import fit_cylinder_friction
 from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
 from pamrs.recordings import Case
 from pamrs.simulation import core_rig
-
-from .summary import table
+from trial.summary import table
 
 Array = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -275,7 +277,7 @@ sentence, and the answer is marked **right**, **wrong** or **cannot tell**.
 Made by
 
 ```
-python -m trial real out/real --recordings ../shared/recordings --page docs/proof/real_recordings.md
+python -m benchmarks.real out/real --page docs/proof/real_recordings.md
 ```
 
 A share is of the mean square error above the noise that the nominal model leaves, on held-out
@@ -292,14 +294,11 @@ printing methods by how well they hold pressure; it gives no law of the leak and
 CHAMBER_AFTER = """
 - There is nothing in these shares of friction, hysteresis or a unit of pressure: no block but the
   chamber is recorded, and the unit is documented.
-- **Known to be wrong: the law of the leak of Ultimaker_020.** The name is right. The slope of the
-  pressure follows the gauge pressure to a power of 1.0 to 1.2, not the laminar law. Form `power`
-  with an exponent of 1.10 leaves 0.42 kPa instead of 8.5 kPa, but its fit begins at a conductance
-  that is 20 times too small and an exponent of 1.5, and does not move from there. The slopes that
-  the fit uses leave out how the correction of the window's start changes with the parameters; so
-  far from the recording that is most of the slope, and its sign is wrong. A fit from 2e-11
-  m3/(s Pa) ends in the right place. The time constant given for 020 therefore belongs to a law that
-  does not fit; the interval does not cover that.
+- **The law of the leak.** Told from the slope of the pressure alone, both leaks follow the gauge
+  pressure to a power between 1.0 and 1.3, not the laminar law. Until this page was made the answer
+  for Ultimaker_020 was the laminar law with 6.6 ± 0.5 s, which left 8.5 kPa: the fit of form
+  `power` began at a conductance 20 times too small and did not move. It is begun again now. What
+  is left of 020 is still three times what the form can reach (0.42 kPa at an exponent of 1.10).
 - The exponent of Ultimaker_015 is listed as undetermined, because the volume is unknown. It does
   not depend on the volume: 1.253 is determined. Its interval is that of a model that still misses
   2.5 noises, and says nothing of the law's own error.
@@ -437,3 +436,36 @@ def page(cases: Path, recordings: Path, out: Path, say: Say, units: Sequence[flo
             arm_text(arms, parts),
         ]
     )
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the command line; 0 when the page is written, 2 when the input is wrong."""
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.real", description="Budgets of the recordings of others."
+    )
+    parser.add_argument("out", type=Path, help="folder for the arm's cases and the results")
+    parser.add_argument("--cases", type=Path, default=Path("cases"), help="(default: cases)")
+    parser.add_argument(
+        "--recordings",
+        type=Path,
+        default=Path("../shared/recordings"),
+        help="where they are (default: ../shared/recordings)",
+    )
+    parser.add_argument("--page", type=Path, required=True, help="the page")
+    args = parser.parse_args(words)
+
+    def say(text: str) -> None:
+        print(text, file=sys.stderr, flush=True)
+
+    try:
+        text = page(args.cases, args.recordings, args.out, say)
+        args.page.write_text(text, encoding="utf-8")
+    except (PamrsError, ValueError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    print(f"written: {args.page}")
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
