@@ -15,6 +15,10 @@ from pathlib import Path
 
 from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
+from trial.plan import MANIFEST
+from trial.report import checked
+from trial.second.marks import is_second
+from trial.second.peers import beside, peers_page
 from trial.sidebyside import compared, side_by_side
 
 
@@ -52,8 +56,13 @@ def main(words: list[str] | None = None) -> int:
             args.jobs,
             lambda text: print(text, file=sys.stderr, flush=True),
         )
-        if (args.folder / "keys").is_dir():
-            text = side_by_side(compared(args.folder / "keys", results))
+        keys = args.folder / "keys"
+        if keys.is_dir():
+            text = (
+                peers_page(beside(keys, results), _made(args.folder))
+                if is_second(keys)
+                else side_by_side(compared(keys, results))
+            )
             print(text)
             if args.markdown is not None:
                 args.markdown.write_text(text + "\n", encoding="utf-8")
@@ -63,6 +72,14 @@ def main(words: list[str] | None = None) -> int:
     for name, why in failed.items():
         print(f"{name}: {why}")
     return 3 if failed else 0
+
+
+def _made(folder: Path) -> str:
+    """Of which trial and by which command a page of the second plan is."""
+    words = " Made by `python -m benchmarks.baselines second_out --markdown PAGE`."
+    if not (folder / MANIFEST).is_file():
+        return words
+    return f"{words} SHA-256 of the manifest: `{checked(folder)[0]}`."
 
 
 if __name__ == "__main__":

@@ -16,7 +16,7 @@ from pamrs._writing import write_atomically
 from pamrs.diagnosis.prove import case_digest
 
 SCHEMA = "pamrs.baselines/1"
-METHODS = ("refit", "sindy", "gp")
+METHODS = ("refit", "free", "sindy", "gp")
 
 
 def examined(folder: Path) -> dict[str, Any]:
@@ -41,7 +41,8 @@ def examined(folder: Path) -> dict[str, Any]:
     table: dict[str, dict[str, float]] = {}
     for column in laid.columns:
         refit, noise = errors(column)
-        table[column.block.channel] = {"noise": noise, "refit": refit}
+        free = errors(column, free=True)[0]
+        table[column.block.channel] = {"noise": noise, "refit": refit, "free": free}
     models: dict[str, dict[str, str]] = {}
     for method, correct in (("sindy", sindy.correct), ("gp", gaussian.correct)):
         began = time.perf_counter()

@@ -6,17 +6,18 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Key, Problem, residuals
+from pamrs.diagnosis.fit import Fit, Key, Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.search import refitted, with_autocorrelation
+from pamrs.errors import SimulationError
 from pamrs.recordings import load_case
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -88,13 +89,14 @@ class Stretch:
 @dataclass(frozen=True, eq=False)
 class Column:
     """One block: its stretches to learn from and those held out (the same when nothing is held
-    out).
+    out); `free` are the held-out ones by the model whose parameters no tolerance holds.
     """
 
     block: Block
     names: tuple[str, ...]
     inner: list[Stretch]
     outer: list[Stretch]
+    free: list[Stretch] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,11 +127,29 @@ class Sheet:
         return self.p_value < ALPHA
 
 
-def _refitted(inner: Problem, nominal: Rig) -> tuple[Rig, dict[str, float]]:
-    """Baseline inside its tolerances, as the diagnosis refits it."""
+def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
+    """Baseline inside its tolerances, as the diagnosis refits it; and fitted on without them, as
+    far as the bounds of :class:`pamrs.diagnosis.FitSettings` let a parameter go (None where that
+    model cannot be run).
+    """
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    best, _ = with_autocorrelation(inner, nominal, first)
-    return best.rig, best.moved
+    best, weights = with_autocorrelation(inner, nominal, first)
+    own = inner.settings.fit
+    try:
+        free = fit(
+            inner,
+            nominal,
+            (),
+            {},
+            weights,
+            warm=best,
+            freed=tuple(free_baseline(inner, nominal)),
+            evaluations=own.baseline_evaluations,
+            share=own.final_step_share,
+        )
+    except SimulationError:
+        return best, None
+    return best, free
 
 
 def _signals(prepared: Prepared, rig: Rig) -> dict[str, Array]:
@@ -209,14 +229,16 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
             continue
         inner = Problem(members, fitted, core, settings)
         outer = Problem(members, held, core, settings) if held else inner
-        model, distances = _refitted(inner, rig)
-        for name, value in distances.items():
+        best, free = _refitted(inner, rig)
+        model = best.rig
+        for name, value in best.moved.items():
             moved[name] = max(value, moved.get(name, 0.0), key=abs)
         noise_level = noise_levels(inner, core.respecified(model.to_json()))
         if held:
             noise_level |= noise_levels(outer, core.respecified(model.to_json()))
         found = residuals(inner, model)
         outside = residuals(outer, model) if held else found
+        freely = _outside(outer, free, outside)
 
         def lay(
             block: Block,
@@ -237,10 +259,21 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
                     names,
                     stretches,
                     [lay(block, p, outside) for p in held] if held else stretches,
+                    [lay(block, p, freely) for p in held or fitted],
                 )
             )
             chances.append(_chance(block, fitted, found, noise_level))
     return Sheet(case.name, columns, min(1.0, min(chances) * len(chances)), moved)
+
+
+def _outside(outer: Problem, free: Fit | None, kept: dict[Key, Residual]) -> dict[Key, Residual]:
+    """Held-out residuals of the free refit; those of the other one where it cannot be run there."""
+    if free is None:
+        return kept
+    try:
+        return residuals(outer, free.rig)
+    except SimulationError:
+        return kept
 
 
 def _chance(
@@ -261,12 +294,14 @@ def _chance(
     return float(chi2.sf(total, max(1, count)))
 
 
-def errors(column: Column, corrections: list[Array] | None = None) -> tuple[float, float]:
+def errors(
+    column: Column, corrections: list[Array] | None = None, *, free: bool = False
+) -> tuple[float, float]:
     """Root mean square of a block's held-out residual, and its noise level, in the channel's
-    unit.
+    unit; of the refit without tolerances where `free`.
     """
     squares, floors_, weights = [], [], []
-    for i, stretch in enumerate(column.outer):
+    for i, stretch in enumerate(column.free if free else column.outer):
         r = stretch.residual
         value = r.value if corrections is None else stretch.corrected(corrections[i])
         squares.append(float(np.mean(value[r.rows] ** 2)) if r.rows.any() else 0.0)

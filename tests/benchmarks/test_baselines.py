@@ -56,9 +56,10 @@ def test_a_leak_and_a_tight_chamber(tmp_path, capsys):
         assert set(told["models"]) == {"sindy", "gp"}
     assert leak["detected"]["refit"] is True
     assert leak["gap_closed"]["refit"] == 0.0
+    assert 0.0 <= leak["gap_closed"]["free"] < 0.9  # a zero and an exponent are no leak
     assert 0.0 <= leak["gap_closed"]["sindy"] <= 1.0
     assert tight["detected"]["refit"] is False
-    assert tight["gap_closed"] == {"refit": None, "sindy": None, "gp": None}
+    assert tight["gap_closed"] == {"refit": None, "free": None, "sindy": None, "gp": None}
     stamp = (out / "leak.json").stat().st_mtime_ns
     (tmp_path / "cases" / "tight" / "hold_0.csv").unlink()
     assert main([str(tmp_path)]) == 3  # the one is kept, the other another case now, and broken

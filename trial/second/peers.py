@@ -1,0 +1,285 @@
+"""Other methods on cases of the second plan: how much of the error each closes by stratum, and what
+a user can read from them.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from ..sidebyside import SCHEMA
+from ..summary import percent, table
+from .marks import CHANNEL, Mark, marks
+
+METHODS = {
+    "refit": "refit inside tolerances",
+    "free": "refit, free",
+    "sindy": "SINDy",
+    "gp": "Gaussian process",
+    "pamrs": "pamrs",
+}
+LEARNING = ("sindy", "gp")
+STRATA = ("strength", "model error", "truth", "effects", "form", "block", "rig")
+WORSE = 1.05
+"""Held-out error over that of the refit from which a correction has made it worse."""
+NOTHING = "no correction"
+TERM = re.compile(r"(?<=\s)[+-]\d")
+"""Where a term of an equation of SINDy begins."""
+ALONE = "one free log"
+ALIKE = 0.05
+"""Difference of two shares of a gap from which one is larger."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """One case by every method.
+
+    Attributes
+    ----------
+    mark : Mark
+        What the diagnosis said of it.
+    gaps : dict of str to float or None
+        Share of the gap from the refit to the noise that each closes; None: there is none.
+    worse : dict of str to bool
+        Whether some channel's held-out error is more than 5 % above that of the refit.
+    block : dict of str to str
+        Block whose error a method takes most off, in noises; empty where it takes nothing off.
+    acts : tuple of str
+        Blocks in which an effect acts or a parameter is wrong.
+    silent : dict of str to bool
+        Whether a learning method corrects nothing.
+    terms : int
+        Terms of all equations of SINDy.
+    alarm : bool
+        Whether the refit's chi-square raises an alarm.
+    seconds : float
+        Of the clock, all methods but the diagnosis.
+    """
+
+    mark: Mark
+    gaps: dict[str, float | None]
+    worse: dict[str, bool]
+    block: dict[str, str]
+    acts: tuple[str, ...]
+    silent: dict[str, bool]
+    terms: int
+    alarm: bool
+    seconds: float
+
+    @property
+    def healthy(self) -> bool:
+        """Whether neither an effect acts nor a parameter is far off."""
+        return not self.acts
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one recording, so that a method is judged on what it learned from."""
+        return ALONE in self.mark.tags["log"]
+
+
+def _noises(held_out: dict[str, dict[str, float]], method: str) -> dict[str, float]:
+    """What a method takes off each block's held-out error, in noises; of the arm that of its angle
+    or its length.
+    """
+    places = {channel: block for block, channel in CHANNEL.items()}
+    found: dict[str, float] = {}
+    for channel, e in held_out.items():
+        block = places.get(channel, "arm")
+        found[block] = found.get(block, 0.0) + (e["refit"] - e[method]) / e["noise"]
+    return found
+
+
+def _one(mark: Mark, key: dict[str, Any], told: dict[str, Any]) -> Beside:
+    held = told["held_out"]
+    others = [m for m in METHODS if m != "pamrs"]
+    gaps = {m: told["gap_closed"].get(m) for m in others}
+    gaps["pamrs"] = None if gaps["refit"] is None else mark.gap
+    block = {}
+    for m in others[1:]:
+        off = _noises(held, m)
+        best = max(off, key=lambda name, off=off: off[name])  # type: ignore[misc]
+        block[m] = best if off[best] > 0.0 else ""
+    equations = [t for t in told["models"]["sindy"].values() if t != NOTHING]
+    kinds = ("effect", "parameter")
+    return Beside(
+        mark,
+        gaps,
+        {m: any(e[m] > WORSE * e["refit"] for e in held.values()) for m in others[1:]},
+        block,
+        tuple(sorted({str(t["block"]) for t in key["terms"] if t["kind"] in kinds})),
+        {m: set(told["models"][m].values()) == {NOTHING} for m in LEARNING},
+        sum(len(TERM.findall(text.partition("=")[2])) for text in equations),
+        bool(told["detected"]["refit"]),
+        sum(told["seconds"].values()),
+    )
+
+
+def beside(keys: Path, results: Path) -> list[Beside]:
+    """Every case of a trial that the other methods were run on.
+
+    Parameters
+    ----------
+    keys : Path
+        Folder with the keys.
+    results : Path
+        Results of the diagnosis, with ``baselines/NAME.json``.
+
+    Raises
+    ------
+    ValueError
+        A result of another schema.
+    """
+    found = []
+    for mark in marks(keys, results):
+        file = Path(results) / "baselines" / f"{mark.case}.json"
+        if not file.is_file():
+            continue
+        told = json.loads(file.read_text(encoding="utf-8"))
+        if told.get("schema") != SCHEMA:
+            raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+        key = json.loads((Path(keys) / f"{mark.case}.json").read_text(encoding="utf-8"))
+        found.append(_one(mark, key, told))
+    return found
+
+
+def _gap_line(name: str, cases: Sequence[Beside]) -> tuple[str, ...] | None:
+    """Median gap closed by every method, over the cases in which each has one."""
+    whole = [c.gaps for c in cases if all(c.gaps[m] is not None for m in METHODS)]
+    if not whole:
+        return None
+    middle = [median(g[m] or 0.0 for g in whole) for m in METHODS]
+    return (name, str(len(whole)), *(f"{v:.2f}" for v in middle))
+
+
+def _order(value: str) -> tuple[float, str]:
+    try:
+        return float(value.split(" ")[0]), value
+    except ValueError:
+        return 1e9, value
+
+
+def _gaps(cases: Sequence[Beside]) -> list[str]:
+    every = [c for c in cases if not c.healthy]
+    ill = [c for c in every if not c.alone]
+    head = ("cases", *METHODS.values())
+    lines = [
+        _gap_line("with recordings held out", ill),
+        _gap_line("one recording, judged on what was fitted", [c for c in every if c.alone]),
+    ]
+    parts = [table(("all that lack something", *head), filter(None, lines))]
+    for name in STRATA:
+        values = sorted({v for c in ill for v in c.mark.tags.get(name, ())}, key=_order)
+        lines = [_gap_line(v, [c for c in ill if v in c.mark.tags.get(name, ())]) for v in values]
+        rows = [line for line in lines if line is not None]
+        if rows:
+            parts += ["", table((name, *head), rows)]
+    return parts
+
+
+def _pairs(cases: Sequence[Beside]) -> str:
+    """In how many cases the diagnosis closes more than each of the others, as much, and less."""
+    ill = (c for c in cases if not c.healthy and not c.alone)
+    whole = [c.gaps for c in ill if None not in c.gaps.values()]
+    rows = []
+    for m in list(METHODS)[:-1]:
+        ahead = [(g["pamrs"] or 0.0) - (g[m] or 0.0) for g in whole]
+        more, less = sum(d > ALIKE for d in ahead), sum(d < -ALIKE for d in ahead)
+        rows.append((METHODS[m], str(more), str(len(ahead) - more - less), str(less)))
+    return table(("pamrs against", "closes more", "alike, within 0.05", "closes less"), rows)
+
+
+def _count(cases: Sequence[Beside], hit: Callable[[Beside], bool]) -> str:
+    hits = sum(hit(c) for c in cases)
+    return f"{hits} of {len(cases)}; {percent(hits, len(cases))}" if cases else "-"
+
+
+def _read(cases: Sequence[Beside]) -> str:
+    """What a user can read from each method."""
+    ill = [c for c in cases if not c.healthy and not c.alone]
+    well = [c for c in cases if c.healthy]
+    clean = [c for c in well if "0 %" in c.mark.tags["model error"]]
+    named = [c for c in ill if c.mark.leading is not None]
+    none = ("0 by construction",) * 4
+    columns = [m for m in METHODS if m not in ("refit", "pamrs")]
+
+    def line(
+        word: str, group: Sequence[Beside], hit: Callable[[Beside, str], bool], last: str
+    ) -> tuple[str, ...]:
+        told = [_count(group, lambda c, m=m: hit(c, m)) for m in columns]  # type: ignore[misc]
+        return (word, "-", *told, last)
+
+    odd = ("effects", "unlisted")
+    rows = [
+        ("right effect named first", *none, _count(named, lambda c: bool(c.mark.leading))),
+        line("block that it corrects most is at fault", ill, lambda c, m: c.block[m] in c.acts,
+             "-"),
+        line("corrects nothing though something is missing", ill,
+             lambda c, m: not c.block[m] or c.silent.get(m, False), "-"),
+        line("a channel is worse than after the refit", ill, lambda c, m: c.worse[m], "-"),
+        ("says that something is missing where nothing is", _count(clean, lambda c: c.alarm), "-",
+         *(_count(clean, lambda c, m=m: not c.silent[m]) for m in LEARNING),  # type: ignore[misc]
+         _count(clean, lambda c: c.mark.verdict in odd)),
+        ("says that something is missing where there is model error alone",
+         _count([c for c in well if c not in clean], lambda c: c.alarm), "-",
+         *(_count([c for c in well if c not in clean], lambda c, m=m: not c.silent[m])  # type: ignore[misc]
+           for m in LEARNING),
+         _count([c for c in well if c not in clean], lambda c: c.mark.verdict in odd)),
+    ]  # fmt: skip
+    return table(("", *METHODS.values()), rows)
+
+
+def peers_page(cases: Sequence[Beside], head: str = "") -> str:
+    """Markdown: gaps closed by stratum, what can be read, every case; `head` closes the first
+    paragraph.
+    """
+    lengths = [c.terms for c in cases if not c.silent["sindy"]]
+    spent = [c.seconds for c in cases]
+    said = f"median {median(lengths):.0f}, most {max(lengths)}" if lengths else "none"
+    parts = [
+        "# Other methods on cases of the second plan\n",
+        f"{len(cases)} cases, the recordings that the diagnosis had. A refit of the parameters "
+        "inside their tolerances (3 of them at most) is where all begin. `refit, free` goes on "
+        "without tolerances, to 10 times the value or 30 tolerances. SINDy and a Gaussian process "
+        "learn what that refit leaves, from measured signals, and correct it only where this helps "
+        "on recordings left out one at a time (with one recording to fit SINDy corrects nothing, "
+        "and the Gaussian process always)." + head + "\n",
+        "What was cut to keep it short: SINDy has 3 libraries, orders 0 to 2 and 2 thresholds, on "
+        "means over 0.02 s; the Gaussian process has 600 points (300 for its lengths). No case has "
+        "a limit of time, and none needed one.\n",
+        "## Gap closed, median\n",
+        "Share of the way from the error after a refit inside the tolerances to the noise, on "
+        "held-out recordings, all channels in noises together; 0 where a method makes it worse. "
+        "Cases without an effect and without a wrong value are left out, and those whose refit "
+        "leaves no gap. A case may stand in several lines. With one recording nothing is held out, "
+        "and a method is judged on what it learned from: those cases have one line, and are in no "
+        "other table but that of alarms.\n",
+        *_gaps(cases),
+        "\n## Case by case\n",
+        _pairs(cases),
+        "\n## What a user can read from them\n",
+        _read(cases),
+        "\nThe refits give parameters, and say nothing when those are absurd. SINDy gives an "
+        f"equation of the residual in measured signals ({said} terms in a case); its block is "
+        "that of the residual, its terms are signals such as `dp` or `|q|`, and one effect "
+        "appears under several of them. The Gaussian process gives lengths of a kernel. An alarm "
+        "of SINDy or the Gaussian process is that it corrects anything; they have no test.\n",
+        "## Every case\n",
+        table(
+            ("case", "truth", *METHODS.values(), "pamrs said"),
+            [_case_line(c) for c in cases],
+        ),
+        f"\nMedian {median(spent):.0f} s for all other methods on a case, longest {max(spent):.0f} "
+        f"s, {sum(spent) / 60.0:.0f} min together.",
+    ]
+    return "\n".join(parts) + "\n"
+
+
+def _case_line(case: Beside) -> tuple[str, ...]:
+    values = (case.gaps[m] for m in METHODS)
+    shown = ("-" if v is None else f"{v:.2f}" for v in values)
+    return (case.mark.case, case.mark.truth, *shown, case.mark.said)
