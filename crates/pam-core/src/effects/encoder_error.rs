@@ -19,12 +19,18 @@ use crate::scalar::{constant, Scalar};
 /// as steep, added as squares.
 const MOST: f64 = 0.1;
 
+/// What encoders on a shaft err by, one standard deviation [rad]: half a degree. Larger amplitudes
+/// stand for something else that goes with the angle, a moment arm or a weight.
+const USUAL: f64 = 0.01;
+
 const SINE: EffectParameter = EffectParameter::new("sine", "rad", -MOST, MOST, 0.005)
     .starts(&[-0.005, 0.005])
+    .prior(0.0, USUAL)
     .off(0.0)
     .same_everywhere();
 const COSINE: EffectParameter = EffectParameter::new("cosine", "rad", -MOST, MOST, 0.0)
     .starts(&[0.005])
+    .prior(0.0, USUAL)
     .off(0.0)
     .same_everywhere();
 

@@ -194,6 +194,8 @@ def _weigh(
     odd = evidence.standing_price * stands(tried, seconds) + unlikely(
         tried, visited(trial.inner), evidence
     )
+    if odd > settings.log_odds:
+        return  # it would have to have values that its physics hardly has
     cost = price(tried, trial.settings)
     if gain > settings.least_gain and over > settings.held_out_share * gain:
         found.shown[tried] = (
