@@ -219,7 +219,7 @@ def _values(told: dict[str, Any]) -> str:
     parts = []
     for effect in told["effects"] if told["verdict"] == "effects" else []:
         for name, entry in effect["parameters"].items():
-            if entry.get("interval") and (entry["identifiable"] or name == "exponent"):
+            if entry.get("interval") and entry["identifiable"]:
                 low, high = entry["interval"]
                 parts.append(
                     f"{name} {entry['value']:.3g} ({low:.3g} to {high:.3g}) {entry['unit']}"

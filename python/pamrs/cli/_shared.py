@@ -17,6 +17,10 @@ import typer
 from pamrs._writing import check_writable
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pamrs.recordings import Recording
     from pamrs.rig import Muscle, Rig
 
 __all__ = [
@@ -30,6 +34,7 @@ __all__ = [
     "progress",
     "quantity",
     "rig_named",
+    "usable_samples",
     "write",
 ]
 
@@ -120,6 +125,16 @@ def rig_named(file: Path) -> Rig:
     return (
         rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
     )
+
+
+def usable_samples(
+    recording: Recording,
+) -> dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Times [s] and values [SI] of the samples of each channel that may be used, to be drawn."""
+    return {
+        name: (recording.time[rows], recording.channels[name][rows])
+        for name, rows in recording.mask.items()
+    }
 
 
 def check_packages(extra: str, *packages: str) -> None:

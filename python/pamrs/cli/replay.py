@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs.channels import unit_of
-from pamrs.cli._shared import check_packages, check_writable, progress, rig_named, write
+from pamrs.cli._shared import (
+    check_packages,
+    check_writable,
+    progress,
+    rig_named,
+    usable_samples,
+    write,
+)
 
 if TYPE_CHECKING:
     from pamrs.recordings import Case, Recording
@@ -62,24 +69,18 @@ def replay_command(
             drawn = own or nominal
     if plot is not None and drawn is not None:
         result = drawn
-        recorded = {
-            name: (shown.time[rows], shown.channels[name][rows])
-            for name, rows in shown.mask.items()
-        }
-        write({plot: lambda path: result.plot(path, recorded=recorded)})
+        write({plot: lambda path: result.plot(path, recorded=usable_samples(shown))})
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
     """A case with its own rig, and the model beside it, if there is one."""
-    from pamrs.recordings import load_case
-    from pamrs.rig import load_rig
+    from pamrs.recordings import load_case, model_and_case
 
+    model = None
     if place.is_file() and place.name != "case.toml":
-        own = load_case(place, allow_outside=allow_outside)
-        model = own.rig if rig is None else rig_named(rig)
-        return load_case(own.path, allow_outside=allow_outside), model
+        model, place = model_and_case(place)
     found = load_case(place, allow_outside=allow_outside)
-    return found, None if rig is None else (rig_named(rig) if rig.suffix == "" else load_rig(rig))
+    return found, model if rig is None else rig_named(rig)
 
 
 def _chosen(case: Case, name: str) -> list[Recording]:

@@ -17,6 +17,7 @@ from pamrs.cli._shared import (
     exact,
     progress,
     rig_named,
+    usable_samples,
     write,
 )
 
@@ -95,10 +96,7 @@ def simulate_command(
         _say_what_is_held(loaded, recording, input)
         with progress(f"simulating {loaded.name}"):
             result = replay(loaded, recording)
-        recorded = {
-            name: (recording.time[rows], recording.channels[name][rows])
-            for name, rows in recording.mask.items()
-        }
+        recorded = usable_samples(recording)
     else:
         result = _steps(
             loaded,

@@ -136,7 +136,7 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
                 f"{free.name}: the data say nothing, its value is the prior's (tolerance "
                 f"{free.tolerance:.3g} {item.unit})"
             )
-        away = abs(item.value - free.nominal) / free.tolerance
+        away = abs(free.moved(item.value))
         if away > FAR:
             notes.append(
                 f"{place} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} "

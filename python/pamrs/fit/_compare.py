@@ -20,7 +20,6 @@ from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODEL
 
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
-    from pamrs.fit._estimate import Free
     from pamrs.rig import Muscle
 
 __all__ = ["ModelComparison", "compare_models"]
@@ -362,12 +361,6 @@ def _paired(difference: Array) -> tuple[float, float]:
     return float(difference.mean()), float(np.std(difference, ddof=1)) / math.sqrt(len(difference))
 
 
-def _moved(fit: MuscleFit, free: Free) -> float:
-    """How far a fitted size lies from what was known of it, in tolerances; 0 where nothing was."""
-    away = abs(fit.params[free.name].value - free.nominal)
-    return 0.0 if math.isinf(free.tolerance) else float(away / free.tolerance)
-
-
 def _candidate(
     data: ForceMap, muscle: Muscle, settings: dict[str, Any], levels: Sequence[float] | None
 ) -> tuple[dict[str, Any], MuscleFit | None]:
@@ -393,7 +386,9 @@ def _candidate(
         "lopo_stderr": cross.rms_stderr,
         "lopo_interior_rms": cross.interior_rms,
         "lopo_end_rms": cross.end_rms,
-        "moved": max((_moved(fit, free) for free in fit.free), default=0.0),
+        "moved": max(
+            (abs(free.moved(fit.params[free.name].value)) for free in fit.free), default=0.0
+        ),
     }
     if levels is not None:
         try:

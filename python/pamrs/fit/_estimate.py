@@ -40,6 +40,12 @@ class Free:
     nominal: float
     tolerance: float
 
+    def moved(self, value: float) -> float:
+        """How far a value lies from the nominal one, in tolerances; an infinite tolerance moves by
+        nothing.
+        """
+        return (value - self.nominal) / self.tolerance
+
     @property
     def scale(self) -> float:
         """Step size of the search."""

@@ -296,9 +296,7 @@ def meaning(fit: MuscleFit) -> list[str]:
         few = ", ".join(unsure[:8]) + (" and more" if len(unsure) > 8 else "")
         lines.append(f"Not told from zero (standard error larger than the value): {few}.")
     for free in fit.free:
-        moved = (
-            fit.params[free.name].value - free.nominal
-        ) / free.tolerance  # an infinite tolerance moves by nothing
+        moved = free.moved(fit.params[free.name].value)
         if abs(moved) > 2:
             lines.append(
                 f"{free.name} moved {signed(moved)} tolerances from what was known of it. For a "

@@ -10,7 +10,7 @@ of every format.
 
 from __future__ import annotations
 
-from pamrs.recordings._case import Case, load_case
+from pamrs.recordings._case import Case, load_case, model_and_case
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._proposal import LogProposal, Proposal, propose
 from pamrs.recordings._recording import CHANNELS, Issue, OwnValue, Recording, load_recording
@@ -28,6 +28,7 @@ __all__ = [
     "load_case",
     "load_recording",
     "load_recordings",
+    "model_and_case",
     "propose",
     "suspicions",
 ]

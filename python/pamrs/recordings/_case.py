@@ -19,7 +19,7 @@ from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
 from pamrs.units import to_si
 
-__all__ = ["SCHEMA", "Case", "load_case"]
+__all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
 SCHEMA: Final = "pamrs.case/1"
 _ROLES: Final = ("fit", "held_out")
@@ -114,7 +114,8 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     """
     given = Path(folder)
     if given.is_file() and given.name != "case.toml":
-        return _case_of(given, allow_outside)
+        model, case = model_and_case(given)
+        return load_case(case, allow_outside=allow_outside).with_rig(model)
     file = given if given.name == "case.toml" else given / "case.toml"
     home = file.parent
     document = _document(file, given)
@@ -135,8 +136,19 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     return Case(name, rig, recordings, home, description)
 
 
-def _case_of(file: Path, allow_outside: bool) -> Case:
-    """The case from which a rig file was diagnosed, with that rig."""
+def model_and_case(file: Path) -> tuple[Rig, Path]:
+    """A rig file that a diagnosis wrote, and the folder of the case from which it did.
+
+    Parameters
+    ----------
+    file : Path
+        The rig file.
+
+    Raises
+    ------
+    CaseError
+        If it is no rig file, or does not say from which case it is.
+    """
     try:
         rig = load_rig(file)
     except RigError as error:
@@ -149,7 +161,7 @@ def _case_of(file: Path, allow_outside: bool) -> Case:
     home = file.parent / rig.case
     if not home.is_dir():
         raise CaseError(f"{file}: case = {rig.case!r}: there is no such case folder")
-    return load_case(home, allow_outside=allow_outside).with_rig(rig)
+    return rig, home
 
 
 def _document(file: Path, given: Path) -> dict[str, Any]:

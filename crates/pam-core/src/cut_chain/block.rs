@@ -63,6 +63,11 @@ impl Block {
         }
     }
 
+    /// Whether muscles and what they move make its output, and not air alone.
+    pub(super) fn mechanical(self) -> bool {
+        matches!(self, Self::Arm(_) | Self::Pull(_))
+    }
+
     /// Place of the predicted state; none for what muscles pull, which is no state.
     pub(super) fn output(self, layout: &Layout) -> Option<usize> {
         match self {
@@ -204,7 +209,7 @@ fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
     let mut places: Vec<usize> = (layout.angle(0)..layout.rate(0)).collect();
     let output = block.output(layout);
     places.extend(output);
-    if matches!(block, Block::Arm(_) | Block::Pull(_)) {
+    if block.mechanical() {
         places.extend(wiring.groups.iter().map(|g| layout.pressure(g.chamber)));
         return places;
     }

@@ -171,8 +171,7 @@ pub(super) fn driven<'a, S: Scalar>(
             lag: lag(plant, *place),
             rest,
             // a block's own clock is that of what it predicts
-            shifted: plant.skewed()
-                && (*place < layout.angle(0)) == matches!(block, Block::Arm(_) | Block::Pull(_)),
+            shifted: plant.skewed() && (*place < layout.angle(0)) == block.mechanical(),
         }
     };
     measured.signals.iter().map(driver).collect()

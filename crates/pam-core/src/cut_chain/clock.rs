@@ -20,13 +20,10 @@ impl<S: Scalar> Clocks<S> {
             return Self { neighbour: constant(0.0), command: constant(0.0) };
         }
         let (pressures, angles) = plant.skew(time);
-        match block {
-            Block::Arm(_) | Block::Pull(_) => {
-                Self { neighbour: pressures - angles, command: angles }
-            }
-            Block::Supply(_) | Block::Chamber(_) => {
-                Self { neighbour: angles - pressures, command: pressures }
-            }
+        if block.mechanical() {
+            Self { neighbour: pressures - angles, command: angles }
+        } else {
+            Self { neighbour: angles - pressures, command: pressures }
         }
     }
 }

@@ -201,11 +201,9 @@ impl<'a, S: Number> Cut<'a, S> {
             }
         }
         // at rest what nobody measures of a regulator's outlet is what it feeds
-        if let (Block::Chamber(gas), regulators) =
-            (self.block, unread(rig, self.block, self.measured))
-        {
-            for supply in regulators {
-                state[layout.supply(supply)] = state[layout.pressure(gas)];
+        if let Some(fed) = self.block.output(layout) {
+            for supply in unread(rig, self.block, self.measured) {
+                state[layout.supply(supply)] = state[fed];
             }
         }
         for gas in 0..layout.gases {

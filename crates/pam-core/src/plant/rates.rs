@@ -391,10 +391,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// the scratch.
     #[inline(never)]
     pub(super) fn mechanics_at_rest(&self, state: &[S], here: &mut Scratch<S>) {
-        let mut now = std::mem::take(&mut here.now);
-        self.contractions(state, &mut now);
-        self.mechanics(state, &self.fresh_memory(), &now, true, here);
-        here.now = now;
+        self.mechanics_now(state, &self.fresh_memory(), here);
         here.volume_rate.fill(constant(0.0));
     }
 
@@ -406,11 +403,16 @@ impl<'a, S: Scalar> Plant<'a, S> {
         memory: &[Memory<S>],
         here: &mut Scratch<S>,
     ) -> S {
+        self.mechanics_now(state, memory, here);
+        here.torque[coordinate]
+    }
+
+    /// Volumes, and what the muscles put on the joints, at an instant at which no step moves them.
+    fn mechanics_now(&self, state: &[S], memory: &[Memory<S>], here: &mut Scratch<S>) {
         let mut now = std::mem::take(&mut here.now);
         self.contractions(state, &mut now);
         self.mechanics(state, memory, &now, true, here);
         here.now = now;
-        here.torque[coordinate]
     }
 
     /// Wall area of the gases without muscles [m2]: the cube of their volume.

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,7 +103,7 @@ class Shaken:
         places = [p.name for p in own.parameters if p.scan is not None]
         sizes = [p.name for p in own.parameters if p.scan is None]
         chosen = itertools.combinations(self.columns, len(places))
-        best = max(chosen, key=lambda lines: sum(self._gains(lines).values()), default=None)
+        best = max(chosen, key=self._gain, default=None)
         if best is None:
             return None
         told = dict(zip(places, best, strict=True))
@@ -114,19 +114,24 @@ class Shaken:
         order = [p.name for p in own.parameters]
         return Events(self.effect, {n: {p: v[p] for p in order} for n, v in values.items()}, form)
 
+    def _columns(self, lines: tuple[float, ...], name: str) -> Array:
+        """What a unit of each size does to the residuals of a recording, in the order of the
+        lines.
+        """
+        return np.concatenate([self.columns[line][name] for line in lines], axis=1)
+
     def _solved(self, lines: tuple[float, ...], name: str) -> Array:
         """The sizes that one recording asks for, in the order of the lines."""
-        columns = np.concatenate([self.columns[line][name] for line in lines], axis=1)
+        columns = self._columns(lines, name)
         return np.asarray(np.linalg.lstsq(columns, -self.rows[name], rcond=1e-9)[0])
 
-    def _gains(self, lines: tuple[float, ...]) -> dict[str, float]:
-        """What these lines take of the sum of squares of each recording."""
-        found = {}
+    def _gain(self, lines: tuple[float, ...]) -> float:
+        """What these lines take of the sum of squares of all recordings."""
+        gain = 0.0
         for name, rows in self.rows.items():
-            columns = np.concatenate([self.columns[line][name] for line in lines], axis=1)
-            left = rows + columns @ self._solved(lines, name)
-            found[name] = float(rows @ rows - left @ left)
-        return found
+            left = rows + self._columns(lines, name) @ self._solved(lines, name)
+            gain += float(rows @ rows - left @ left)
+        return gain
 
 
 def _by_recording(
@@ -134,15 +139,9 @@ def _by_recording(
 ) -> dict[str, Array]:
     """Stacked residuals of each recording."""
     return {
-        p.recording.name: stacked(_alone(problem, p.recording.name), found, inflation)[0]
+        p.recording.name: stacked(replace(problem, recordings=[p]), found, inflation)[0]
         for p in problem.recordings
     }
-
-
-def _alone(problem: Problem, name: str) -> Problem:
-    """A problem with one of its recordings."""
-    recordings = [p for p in problem.recordings if p.recording.name == name]
-    return Problem(problem.blocks, recordings, problem.core, problem.settings, problem.stopped)
 
 
 def _lines(

@@ -11,7 +11,7 @@ only if little is left.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from threading import Event
@@ -112,11 +112,20 @@ def fit_events(
         With ``events``; its ``values`` hold the parameters of the first recording that has one.
         None where nothing was found.
     """
+    rig, base = baseline.rig, baseline.residuals
+    forms = [form for form in EFFECTS[effect].forms if form.transient]
+    found = look_for_events(effect, problem, rig, base, inflation)
+    shaken = None
     least, last = problem.settings.transients.least_gain, None
-    for begun in _begun(effect, problem, baseline, inflation):
-        # events that were fitted in the usual form say where those of another one are
-        near = begun if last is None or last.events is None else _near(begun, last.events)
-        again = _jointly(near, problem, nominal, baseline, inflation)
+    # what repeats begins at frequencies; other events begin where those of the usual form are
+    for form in sorted(forms, key=lambda form: form.periodic):
+        if form.periodic:
+            shaken = shaken or Shaken.of(effect, problem, rig, base, inflation)
+            begun = shaken.best(form.name)
+        else:
+            usual = found if last is None else last.events
+            begun = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
+        again = None if begun is None else _jointly(begun, problem, nominal, baseline, inflation)
         if again is not None and (last is None or 2.0 * (last.cost - again.cost) > least):
             last = again
     if last is None:
@@ -130,31 +139,6 @@ def fit_events(
         rig=last.rig.with_effect(effect, first, form=last.events.form),
         values=last.values | values,
     )
-
-
-def _begun(
-    effect: str, problem: Problem, baseline: Fit, inflation: dict[str, float]
-) -> Iterator[Events]:
-    """Where the fits of an effect's events begin, one in each form; the usual form first."""
-    rig, base = baseline.rig, baseline.residuals
-    forms = [form for form in EFFECTS[effect].forms if form.transient]
-    found = look_for_events(effect, problem, rig, base, inflation)
-    if found is not None:
-        yield found
-        yield from (_in_form(found, form.name) for form in forms[1:] if not form.periodic)
-    periodic = [form for form in forms if form.periodic]
-    if periodic:
-        shaken = Shaken.of(effect, problem, rig, base, inflation)
-        for form in periodic:
-            begun = shaken.best(form.name)
-            if begun is not None:
-                yield begun
-
-
-def _near(begun: Events, found: Events) -> Events:
-    """Where a form begins, from events that were fitted: what repeats begins where it was found."""
-    periodic = any(EFFECTS[e.effect].form(e.form).periodic for e in (begun, found))
-    return begun if periodic else _in_form(found, begun.form)
 
 
 def _in_form(events: Events, form: str) -> Events:
@@ -207,30 +191,26 @@ def look_for_events(
     """
     known = dict(known or {})
     size = known.get(EFFECTS[effect].leading.name)
-    shaken = None
-    if EFFECTS[effect].form(form).periodic:
-        shaken = Shaken.of(effect, problem, rig, base, inflation, known).best(form)
+    periodic = EFFECTS[effect].form(form).periodic
+    shaken = (
+        Shaken.of(effect, problem, rig, base, inflation, known).best(form) if periodic else None
+    )
 
-    def begun_in(
-        alone: Problem, prepared: Prepared, own: dict[Key, Residual]
-    ) -> dict[str, float] | None:
+    def begun_in(alone: Problem, prepared: Prepared) -> Events | None:
         """Where the events of one recording begin, in the form that is asked for."""
         name = prepared.recording.name
-        if EFFECTS[effect].form(form).periodic:
-            return None if shaken is None else shaken.values.get(name)
+        if periodic:
+            return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
+        own = {key: r for key, r in base.items() if key[1] == name}
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
-        if not started:
-            return None
-        begun = Events(effect, {name: started})
-        return (_in_form(begun, form) if form else begun).values[name]
+        begun = Events(effect, {name: started}) if started else None
+        return _in_form(begun, form) if begun and form else begun
 
     def one(prepared: Prepared) -> dict[str, float] | None:
         alone = replace(problem, recordings=[prepared])
-        own = {key: r for key, r in base.items() if key[1] == prepared.recording.name}
-        started = begun_in(alone, prepared, own)
-        if started is None:
+        begun = begun_in(alone, prepared)
+        if begun is None:
             return None
-        begun = Events(effect, {prepared.recording.name: started}, form)
         return _fitted(begun, alone, prepared, rig, inflation, known, stopped)
 
     stopped = Event()

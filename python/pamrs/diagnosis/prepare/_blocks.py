@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
-from pamrs.diagnosis.prepare._signals import DRIVES, Prepared
+from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -155,34 +155,25 @@ class _Map:
             for way in self.around(block)
             for name in way.between
         ]
-        known = [
-            end
-            for end in others
-            if (self._constant(end) or self._regulator(end)) and self.pressure(end) not in self.has
-        ]
+        known = [end for end in others if self._unread(end, "constant", "regulator")]
         wanted = [self.pressure(end) for end in others if end not in known]
         return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
 
-    def _constant(self, block: str) -> bool:
-        return self._kind_of_supply(block) == "constant"
-
-    def _regulator(self, block: str) -> bool:
-        return self._kind_of_supply(block) == "regulator"
-
-    def _kind_of_supply(self, block: str) -> str:
-        kind, _, name = block.partition(".")
-        return str(self.rig.tables("supply")[name]["kind"]) if kind == "supply" else ""
+    def _unread(self, block: str, *kinds: str) -> bool:
+        """Whether a block is a supply of one of these kinds whose pressure nobody measured."""
+        block_kind, _, name = block.partition(".")
+        return (
+            block_kind == "supply"
+            and self.rig.tables("supply")[name]["kind"] in kinds
+            and self.pressure(block) not in self.has
+        )
 
     def unread(self, block: str) -> list[str]:
         """Names of the regulators next to a chamber whose outlet nobody measured: their command
         says what it is.
         """
         ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
-        return [
-            end.partition(".")[2]
-            for end in ends
-            if self._regulator(end) and self.pressure(end) not in self.has
-        ]
+        return [end.partition(".")[2] for end in ends if self._unread(end, "regulator")]
 
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
@@ -257,7 +248,8 @@ class _Map:
         pressure is then what is given.
         """
         full = qualified("chamber", name)
-        fed = bool(self.neighbours(full) or self.commands(full) or self.unread(full))
+        unread = self.unread(full)
+        fed = bool(self.neighbours(full) or self.commands(full) or unread)
         joints = tuple(
             dict.fromkeys(
                 self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
@@ -265,7 +257,6 @@ class _Map:
         )
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
             return None
-        unread = self.unread(full)
         drives = (
             *self.neighbours(full),
             *self.commands(full),
@@ -338,8 +329,7 @@ class _Map:
         """The block of what the muscles put on a joint or a load, where that is measured: their
         pressures and the motion to a torque or a force.
         """
-        loaded = bool(self.rig.model["load"])
-        channel = "force" if loaded else dotted("joint_torque", joint)
+        loaded, channel = bool(self.rig.model["load"]), pulls_of(self.rig)[joint]
         pulling = [m for m in self.pulling if loaded or self.joint_of[m] == joint]
         drives = tuple(dict.fromkeys(dotted("muscle_pressure", self.pulling[m]) for m in pulling))
         moving = ("length",) if loaded else (dotted("joint_angle", joint),)
@@ -368,9 +358,9 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; and so are
-    muscles whose force (or torque at a joint) is measured. A rig with
-    joints or a load and without valves and supplies is driven by the pressures of its muscles:
-    these are given, and only what they move is judged.
+    muscles whose force (or torque at a joint) is measured. A rig with joints or a load and without
+    valves and supplies is driven by the pressures of its muscles: these are given, and only what
+    they move is judged.
 
     Parameters
     ----------
@@ -390,7 +380,7 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     found += [have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
     found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
-    found += [have.pull(name) for name in ([""] if rig.model["load"] else rig.tables("joint"))]
+    found += [have.pull(name) for name in pulls_of(rig)]
     return [block for block in found if block is not None]
 
 

@@ -22,7 +22,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
-PULLS = ("force", "joint_torque")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
 COMMANDS = ("valve_command", "supply_command")
 
@@ -274,8 +273,9 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
     signals, raw, noise = {}, {}, {}
-    for name in dict.fromkeys([*core.channels, *pulls_of(rig)]):
-        if channel_of(name) not in (*DRIVES, *PULLS) or name not in recording.channels:
+    drives = [name for name in core.channels if channel_of(name) in DRIVES]
+    for name in (*drives, *pulls_of(rig).values()):
+        if name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
         if mask.sum() < max(own.least_channel_samples, own.least_channel_share * mask.size):
@@ -292,11 +292,13 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     return Prepared(recording, commands, signals, raw, noise, settings)
 
 
-def pulls_of(rig: Rig) -> list[str]:
-    """Channels of what the muscles of a rig put on its load (a force) or joints (torques)."""
+def pulls_of(rig: Rig) -> dict[str, str]:
+    """Channels of what the muscles of a rig put on its joints (torques), by the name of the joint,
+    or on its load (a force), by no name.
+    """
     if rig.model["load"]:
-        return ["force"]
-    return [dotted("joint_torque", name) for name in rig.tables("joint")]
+        return {"": "force"}
+    return {name: dotted("joint_torque", name) for name in rig.tables("joint")}
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
