@@ -49,6 +49,20 @@ def class_of(row: Row, catalogue: Sequence[str]) -> str:
     return f"{kind}, {row.wanted}" if row.wanted else kind
 
 
+def told_by_others(file: Path) -> dict[str, Any]:
+    """What the other methods made of a case.
+
+    Raises
+    ------
+    ValueError
+        A result of another schema.
+    """
+    told: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if told.get("schema") != SCHEMA:
+        raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+    return told
+
+
 def compared(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> list[Compared]:
     """Every case that the baselines were run on.
 
@@ -71,9 +85,7 @@ def compared(keys: Path, results: Path, catalogue: Sequence[str] = LISTED) -> li
         file = Path(results) / "baselines" / f"{row.case}.json"
         if not file.is_file():
             continue
-        told: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
-        if told.get("schema") != SCHEMA:
-            raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+        told = told_by_others(file)
         gaps = {m: told["gap_closed"].get(m) for m in METHODS if m != "pamrs"}
         gaps["pamrs"] = None if gaps["refit"] is None else row.gap
         found.append(Compared(row, class_of(row, catalogue), gaps, told["detected"].get("refit")))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.recordings import Recording
+from tests.diagnosis.noisy import SHOULDER, noisy
 
 RIG = pamrs.rigs.shoulder()
 ROLES = {"first": "fit", "second": "fit", "third": "held_out"}
@@ -18,7 +18,6 @@ def case(plant: pamrs.Rig, duration: float = 15.0) -> pamrs.Case:
     """Recordings of a shoulder that uses half of its stroke, with the noise of transducers."""
     found = []
     for number, (name, role) in enumerate(ROLES.items()):
-        rng = np.random.default_rng([7, number])
         time = np.arange(0.0, duration, 0.005)
         command = (
             5.0
@@ -27,15 +26,8 @@ def case(plant: pamrs.Rig, duration: float = 15.0) -> pamrs.Case:
             + 0.08 * np.sign(np.sin(2 * np.pi * 0.23 * time + number))
         )
         run = pamrs.simulate(plant, valve_command=command, sample_time=0.005)
-        channels = {
-            "valve_command": command,
-            "supply_pressure": run["supply_pressure"] + rng.normal(0.0, 400.0, time.size),
-            "muscle_pressure": run["muscle_pressure"] + rng.normal(0.0, 400.0, time.size),
-            "joint_angle": run["joint_angle"] + rng.normal(0.0, 3e-4, time.size),
-        }
-        mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
-        units = dict.fromkeys(channels, "")
-        found.append(Recording(name, role, time, 0.005, channels, mask, [], units))
+        channels = {"valve_command": command} | {n: run[n] for n in SHOULDER}
+        found.append(noisy(name, role, 0.005, channels, SHOULDER, [7, number]))
     return pamrs.Case("shoulder", RIG, found, Path())
 
 

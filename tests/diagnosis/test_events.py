@@ -15,6 +15,7 @@ from pamrs.diagnosis.fit._lines import lines_of
 from pamrs.diagnosis.prepare import Residual, available_blocks, prepare
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import SHOULDER, noisy
 
 SETTINGS = DiagnosisSettings()
 
@@ -37,7 +38,6 @@ def recordings(
     """
     found = []
     for number, (name, when) in enumerate(TIMES.items()):
-        rng = np.random.default_rng([2014, number])
         time = np.arange(0.0, duration, 0.005)
         command = (
             5.0
@@ -48,18 +48,8 @@ def recordings(
         here = {"time": when} if own is None else own[name]
         rig = rig.with_effect(effect, make | here, form=form)
         run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-        channels = {
-            "valve_command": command,
-            "supply_pressure": run["supply_pressure"] + rng.normal(0.0, 400.0, time.size),
-            "muscle_pressure": run["muscle_pressure"] + rng.normal(0.0, 400.0, time.size),
-            "joint_angle": run["joint_angle"] + rng.normal(0.0, 3e-4, time.size),
-        }
-        mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
-        found.append(
-            Recording(
-                name, ROLES[name], time, 0.005, channels, mask, [], dict.fromkeys(channels, "")
-            )
-        )
+        channels = {"valve_command": command} | {n: run[n] for n in SHOULDER}
+        found.append(noisy(name, ROLES[name], 0.005, channels, SHOULDER, [2014, number]))
     return found
 
 

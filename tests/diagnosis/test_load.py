@@ -20,6 +20,7 @@ from pamrs.errors import SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
 
@@ -39,10 +40,8 @@ def recording(rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 
     }[name]
     command = np.concatenate([np.full(rest, 5.0), 5.02 + wave])
     run = pamrs.simulate(rig, command, sample_time=DT, initial={"muscle_pressure": 2.5e5})
-    rng = np.random.default_rng(seed)
-    channels = {n: run[n][rest:] + rng.normal(0.0, s, time.size) for n, s in NOISE.items()}
-    mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-    return Recording(name, role, time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
+    channels = {n: run[n][rest:] for n in NOISE}
+    return noisy(name, role, DT, channels, NOISE, [seed])
 
 
 def case(rig: pamrs.Rig) -> pamrs.Case:

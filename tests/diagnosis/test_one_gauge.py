@@ -13,20 +13,20 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.named("regulated_joint")
 DT = 0.005
-CHANNELS = ("supply_command", "muscle_pressure", "joint_angle")
+NOISE = {"muscle_pressure": 400.0, "joint_angle": 3e-4}
+CHANNELS = ("supply_command", *NOISE)
 
 
 def case(true: pamrs.Rig) -> pamrs.Case:
     """Waves and steps of the set pressure, without the supply's gauge."""
     found = []
     for k, (name, role) in enumerate((("a", "fit"), ("b", "fit"), ("c", "held_out"))):
-        rng = np.random.default_rng([41, k])
         time = np.arange(0.0, 14.0, DT)
         command = (
             1.9e5
@@ -34,13 +34,8 @@ def case(true: pamrs.Rig) -> pamrs.Case:
             + 0.4e5 * np.sign(np.sin(2 * np.pi * 0.23 * time + k))
         )
         run = pamrs.simulate(true, supply_command=command, sample_time=DT)
-        channels = {
-            "supply_command": command,
-            "muscle_pressure": run["muscle_pressure"] + rng.normal(0.0, 400.0, time.size),
-            "joint_angle": run["joint_angle"] + rng.normal(0.0, 3e-4, time.size),
-        }
-        mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-        found.append(Recording(name, role, time, DT, channels, mask))
+        channels = {"supply_command": command} | {n: run[n] for n in NOISE}
+        found.append(noisy(name, role, DT, channels, NOISE, [41, k]))
     return pamrs.Case("one gauge", RIG, found, Path())
 
 

@@ -15,6 +15,8 @@ from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import CaseError, DiagnosisError
 from pamrs.recordings import OwnValue, Recording, load_case
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import SHOULDER as NOISE
+from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
 DT = 0.005
@@ -22,7 +24,6 @@ SHOULDER = pamrs.rigs.shoulder()
 NAME = "arm.payload"
 LOADS = {"light": SHOULDER.parameter(NAME).value, "heavy": 13.0, "half": 11.0}
 ROLES = {"light": "fit", "heavy": "fit", "half": "held_out"}
-NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 
 
 def recordings(true: pamrs.Rig, *, told: bool, error: str = "same") -> list[Recording]:
@@ -30,7 +31,6 @@ def recordings(true: pamrs.Rig, *, told: bool, error: str = "same") -> list[Reco
     found = []
     nominal = SHOULDER.parameter(NAME).value
     for k, (name, load) in enumerate(LOADS.items()):
-        rng = np.random.default_rng([31, k])
         time = np.arange(0.0, 12.0, DT)
         command = (
             5.0
@@ -40,12 +40,9 @@ def recordings(true: pamrs.Rig, *, told: bool, error: str = "same") -> list[Reco
         more = load - nominal
         rig = true.with_parameters({NAME: true.parameter(NAME).value + more})
         run = pamrs.simulate(rig, command, sample_time=DT)
-        channels = {"valve_command": command} | {
-            n: run[n] + rng.normal(0.0, s, time.size) for n, s in NOISE.items()
-        }
+        channels = {"valve_command": command} | {n: run[n] for n in NOISE}
         own = {NAME: OwnValue(load, nominal, error)} if told and more else {}
-        mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-        found.append(Recording(name, ROLES[name], time, DT, channels, mask, [], {}, parameters=own))
+        found.append(noisy(name, ROLES[name], DT, channels, NOISE, [31, k], own))
     return found
 
 

@@ -15,6 +15,7 @@ from pamrs.diagnosis.prepare import available_blocks
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import SHOULDER, noisy
 
 SETTINGS = DiagnosisSettings()
 DT = 0.005
@@ -27,13 +28,7 @@ ROLES = {"slow": "fit", "fast": "fit", "other": "held_out"}
 
 def recorded(name: str, values: dict[str, np.ndarray], noise: dict[str, float]) -> Recording:
     """A recording with the noise of transducers."""
-    rng = np.random.default_rng([17, list(ROLES).index(name)])
-    channels = {n: v + rng.normal(0.0, noise.get(n, 0.0), v.size) for n, v in values.items()}
-    size = next(iter(values.values())).size
-    mask = {n: np.ones(size, dtype=bool) for n in channels}
-    return Recording(
-        name, ROLES[name], DT * np.arange(size), DT, channels, mask, [], dict.fromkeys(channels, "")
-    )
+    return noisy(name, ROLES[name], DT, values, noise, [17, list(ROLES).index(name)])
 
 
 def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
@@ -132,10 +127,13 @@ def turned(true: pamrs.Rig) -> pamrs.Case:
             + 0.25 * np.sin(2 * np.pi * 0.4 * time + k)
         )
         run = pamrs.simulate(true, command, sample_time=DT)
-        measured = ("supply_pressure", "muscle_pressure", "joint_angle", "joint_torque")
-        noise = dict(zip(measured, (400.0, 400.0, 3e-4, 0.3), strict=True))
+        noise = {"valve_command": 0.0, **SHOULDER, "joint_torque": 0.3}
         found.append(
-            recorded(name, {"valve_command": command} | {n: run[n] for n in measured}, noise)
+            recorded(
+                name,
+                {"valve_command": command} | {n: run[n] for n in (*SHOULDER, "joint_torque")},
+                noise,
+            )
         )
     return pamrs.Case("torque", pamrs.rigs.shoulder(), found, Path())
 

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, uniform
+from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, either_sign, uniform
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ class PayloadChange(Effect):
         start = [
             RECORDING_PERIOD * i + setting.duration * uniform(rng, 0.3, 0.65) for i in range(n)
         ]
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         mass = sign * uniform(rng, 0.025, 0.05)
         return cls(tuple(start), (mass,) * n, (uniform(rng, 0.2, 2.0),) * n)
 

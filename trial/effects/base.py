@@ -208,3 +208,8 @@ def log_uniform(rng: np.random.Generator, low: float, high: float) -> float:
 def uniform(rng: np.random.Generator, low: float, high: float) -> float:
     """One uniform number."""
     return float(rng.uniform(low, high))
+
+
+def either_sign(rng: np.random.Generator) -> float:
+    """1 or -1, as likely."""
+    return 1.0 if rng.random() < 0.5 else -1.0

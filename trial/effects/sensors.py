@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, uniform
+from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, either_sign, uniform
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class ClockSkew(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         return cls(
             sign * uniform(rng, 4.0e-3, 8.0e-3),
             sign * uniform(rng, 2.0e-4, 8.0e-4),
@@ -172,7 +172,7 @@ class PressureDrift(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         return cls(
             sign * uniform(rng, 1.2e3, 1.8e3), uniform(rng, 8.0, 20.0), uniform(rng, 15.0, 40.0)
         )

@@ -8,7 +8,18 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, log_uniform, uniform
+from .base import (
+    RECORDING_PERIOD,
+    Effect,
+    Env,
+    Port,
+    Setting,
+    Start,
+    State,
+    either_sign,
+    log_uniform,
+    uniform,
+)
 
 
 @dataclass(frozen=True)
@@ -262,7 +273,7 @@ class NullDrift(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         return cls(
             sign * uniform(rng, 0.0008, 0.0015),
             uniform(rng, 0.0002, 0.0006),

@@ -17,6 +17,7 @@ from ..effects.base import (
     Setting,
     Start,
     State,
+    either_sign,
     uniform,
 )
 
@@ -544,7 +545,7 @@ class TwoOpenings(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         return cls(sign * uniform(rng, 0.05, 0.15))
 
     def most(self) -> float:
@@ -566,7 +567,7 @@ class BentOpening(Effect):
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        sign = 1.0 if rng.random() < 0.5 else -1.0
+        sign = either_sign(rng)
         return cls(sign * uniform(rng, 0.1, 0.3))
 
     def most(self) -> float:

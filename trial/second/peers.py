@@ -12,7 +12,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from ..sidebyside import SCHEMA
+from ..sidebyside import told_by_others
 from ..summary import percent, table
 from .marks import CHANNEL, Mark, marks
 
@@ -139,9 +139,7 @@ def beside(keys: Path, results: Path) -> list[Beside]:
         file = Path(results) / "baselines" / f"{mark.case}.json"
         if not file.is_file():
             continue
-        told = json.loads(file.read_text(encoding="utf-8"))
-        if told.get("schema") != SCHEMA:
-            raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+        told = told_by_others(file)
         key = json.loads((Path(keys) / f"{mark.case}.json").read_text(encoding="utf-8"))
         found.append(_one(mark, key, told))
     return found
@@ -213,7 +211,15 @@ def _read(cases: Sequence[Beside]) -> str:
         told = [_count(group, lambda c, m=m: hit(c, m)) for m in columns]  # type: ignore[misc]
         return (word, "-", *told, last)
 
-    odd = ("effects", "unlisted")
+    def alarms(where: str, group: Sequence[Beside]) -> tuple[str, ...]:
+        return (
+            f"says that something is missing where {where}",
+            _count(group, lambda c: c.alarm),
+            "-",
+            *(_count(group, lambda c, m=m: not c.silent[m]) for m in LEARNING),  # type: ignore[misc]
+            _count(group, lambda c: c.mark.verdict in ("effects", "unlisted")),
+        )
+
     rows = [
         ("right effect named first", *none, _count(named, lambda c: bool(c.mark.leading))),
         line("block that it corrects most is at fault", ill, lambda c, m: c.block[m] in c.acts,
@@ -221,14 +227,8 @@ def _read(cases: Sequence[Beside]) -> str:
         line("corrects nothing though something is missing", ill,
              lambda c, m: not c.block[m] or c.silent.get(m, False), "-"),
         line("a channel is worse than after the refit", ill, lambda c, m: c.worse[m], "-"),
-        ("says that something is missing where nothing is", _count(clean, lambda c: c.alarm), "-",
-         *(_count(clean, lambda c, m=m: not c.silent[m]) for m in LEARNING),  # type: ignore[misc]
-         _count(clean, lambda c: c.mark.verdict in odd)),
-        ("says that something is missing where there is model error alone",
-         _count([c for c in well if c not in clean], lambda c: c.alarm), "-",
-         *(_count([c for c in well if c not in clean], lambda c, m=m: not c.silent[m])  # type: ignore[misc]
-           for m in LEARNING),
-         _count([c for c in well if c not in clean], lambda c: c.mark.verdict in odd)),
+        alarms("nothing is", clean),
+        alarms("there is model error alone", [c for c in well if c not in clean]),
     ]  # fmt: skip
     return table(("", *METHODS.values()), rows)
 
