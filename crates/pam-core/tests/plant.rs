@@ -165,6 +165,40 @@ fn sensitivities_agree_with_differences() {
     }
 }
 
+#[test]
+fn sensitivities_do_not_depend_on_how_many_are_asked_for() {
+    let rig = Rig::new(spec()).unwrap();
+    let n = 40;
+    let truth = run(&rig, n, 10);
+    let channel = |name: &str| truth.get(&rig, name).unwrap();
+    let channels = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    let rates = channels.map(|name| slopes(channel(name), 0.01));
+    let u = command(n);
+    let signal = |k: usize| (channels[k], Signal { value: channel(channels[k]), slope: &rates[k] });
+    let measured =
+        Measured::new(&rig, n, &[("valve_command", &u)], &[signal(0), signal(1), signal(2)])
+            .unwrap();
+    let timing = Timing { sample_time: 0.01, substeps: 10 };
+    let names = rig.parameters().names();
+    let all: Vec<_> = names.iter().map(|name| rig.parameters().find(name).unwrap()).collect();
+    assert!(all.len() > 8, "as many as a narrow pass takes are no test");
+    for block in [Block::Chamber(0), Block::Arm(0)] {
+        let several = |ids: &[_]| predict(&rig, block, &measured, timing, &[0, 20], ids).unwrap();
+        let together = several(&all);
+        for (column, id) in all.iter().enumerate() {
+            let alone = several(&[*id]);
+            assert_eq!(alone.value, together.value);
+            for k in 0..n {
+                let (one, other) = (
+                    alone.jacobian[k * alone.columns],
+                    together.jacobian[k * together.columns + column],
+                );
+                assert_eq!(one, other, "{} at row {k}", names[column]);
+            }
+        }
+    }
+}
+
 fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
     let (block, key) = name.split_once('.').unwrap();
     if let Some(index) = spec.effects.iter().position(|e| e.id == block) {

@@ -4,13 +4,14 @@
 use super::block::{check, Block};
 use super::boundary::Measured;
 use super::window::Cut;
-use crate::effects::{Dual, LANES};
+use crate::effects::{Number, LANES, WIDE_LANES};
 use crate::plant::parameters::unit;
 use crate::plant::{ParameterId, Place, Plant, Rig};
 use crate::scalar::constant;
 use crate::simulate::Timing;
 use crate::{Error, Result};
 use nalgebra::Const;
+use num_dual::DualSVec64;
 
 /// Prediction of a block's output with its sensitivities.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,26 +55,56 @@ pub fn predict(
     out.columns = parameters.len() + initial;
     out.jacobian = vec![0.0; n * out.columns];
     let columns: Vec<usize> = (0..out.columns).collect();
-    for chunk in columns.chunks(LANES) {
-        let mut values = rig.parameters().lift::<Dual>();
-        let mut bumps = vec![constant::<Dual>(0.0); initial];
-        for (lane, column) in chunk.iter().enumerate() {
+    let mut left = columns.as_slice();
+    while !left.is_empty() {
+        let wide = left.len() > LANES;
+        let (chunk, rest) = left.split_at(left.len().min(if wide { WIDE_LANES } else { LANES }));
+        let task = Task { rig, block, measured, timing, starts, parameters };
+        if wide {
+            task.differentiate::<WIDE_LANES>(chunk, &mut out)?;
+        } else {
+            task.differentiate::<LANES>(chunk, &mut out)?;
+        }
+        left = rest;
+    }
+    Ok(out)
+}
+
+/// A prediction of which some columns are wanted at a time.
+struct Task<'a> {
+    rig: &'a Rig,
+    block: Block,
+    measured: &'a Measured<'a>,
+    timing: Timing,
+    starts: &'a [usize],
+    parameters: &'a [ParameterId],
+}
+
+impl Task<'_> {
+    /// The values, and the derivatives of up to `N` columns.
+    fn differentiate<const N: usize>(&self, columns: &[usize], out: &mut Prediction) -> Result<()>
+    where
+        DualSVec64<N>: Number,
+    {
+        let Self { rig, block, measured, timing, starts, parameters } = *self;
+        let mut values = rig.parameters().lift::<DualSVec64<N>>();
+        let mut bumps = vec![constant::<DualSVec64<N>>(0.0); block.initial_count(rig)];
+        for (lane, column) in columns.iter().enumerate() {
             match parameters.get(*column) {
                 Some(id) => values.seed(*id, lane),
                 None => bumps[column - parameters.len()].eps = unit(lane),
             }
         }
         let plant = Plant::new(rig, values, false)?;
-        let (value, jacobian, width) = (&mut out.value, &mut out.jacobian, out.columns);
+        let Prediction { value, jacobian, columns: width } = out;
         Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| {
             value[k] = y.re;
-            let gradient = y.eps.unwrap_generic(Const::<LANES>, Const::<1>);
-            for (column, slope) in chunk.iter().zip(gradient.iter()) {
-                jacobian[k * width + column] = *slope;
+            let gradient = y.eps.unwrap_generic(Const::<N>, Const::<1>);
+            for (column, slope) in columns.iter().zip(gradient.iter()) {
+                jacobian[k * *width + column] = *slope;
             }
-        })?;
+        })
     }
-    Ok(out)
 }
 
 /// Terms of the closure in a block at each sample of a prediction, row-major `samples x terms`, and

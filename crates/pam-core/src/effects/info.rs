@@ -12,6 +12,11 @@ pub const LANES: usize = 8;
 /// The dual number of sensitivities.
 pub type Dual = DualSVec64<LANES>;
 
+/// Derivatives of a prediction that has more of them: ten at once cost half of twice eight.
+pub const WIDE_LANES: usize = 16;
+/// Number with that many derivatives.
+pub type WideDual = DualSVec64<WIDE_LANES>;
+
 /// What a parameter is to a fit and to a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
@@ -247,13 +252,15 @@ pub struct Make {
     pub plain: fn(&[f64], &Gas) -> Box<dyn Effect<f64>>,
     /// Dual numbers.
     pub dual: fn(&[Dual], &Gas) -> Box<dyn Effect<Dual>>,
+    /// Dual numbers with more derivatives.
+    pub wide: fn(&[WideDual], &Gas) -> Box<dyn Effect<WideDual>>,
 }
 
 /// A [`Make`] of a function that is generic over its number type.
 #[macro_export]
 macro_rules! made_by {
     ($make:path) => {
-        $crate::effects::Make { plain: $make, dual: $make }
+        $crate::effects::Make { plain: $make, dual: $make, wide: $make }
     };
 }
 
@@ -272,6 +279,12 @@ impl Number for f64 {
 impl Number for Dual {
     fn effect(make: &Make, values: &[Self], gas: &Gas) -> Box<dyn Effect<Self>> {
         (make.dual)(values, gas)
+    }
+}
+
+impl Number for WideDual {
+    fn effect(make: &Make, values: &[Self], gas: &Gas) -> Box<dyn Effect<Self>> {
+        (make.wide)(values, gas)
     }
 }
 

@@ -11,7 +11,7 @@ mod port;
 pub(crate) use self::info::BEGINNING;
 pub use self::info::{
     AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role,
-    SameData, Use, LANES,
+    SameData, Use, WideDual, LANES, WIDE_LANES,
 };
 pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
 pub use self::port::{At, AtMuscle, Cord, Effect, Extremes, Port};
