@@ -300,11 +300,11 @@ def penalty(candidate: Candidate, seconds: float, settings: EvidenceSettings) ->
 
 def _unseen(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> bool:
     """Whether a time constant of a set was not seen: it is much longer than the recordings, or
-    below its own standard deviation. What relaxes at once is another stiffness.
+    not told from zero. What relaxes at once is another stiffness.
     """
-    std = candidate.fit.std
+    std, least = candidate.fit.std, settings.same_stds
     return any(
-        value > settings.unseen_lengths * seconds or value < std.get(name, 0.0)
+        value > settings.unseen_lengths * seconds or value < least * std.get(name, 0.0)
         for name, value in _effect_values(candidate)
         if find_parameter(name).time_constant
     )

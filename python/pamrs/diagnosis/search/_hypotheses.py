@@ -4,11 +4,8 @@ recordings.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from pamrs.diagnosis.evidence import (
     Attempts,
@@ -27,11 +24,12 @@ from pamrs.diagnosis.evidence import (
 from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, depends, fits, form_in, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen, stand_of
+from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed, strained_parameters
+from pamrs.diagnosis.search._sets import beside_wrong, left_everywhere, settles, several
+from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
 from pamrs.errors import SimulationError
@@ -265,6 +263,14 @@ def _marginal(refit: _Refit) -> bool:
     )
 
 
+def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
+    """Of hypotheses of one name, one that lasts and one of events, the one that leaves least."""
+    best: dict[str, Candidate] = {}
+    for candidate in sorted(candidates, key=left_everywhere):
+        best.setdefault(candidate.key, candidate)
+    return [c for c in candidates if c is best[c.key]]
+
+
 def _hypotheses(
     refit: _Refit,
     screened: Screen,
@@ -286,104 +292,10 @@ def _hypotheses(
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)
-    if any(_settles(c, trial, start) for c in (*singles, *mistaken)):
-        return [start, *singles, *_beside_wrong(trial, singles, tell), *mistaken]
-    pairs = _pairs(trial, screened, start, singles, tell)
-    for effect, beside in _beside(trial, screened, start, singles, transient):
-        tell(f"looking for {effect} beside {beside.effects[0]}")
-        found = trial.transient(effect, beside)
-        pairs += [] if found is None else [found]
-    sets = [*singles, *pairs, *_grown(trial, screened, pairs, tell)]
-    return [start, *sets, *_beside_wrong(trial, sets, tell), *mistaken]
-
-
-def _beside_wrong(trial: Attempts, sets: list[Candidate], tell: Say) -> list[Candidate]:
-    """The single effect and the set that leave least, each beside a file that is wrong: parameters
-    that they move far, freed one at a time.
-    """
-    lasting = [c for c in sets if c.fit.events is None]
-    singles = [c for c in lasting if len(c.effects) == 1]
-    best = [min(part, key=_left_everywhere) for part in (singles, lasting) if part]
-    walls = trial.settings.fit.most_tolerances
-    found = []
-    for candidate in dict.fromkeys(best):
-        starts = [trial.start_of(candidate.fit, e) for e in candidate.effects]
-        for name in strained_parameters(trial, candidate.fit):
-            tell(f"trying {' + '.join(candidate.effects)} beside another {name}")
-            beside = trial.beside_wrong(starts, candidate.fit, (name,))
-            if beside is not None and beside.is_wrong(walls):
-                found.append(beside)
-    return found
-
-
-def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
-    """Of hypotheses of one name, one that lasts and one of events, the one that leaves least."""
-    best: dict[str, Candidate] = {}
-    for candidate in sorted(candidates, key=_left_everywhere):
-        best.setdefault(candidate.key, candidate)
-    return [c for c in candidates if c is best[c.key]]
-
-
-def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say) -> list[Candidate]:
-    """Sets of three effects and more: the pair that leaves least with one effect after the other,
-    as long as held-out recordings are clearly predicted better.
-    """
-    settings = trial.settings.search
-    lasting = [c for c in pairs if c.fit.events is None]
-    best = min(lasting, key=_left_everywhere, default=None)
-    found: list[Candidate] = []
-    while best is not None and len(best.effects) < settings.most_terms:
-        stand = stand_of(best.fit, trial.inner, trial.white)
-        ranked = by_effect(screened.scores(stand, without=best.effects)).values()
-        least = max(settings.least_gain, settings.partner_share * stand.power_left)
-        likely = [scores[0] for scores in ranked if scores[0].gain > least]
-        tried = []
-        for score in likely[: settings.most_partners]:
-            tell(f"trying {' + '.join([*best.effects, score.effect])}")
-            candidate = _with_partner(trial, best, score)
-            tried += [] if candidate is None else [candidate]
-        further = min(tried, key=_left_everywhere, default=None)
-        if further is None or not _predicts_better(further, best, trial):
-            break
-        found.append(further)
-        best = further
-    return found
-
-
-def _with_partner(trial: Attempts, candidate: Candidate, score: Score) -> Candidate | None:
-    """The effects of a candidate fitted together with a further one, from where both stand."""
-    begun = [trial.start_of(candidate.fit, effect) for effect in candidate.effects]
-    return trial.fitted([*begun, score.start.scaled(score.size)], candidate.fit, trial.white)
-
-
-def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
-    """Whether a larger set takes a telling share of what a smaller one leaves of held-out
-    recordings, and more than the pieces of the recordings differ in it.
-    """
-    settings = trial.settings.search
-    taken, left = [], 0.0
-    for block in trial.suspects:
-        before, after = (c.held_out[block.name].pieces for c in (best, further))
-        taken += [n * (was - now) for (was, n), (now, _) in zip(before, after, strict=True)]
-        left += sum(n * (was - 1.0) for was, n in before)
-    if len(taken) < 2 or left <= 0.0:
-        return False
-    error = math.sqrt(len(taken)) * float(np.std(taken, ddof=1))
-    gained = float(sum(taken))
-    return gained > settings.further_errors * error and gained > settings.further_share * left
-
-
-def _settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether a hypothesis leaves so little that no pair can be called for.
-
-    What a single effect leaves may be no more than the difference between its equation and the
-    truth.
-    """
-    evidence = trial.settings.evidence
-    if explains(candidate, start, trial.suspects, evidence):
-        return True
-    little = share_left(candidate, start, trial.suspects, evidence) < evidence.form_share
-    return little and not _untouched(candidate, start, trial)
+    if any(settles(c, trial, start) for c in (*singles, *mistaken)):
+        return [start, *singles, *beside_wrong(trial, singles, tell), *mistaken]
+    sets = [*singles, *several(trial, screened, start, singles, mistaken, transient, tell)]
+    return [start, *sets, *beside_wrong(trial, sets, tell), *mistaken]
 
 
 def _weighed(
@@ -578,11 +490,11 @@ def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
     """Of one effect's fits the one that leaves least; of forms that leave as little, the one that
     the catalogue lists first, which is the usual one.
     """
-    least = min(_left_everywhere(c) for c in fitted)
-    near = [c for c in fitted if _left_everywhere(c) <= least + alike]
+    least = min(left_everywhere(c) for c in fitted)
+    near = [c for c in fitted if left_everywhere(c) <= least + alike]
     (effect,) = near[0].effects
     order = ["", *(form.name for form in EFFECTS[effect].forms[1:])]
-    return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), _left_everywhere(c)))
+    return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), left_everywhere(c)))
 
 
 def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
@@ -601,14 +513,6 @@ def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
     alike = [s for s in scores if kind(s) == kind(scores[0])]
     near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
     return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
-
-
-def _left_everywhere(candidate: Candidate) -> float:
-    """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
-    by it the forms of an effect are compared.
-    """
-    stages = (candidate.fitted, candidate.held_out)
-    return sum(math.log(max(e.ratio, 1.0)) for stage in stages for e in stage.values())
 
 
 def _with_same_data(
@@ -677,108 +581,3 @@ def _as_twin(
     free = {f"{twin.id}.{same.size}": size, f"{twin.id}.{same.without}": 0.0}
     held = {f"{twin.id}.{name}": value for name, value in same.held}
     return trial.fitted([Start(twin.id, free, held, (), False)], start.fit, trial.white)
-
-
-def _beside(
-    trial: Attempts,
-    screened: Screen,
-    start: Candidate,
-    singles: list[Candidate],
-    happening: list[str],
-) -> list[tuple[str, Candidate]]:
-    """Effects with times of their own, each with a persistent one that it may have happened beside.
-
-    That is the persistent effect that leaves least, if it leaves much; and, of those that were
-    fitted, the one whose signature is in what the events leave.
-    """
-    settings, evidence = trial.settings.search, trial.settings.evidence
-
-    def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.suspects, evidence)
-
-    steady = [c for c in singles if c.fit.events is None]
-    best = min(steady, key=left_by, default=start)
-    found = (
-        [(e, best) for e in happening]
-        if settings.transient_beside < left_by(best) < settings.much_left
-        else []
-    )
-    mismatch = float(screened.stand.rows @ screened.stand.rows)
-    for single in singles:
-        if single.fit.events is None or left_by(single) > settings.much_left:
-            continue
-        # what the baseline can do is taken as without the events
-        kept = start.fit.residuals
-        left = {
-            key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()
-        }
-        beside = replace(start.fit, residuals=left, moved=single.fit.moved)
-        least = max(settings.least_gain, settings.partner_share * mismatch)
-        told = [
-            s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least
-        ]
-        partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
-        if partner is not None and (single.effects[0], partner) not in found:
-            found.append((single.effects[0], partner))
-    return found
-
-
-def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
-    """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
-    or held out.
-    """
-    much = trial.settings.search.much_left
-    stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
-    return [
-        b
-        for b in trial.suspects
-        if any(
-            significant(now[b.name]) and now[b.name].ratio - 1.0 > much * (was[b.name].ratio - 1.0)
-            for was, now in stages
-        )
-    ]
-
-
-def _pairs(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
-) -> list[Candidate]:
-    """For the best singles that leave something: the effects that would take most of it, fitted
-    together with them.
-    """
-    settings = trial.settings.search
-    persistent = [c for c in singles if c.fit.events is None]
-    ranked = sorted(
-        persistent, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects)
-    )[: settings.most_paired]
-    white = trial.white
-    mismatch = float(screened.stand.rows @ screened.stand.rows)
-    tried: set[frozenset[str]] = set()
-    found = []
-    for single in ranked:
-        stand = stand_of(single.fit, trial.inner, white)
-        partners = [
-            scores[0]
-            for scores in by_effect(screened.scores(stand, without=single.effects)).values()
-        ]
-        least = max(settings.least_gain, settings.partner_share * mismatch)
-        best = [score for score in partners if score.gain > least][: settings.most_partners]
-        # what is left in one block may be little beside what another one had: an effect of that
-        # block alone is tested by itself
-        for block in _untouched(single, start, trial):
-            there = [
-                s
-                for s in partners
-                if [b for b in trial.suspects if acts_in(s.effect, b)] == [block]
-            ]
-            own = [s for s in there if s.gain > settings.least_gain]
-            best += [score for score in own[:1] if score not in best]
-        for score in best:
-            both = frozenset({*single.effects, score.effect})
-            if both in tried:
-                continue
-            tried.add(both)
-            tell(f"trying {' + '.join(sorted(both))}")
-            candidate = _with_partner(trial, single, score)
-            if candidate is not None:
-                found.append(candidate)
-    return found

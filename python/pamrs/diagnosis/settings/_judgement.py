@@ -178,7 +178,7 @@ class EvidenceSettings(SettingsGroup):
         2.0,
         unit="standard deviations",
         least=0.0,
-        reason="the same by its uncertainty",
+        reason="standard deviations within which a value is not told from zero",
         origin="judgement",
     )
     unseen_lengths: float = setting(
@@ -192,8 +192,8 @@ class EvidenceSettings(SettingsGroup):
         6.5,
         unit="log odds",
         least=0.0,
-        reason="price of an effect with such a time constant, or with one below its own standard "
-        "deviation",
+        reason="price of an effect with such a time constant, or with one that is "
+        "not told from zero",
         origin="judgement",
     )
     scatter: float = setting(

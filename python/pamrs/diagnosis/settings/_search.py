@@ -162,6 +162,15 @@ class SearchSettings(SettingsGroup):
         reason="least predicted gain of a partner, as a share of the mismatch",
         origin="judgement; docs/decisions/0013",
     )
+    telling_left: float = setting(
+        0.8,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of a mismatch that a hypothesis may leave by itself to be fitted together "
+        "with the effects that leave least",
+        origin="docs/decisions/0053: it takes a fifth, as a further effect has to",
+    )
     transient_from: float = setting(
         0.15,
         unit="1",
