@@ -54,6 +54,9 @@ class Muscle:
     friction_presliding : float
         Motion over which the force goes from one branch of the hysteresis to the other in a
         simulation [m].
+    buckling_load : float
+        The most that one muscle pushes in a rig, where it bows out [N]; 1e9: it pushes like a strut,
+        without end. The methods here are those of a muscle that is held straight.
     count : int
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float
@@ -97,6 +100,7 @@ class Muscle:
         friction_pressure_slope: float = 0.0,
         friction_floor: float = 0.0,
         friction_presliding: float = 1e-3,
+        buckling_load: float = 1e9,
         count: int = 1,
         modulus_scale: float = 1.0,
         k0: float = 1.64,
@@ -123,6 +127,7 @@ class Muscle:
             "friction_pressure_slope": friction_pressure_slope,
             "friction_floor": friction_floor,
             "friction_presliding": friction_presliding,
+            "buckling_load": buckling_load,
             "k0": k0,
             "contraction_slope": contraction_slope,
             "extension_slope": extension_slope,

@@ -227,6 +227,14 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         ),
         Key("friction_floor", "1", 0.0, 1.0, 0.0, path=("friction", "floor")),
         Key("friction_presliding", "m", 1e-7, 1.0, 1e-3, path=("friction", "presliding")),
+        Key(
+            "buckling_load",
+            "N",
+            1e-2,
+            1e9,
+            1e9,
+            note="the most that one muscle pushes; 1e9 N: like a strut, without end",
+        ),
     ),
     "transmission": (
         Key("kind", default="tendon", kind="choice", choices=_TRANSMISSIONS),

@@ -49,7 +49,9 @@ impl Plan {
     pub(crate) fn new(rig: &Rig) -> Option<Self> {
         let wiring = &rig.wiring;
         let body = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Mass { .. });
-        let plain = wiring.ports.effects.is_empty() && wiring.groups.iter().all(|g| !g.direction);
+        // the curves hold torques, which know nothing of a muscle that goes slack
+        let plain = wiring.ports.effects.is_empty()
+            && wiring.groups.iter().all(|g| !g.direction && !g.muscle.buckles());
         let valves = wiring.groups.iter().all(|g| g.coordinate == 0);
         if !(body && plain && valves) {
             return None;

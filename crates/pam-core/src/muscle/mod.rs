@@ -20,7 +20,7 @@ pub mod table;
 
 pub use self::friction::Friction;
 pub use self::model::{Coefficients, Elasticity, ForceModel};
-pub use self::spec::{MuscleSpec, HIGHEST_ORDER};
+pub use self::spec::{MuscleSpec, HIGHEST_ORDER, STRUT};
 pub use self::table::{Table, TablePoint};
 use crate::braid::{MuscleGeometry, Shape};
 use crate::error::{check_range, Result};
@@ -158,6 +158,26 @@ impl CompiledMuscle {
         self.lengthening.is_some() || self.exact.friction.is_some()
     }
 
+    /// Whether the muscle buckles when it is pushed.
+    #[must_use]
+    pub fn buckles(&self) -> bool {
+        self.exact.spec.buckling_load < STRUT
+    }
+
+    /// The force [N] of a muscle that bows out when it is pushed: a pull as it is, a push up to the
+    /// buckling load, reached with a continuous slope at twice that push.
+    #[inline]
+    pub fn buckled<S: Scalar>(&self, force: S) -> S {
+        let load = self.exact.spec.buckling_load;
+        if force.re() >= 0.0 || !self.buckles() {
+            return force;
+        }
+        if force.re() <= -2.0 * load {
+            return constant(-load);
+        }
+        force + force * force / (4.0 * load)
+    }
+
     /// The presliding distance [m] over which the direction changes.
     #[must_use]
     pub fn presliding(&self) -> f64 {
@@ -224,6 +244,7 @@ fn check_direction(direction: f64) -> Result<f64> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+    use num_dual::Dual64;
 
     pub(crate) fn shoulder() -> MuscleSpec {
         MuscleSpec {
@@ -265,7 +286,7 @@ pub(crate) mod tests {
     #[test]
     fn impossible_parameters_are_named() {
         type Change = fn(&mut MuscleSpec);
-        let changes: [(&str, Change); 13] = [
+        let changes: [(&str, Change); 14] = [
             ("muscle.model", |s| s.model = "spring".into()),
             ("muscle.geometry", |s| s.geometry = Some("sphere".into())),
             ("muscle.count", |s| s.count = 0),
@@ -279,6 +300,7 @@ pub(crate) mod tests {
             ("muscle.c10", |s| s.c10 = 1e5),
             ("muscle.friction_coefficient", |s| s.friction_coefficient = f64::NAN),
             ("muscle.neck_floor", |s| s.neck_floor = 1.5),
+            ("muscle.buckling_load", |s| s.buckling_load = 0.0),
         ];
         for (name, change) in changes {
             let mut spec = shoulder();
@@ -306,5 +328,31 @@ pub(crate) mod tests {
         let spec: MuscleSpec = serde_json::from_str(&format!("{text}}}")).unwrap();
         assert!(spec.validate().is_ok());
         assert!(serde_json::from_str::<MuscleSpec>(&format!("{text}, \"colour\": 1}}")).is_err());
+    }
+
+    #[test]
+    fn a_muscle_pulls_as_it_does_and_pushes_no_more_than_it_can() {
+        let load = 3.5;
+        let spec = MuscleSpec { buckling_load: load, ..shoulder() };
+        let muscle = CompiledMuscle::new(Muscle::new(&spec).unwrap()).unwrap();
+        let strut = CompiledMuscle::new(Muscle::new(&shoulder()).unwrap()).unwrap();
+        assert!(muscle.buckles() && !strut.buckles());
+        let mut before = f64::NEG_INFINITY;
+        for k in 0..=4000 {
+            let force = -10.0 + f64::from(k) * 0.005;
+            let (held, straight) = (muscle.buckled(force), strut.buckled(force));
+            assert_eq!(straight, force);
+            assert!(held >= before && held >= -load && held >= force, "{force} N");
+            before = held;
+            if force >= 0.0 {
+                assert_eq!(held, force);
+            }
+            let slope = muscle.buckled(Dual64::new(force, 1.0)).eps;
+            let step = 1e-6;
+            let change =
+                (muscle.buckled(force + step) - muscle.buckled(force - step)) / (2.0 * step);
+            assert!((slope - change).abs() < 1e-5, "{force} N: {slope} and {change}");
+        }
+        assert_eq!(muscle.buckled(-500.0), -load);
     }
 }

@@ -54,7 +54,7 @@ impl<S: Scalar> Plant<'_, S> {
             let force = table.force(gauge, scale);
             self.directed(group, memory, start, *contraction, gauge, scale, force)
         };
-        force * group.count
+        group.muscle.buckled(force) * group.count
     }
 
     /// The force of one muscle for the way in which it has been moving.
