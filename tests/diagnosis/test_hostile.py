@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 import pamrs
 from pamrs.control import trajectories
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import implausible
+from pamrs.diagnosis.prepare import implausible, suspected_units
 from pamrs.reproduce import _lift as lift
 from pamrs.reproduce._lift_diagnosis import recorded
 
@@ -258,3 +258,19 @@ def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
         "goes against valve_command" in text
         for text in implausible(turned, model, SETTINGS.plausibility)
     )
+
+
+def test_a_unit_that_physics_contradicts_is_named_where_a_case_is_refused(
+    plain: Table, tmp_path: Path
+) -> None:
+    psi = plain | {c: plain[c] / 6894.757 for c in ("supply_pressure", "muscle_pressure")}
+    units = {"supply_pressure": "bar", "muscle_pressure": "bar"}
+    with pytest.raises(pamrs.DiagnosisError, match="read as psi it reaches"):
+        pamrs.diagnose(loaded(tmp_path, psi, units))
+
+
+def test_nothing_is_suspected_of_units_that_are_right(plain: Table, tmp_path: Path) -> None:
+    case = loaded(tmp_path, plain)
+    (recording,) = case.recordings
+    assert recording.said == {c: HEADINGS[c] for c in recording.channels}
+    assert suspected_units(case) == []

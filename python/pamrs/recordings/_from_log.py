@@ -97,7 +97,10 @@ def load_recordings(
     content = log or read_log(file, form)
     stem = re.sub(r"\.[^.]*$", "", file.name.removesuffix(".gz"))
     found = recordings_of(content, sources, clock, name or stem, role, sample_time, cut, pieces)
-    return [replace(recording, source=source).between(start, stop) for recording in found]
+    said = {item.channel: item.unit for item in sources}
+    return [
+        replace(recording, source=source, said=said).between(start, stop) for recording in found
+    ]
 
 
 def recordings_of(

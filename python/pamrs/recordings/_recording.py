@@ -159,6 +159,8 @@ class Recording:
         The file that it was read from.
     parameters : dict of str to OwnValue
         Parameters of the rig that had another value in it than in the rig file, by dotted name.
+    said : dict of str to str
+        Unit in which the file has each channel, as far as it was read from one.
     """
 
     name: str
@@ -171,6 +173,7 @@ class Recording:
     units: dict[str, str] = field(default_factory=dict)
     source: str = ""
     parameters: dict[str, OwnValue] = field(default_factory=dict)
+    said: dict[str, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -372,7 +375,8 @@ def load_recording(
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
     recording = assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
-    return replace(recording, source=source)
+    said = {channel: unit for channel, (_, unit) in wanted.items() if channel != "time"}
+    return replace(recording, source=source, said=said)
 
 
 # ------------------------------------------------------------------------- columns

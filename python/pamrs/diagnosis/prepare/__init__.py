@@ -3,10 +3,10 @@ from their measured neighbours.
 
 Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible`, `without_impossible` (what recordings
-cannot be), `prepare`,
-`Prepared`, `binned`, `noise_level`, `smoothed` (signals), `Block`, `Residual`, `available_blocks`,
-`begun`, `change`, `predicted`, `residual` (blocks and their residuals).
+`check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
+recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed` (signals),
+`Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and
+their residuals).
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from pamrs.diagnosis.prepare._plausible import (
     without_impossible,
 )
 from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
+from pamrs.diagnosis.prepare._units import suspected_units
 
 __all__ = [
     "Block",
@@ -50,6 +51,7 @@ __all__ = [
     "prepare",
     "residual",
     "smoothed",
+    "suspected_units",
     "without_copies",
     "without_impossible",
 ]
