@@ -26,7 +26,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
-from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.evidence import Group, calibrated
 from pamrs.diagnosis.explain import assemble, data_used
 from pamrs.diagnosis.fit import Problem, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
@@ -38,6 +38,7 @@ from pamrs.diagnosis.prepare import (
     check_plausible,
     check_sense,
     prepare,
+    suspected_units,
     without_copies,
     without_impossible,
 )
@@ -197,9 +198,13 @@ def diagnose(
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
     held = _said_of_held(case.rig)
+    suspected = suspected_units(case)
     case = case.with_rig(without_passing(case.rig))
     chosen = DiagnosisSettings() if settings is None else settings
-    check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    try:
+        check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+    except DiagnosisError as error:
+        raise DiagnosisError("\n".join([str(error), *suspected])) from error
     sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
     case = replace(case, recordings=sound)
     kept, copies = without_copies(case.recordings, chosen.overlap)
@@ -214,13 +219,14 @@ def diagnose(
     motion = [b for b in blocks if b.mechanical]
     with _in_range(case.name):
         groups = _examined(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
+        groups = [calibrated(group, chosen.verdict) for group in groups]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
         if unsettled:
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*copies, *masked, *held, *left_out, *diagnosis.warnings]
+    warnings = [*suspected, *copies, *masked, *held, *left_out, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(

@@ -4,7 +4,7 @@ Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
 `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
 `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
-`case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
+`calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pamrs.diagnosis.evidence._candidates import (
 )
 from pamrs.diagnosis.evidence._verdicts import (
     Judged,
+    calibrated,
     case_ambiguity,
     case_probabilities,
     case_verdict,
@@ -51,6 +52,7 @@ __all__ = [
     "Ranges",
     "autocorrelation_of",
     "capped",
+    "calibrated",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",

@@ -260,7 +260,6 @@ class Attempts:
             autocorrelation,
             fixed=kept,
             warm=warm,
-            frozen=True,
             events=found.events,
             evaluations=self.settings.transients.evaluations_beside,
             forms=forms,
@@ -333,7 +332,6 @@ class Attempts:
                 autocorrelation,
                 fixed=held,
                 warm=warm,
-                frozen=True,
                 evaluations=limit,
                 share=share,
                 forms=forms,
@@ -351,7 +349,6 @@ class Attempts:
                     autocorrelation,
                     fixed=held,
                     warm=best,
-                    frozen=True,
                     evaluations=limit,
                     share=share,
                     forms=forms,
@@ -434,9 +431,7 @@ class Attempts:
         evaluations: int,
         share: float | None = None,
     ) -> Candidate:
-        """Effects fitted on from a fit, with the sensitivities of every parameter where it is and
-        some parameters freed.
-        """
+        """Effects fitted on from a fit, with some parameters freed."""
         effects = tuple(start.effect for start in starts)
         free, held, forms = parts_of(starts)
         found = fit(
@@ -488,12 +483,10 @@ class Attempts:
             return None
 
     def polished(self, candidate: Candidate) -> Candidate:
-        """A fitted set of persistent effects, fitted on with the sensitivities of every parameter
-        where it is.
+        """A fitted set of persistent effects, fitted to its end.
 
-        The first fit keeps the baseline's sensitivities as they were without the effects and ends
-        where little is to be gained; of sets that nearly say the same the one that was left further
-        from its end would lose.
+        The first fit ends where little is to be gained; of sets that nearly say the same the one
+        that was left further from its end would lose.
         """
         found = candidate.fit
         if found.events is not None or not candidate.effects:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
 from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
@@ -18,6 +18,7 @@ from pamrs.findings import HEALTHY
 
 __all__ = [
     "Judged",
+    "calibrated",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
@@ -106,6 +107,19 @@ def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
     for name, share in quiet.items():
         found[name] = found.get(name, 0.0) + unchanged * share
     return {key: p for key, p in found.items() if p >= own.counted or key in WITHOUT_NAME}
+
+
+def calibrated(group: Group, settings: VerdictSettings) -> Group:
+    """A group whose probabilities are as often right as they say.
+
+    Where hypotheses compete for a mismatch, the logarithm of the odds between any two of them
+    counts a share (`certainty` of the settings) that was found on cases of another plant: what
+    speaks for a name are residuals of which no model is quite true.
+    """
+    if group.mismatch is None or group.below_noise:
+        return group
+    powers = {key: p**settings.certainty for key, p in group.probabilities.items() if p > 0.0}
+    return replace(group, probabilities=_normalised(powers))
 
 
 def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:

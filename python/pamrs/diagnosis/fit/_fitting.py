@@ -435,7 +435,6 @@ def fit(
     *,
     fixed: dict[str, float] | None = None,
     warm: Fit | None = None,
-    frozen: bool = False,
     events: Events | None = None,
     evaluations: int | None = None,
     share: float | None = None,
@@ -462,9 +461,6 @@ def fit(
         Effect parameters that are held.
     warm : Fit, optional
         A fit of the same problem from whose baseline values to start.
-    frozen : bool, optional
-        Take the sensitivities of the baseline parameters from ``warm`` and compute those of the
-        effects alone.
     events : Events, optional
         What happens in single recordings, held.
     evaluations : int, optional
@@ -489,17 +485,11 @@ def fit(
     scaling = Scaling(nominal, baseline, starts, own, freed, forms)
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
-    kept = _jacobian_of(warm, baseline) if frozen and warm is not None else None
-    wanted = scaling.names if kept is None else list(starts)
     prior = np.zeros((count, len(scaling.names)))
     prior[:, :count] = np.diag(bound)
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
-        found = residuals(problem, scaling.rig(x, fixed or {}), wanted, events)
-        if kept is not None:
-            found = {
-                key: replace(r, jacobian=_beside(kept[key], r.jacobian)) for key, r in found.items()
-            }
+        found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
         rows, slope = stacked(problem, found, inflation)
         slopes = np.array(
             [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
@@ -542,16 +532,3 @@ def fit(
         loose,
         dict(inflation),
     )
-
-
-def _jacobian_of(fitted: Fit, names: Sequence[str]) -> dict[Key, Array]:
-    """Sensitivities that a fit ended with, for some of its parameters."""
-    columns = [list(fitted.values).index(name) for name in names]
-    return {
-        key: np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian[:, columns]
-        for key, r in fitted.residuals.items()
-    }
-
-
-def _beside(left: Array, right: Array | None) -> Array:
-    return left if right is None else np.concatenate([left, right], axis=1)

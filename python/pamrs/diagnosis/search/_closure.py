@@ -612,7 +612,6 @@ def _fitted(
                 inflation,
                 fixed=held,
                 warm=replace(warm, values=shifted),
-                frozen=True,
                 evaluations=evaluations,
             )
         except SimulationError:
