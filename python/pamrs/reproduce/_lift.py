@@ -75,7 +75,7 @@ _STEP, _ROW = 1e-3, 0.01
 _SEED: Final = 1
 
 #: Name -> kM, then kP and kI, or g1, g2 and h, in radians and volts; kM = 0: no feedforward.
-GAINS: Final[Mapping[str, Gains]] = {
+GAINS: Final[Mapping[str, tuple[float, ...]]] = {
     "PID": (0.0, 1.4, 2.5),
     "FF": (0.5, 0.0, 0.0),
     "FF+PID": (1.0, 5.0, 2.0),
@@ -216,7 +216,7 @@ def plant(
         assumed(variant).with_parameters({"arm.payload": payload}), seed
     ).with_parameters(variant.hidden)
     if variant.hysteresis:
-        rig = with_muscle(rig, **HYSTERESIS)
+        rig = with_muscle(rig, None, **HYSTERESIS)
     if variant.regulated:
         model = rig.model
         fed = {
