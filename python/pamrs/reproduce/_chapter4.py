@@ -746,6 +746,7 @@ def in_short(rows: list[Comparison]) -> list[str]:
     ]
     strong = "smooth muscle, damping 12000 N s/m, activation 50 kPa"
     best = told.row("printed maps", "PID: kP of the smallest J, 11 kg").note
+    fuzzy = told.row("printed maps", "fuzzy: g1 of the smallest J, 23 kg").note
     border = f"kP {_AXES['kP'][0]:.2f}"
     return [
         "The score is of the plant that the chapter prints: two branches of the muscle's force, "
@@ -756,8 +757,8 @@ def in_short(rows: list[Comparison]) -> list[str]:
         "gains that are printed (for 23 kg) at every payload.",
         f"The library's smooth muscle with the hysteresis of (2.36), of another muscle, has "
         f"{tried[RUBBING]} with the printed gains and {tried[RUBBING + own]} with its own maps', "
-        f"without hysteresis {tried[SMOOTH]}. The flow of the measured motion costs: "
-        f"{tried[PRINTED + _MEASURED]}, {tried[RUBBING + _MEASURED]} and "
+        f"without hysteresis {tried[SMOOTH]}. With the measured motion in the "
+        f"feedforward: {tried[PRINTED + _MEASURED]}, {tried[RUBBING + _MEASURED]} and "
         f"{tried[SMOOTH + _MEASURED]} of the same three.",
         "A smooth muscle with a damping of 12000 N s/m (60 times the usual) and an activation "
         f"pressure of 50 kPa, both chosen by their score, has {tried[strong]}, and "
@@ -778,6 +779,8 @@ def in_short(rows: list[Comparison]) -> list[str]:
         "4.5.1.2 contradicts itself: the best kP is 'just above kP = 1 at 11 kg' and 'decreases "
         f"with increasing payload', and it is 1.4 at 23 kg. Ours: {best.partition('; in')[0]}"
         f"{_BORDER if border in best else ''}.",
+        f"The fuzzy optimum of 23 kg: {fuzzy.split('; ')[1].removeprefix('23 kg: ')}; printed are "
+        "g1 0.45, h 0.65.",
         "Clamping at the valve's limits does not change the PID's wind-up, as it does not reach "
         "them.",
         "No value of nu or omega is printed, so the unit of the curvature cannot be read off. By "
