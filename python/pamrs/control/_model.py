@@ -106,10 +106,9 @@ def torque_line(rig: Rig, angle: ArrayLike, *, lengthening: bool = False) -> tup
         friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0
     )
     contraction = joint.shortening(angle) / float(muscle.parameters["rest_length"])
-    direction = 1.0 if lengthening else -1.0
-    arm = count * joint.torque_arm(angle)
+    direction, arm = (1.0 if lengthening else -1.0), joint.torque_arm(angle)
     zero, full = (
-        np.asarray(smooth.force(p, contraction, direction) * arm) for p in (0.0, pressure)
+        np.asarray(count * smooth.force(p, contraction, direction) * arm) for p in (0.0, pressure)
     )
     return (full - zero) / pressure, zero
 

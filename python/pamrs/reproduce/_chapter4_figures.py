@@ -49,79 +49,50 @@ def pictures() -> list[Picture]:
     ]
 
 
-def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
+Drawn = tuple[str, str, Callable[[], Figure], str]
+
+
+def _pictures() -> list[Drawn]:
     """Name, group, function and caption of each picture."""
     model, feedback = ("FF+fuzzy", "FF+PID"), ("PID", "fuzzy")
+    rubbing = "with the library's muscle and hysteresis (2.36)"
+    model_words = "feedforward with fuzzy and with PID feedback, angle and pressure"
+    map_words = "metrics over their least; circle: optimum, cross: published"
+    series_words = (
+        "Fig. 4.14: the series of kM with 23 kg, the plant as printed, with the library's muscle "
+        "and hysteresis (2.36), and with that muscle alone."
+    )
+    optima_words = (
+        "Fig. 4.9: gains of the smallest J by payload; grey: what the text prints, 'just above kP "
+        "= 1' and 'near kI = 4' at 11 kg."
+    )
+    effects_words = (
+        "How many of the statements agree, with the printed gains; dark: the plant as printed."
+    )
+
+    def lifts(plant: str, name: str, words: tuple[str, str]) -> list[Drawn]:
+        return [
+            (f"{name}_model", name, partial(_lifts, plant, model), words[0]),
+            (f"{name}_feedback", name, partial(_lifts, plant, feedback), words[1]),
+        ]
+
+    printed = (
+        f"Figs. 4.6 and 4.7, the plant as printed: {model_words}.",
+        "Figs. 4.10 and 4.11, the plant as printed: PID and fuzzy control.",
+    )
+    maps = f"Fig. 4.5 and its like for PID, the plant as printed, 23 kg: {map_words}."
     return [
-        (
-            "printed_model",
-            "printed",
-            partial(_lifts, PRINTED, model),
-            (
-                "Figs. 4.6 and 4.7, the plant as printed: feedforward with fuzzy and with PID "
-                "feedback, angle and pressure."
-            ),
-        ),
-        (
-            "printed_feedback",
-            "printed",
-            partial(_lifts, PRINTED, feedback),
-            "Figs. 4.10 and 4.11, the plant as printed: PID and fuzzy control.",
-        ),
-        (
-            "series",
-            "printed",
-            _series,
-            (
-                "Fig. 4.14: the series of kM with 23 kg, the plant as printed, with the library's "
-                "muscle and hysteresis (2.36), and with that muscle alone."
-            ),
-        ),
-        (
-            "rubbing_model",
+        *lifts(PRINTED, "printed", printed),
+        ("series", "printed", _series, series_words),
+        *lifts(
+            RUBBING,
             "rubbing",
-            partial(_lifts, RUBBING, model),
-            "Figs. 4.6 and 4.7 with the library's muscle and hysteresis (2.36).",
+            (f"Figs. 4.6 and 4.7 {rubbing}.", f"Figs. 4.10 and 4.11 {rubbing}."),
         ),
-        (
-            "rubbing_feedback",
-            "rubbing",
-            partial(_lifts, RUBBING, feedback),
-            "Figs. 4.10 and 4.11 with the library's muscle and hysteresis (2.36).",
-        ),
-        (
-            "printed_maps",
-            "printed maps",
-            partial(_maps, PRINTED),
-            (
-                "Fig. 4.5 and its like for PID, the plant as printed, 23 kg: metrics over their "
-                "least; circle: optimum, cross: published."
-            ),
-        ),
-        (
-            "optima",
-            "printed maps",
-            _optima,
-            (
-                "Fig. 4.9: gains of the smallest J by payload; grey: what the text prints, 'just "
-                "above kP = 1' and 'near kI = 4' at 11 kg."
-            ),
-        ),
-        (
-            "rubbing_maps",
-            "rubbing maps",
-            partial(_maps, RUBBING),
-            "The same with the library's muscle and hysteresis (2.36).",
-        ),
-        (
-            "effects",
-            "effects",
-            _effects,
-            (
-                "How many of the statements agree, with the printed gains; dark: the plant as "
-                "printed."
-            ),
-        ),
+        ("printed_maps", "printed maps", partial(_maps, PRINTED), maps),
+        ("optima", "printed maps", _optima, optima_words),
+        ("rubbing_maps", "rubbing maps", partial(_maps, RUBBING), f"The same {rubbing}."),
+        ("effects", "effects", _effects, effects_words),
     ]
 
 
