@@ -223,6 +223,8 @@ def test_page_has_every_plant_and_no_picture_is_missing():
 def test_the_printed_muscle_lets_go_at_its_free_contraction():
     """3.2.2: 37 % at 150 psi; and (4.7) is above (4.4), since it resists being stretched."""
     muscle = two_branches()
+    told = {name: value for name, value, _ in chapter4.chosen()}["E_R of (4.5), (4.6)"]
+    assert told == f"{muscle.parameters['bladder_modulus'] / 1e6:.2f} MPa"
     psi = 150.0 * PSI
     assert float(muscle.force(psi, 0.37, -1.0)) == pytest.approx(0.0, abs=1e-6)
     up, down = (muscle.force(psi, [0.05, 0.2, 0.35], way) for way in (-1.0, 1.0))
