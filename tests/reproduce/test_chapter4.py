@@ -273,3 +273,10 @@ def test_an_error_too_small_for_a_figure_decides_nothing():
     fact = "fuzzy: error at the end of the hold, least"
     for late, verdict in ((0.3, "differs"), (5.05, "cannot tell"), (5.5, "agree")):
         assert verdicts(fuzzy=made(late=late))[fact] == verdict
+
+
+def test_an_optimum_at_the_end_of_a_line_decides_nothing():
+    inside, end = [0.3, 0.6, 0.4], [0.3, chapter4._RATE[-1], 0.4]
+    assert chapter4._at_an_end(inside) == ""
+    assert "end of the line" in chapter4._at_an_end(end)
+    assert "end of the line" in chapter4._at_an_end([chapter4._RATE[0], 0.3])

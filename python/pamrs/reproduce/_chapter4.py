@@ -104,7 +104,7 @@ CHOSEN: Final = (
 _AXES: Final = {"kP": (0.2, 3.8), "kI": (0.0, 6.0), "g1": (0.15, 1.05), "h": (0.2, 2.0)}
 #: Values of kD [V s/rad] and g2 [rad/s] beside the best of those.
 _DERIVATIVE: Final = (0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
-_RATE: Final = (0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6)
+_RATE: Final = (0.15, 0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 3.2, 6.4)
 _POINTS: Final = {True: 13, False: 7}
 _KG: Final = ("11 kg", "23 kg", "34 kg")
 
@@ -325,10 +325,18 @@ def _lines(done: Experiments) -> list[Comparison]:
             1.0,
             max(g2) / min(g2),
             tolerance=1.0,
+            cannot_tell=_at_an_end(g2),
             note="beside the best g1 and h, "
             + by_payload.format(*(x for pair in zip(g2, _KG, strict=True) for x in pair)),
         ),
     ]
+
+
+def _at_an_end(g2: list[float]) -> str:
+    """Why a ratio of the best g2 decides nothing: an end of the line is no optimum."""
+    if not {_RATE[0], _RATE[-1]} & set(g2):
+        return ""
+    return "J is smallest at an end of the line, which is ours: there is no optimum to compare"
 
 
 # ------------------------------------------------------------------------- wind-up
