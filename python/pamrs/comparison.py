@@ -54,6 +54,9 @@ class Comparison:
         By the tolerance or the relation.
     used : bool
         The statement took part in choosing our numbers, so that agreement proves nothing.
+    apart : str
+        Why it is no part of the score: another reading of a statement that is there already, a
+        trial, a diagnosis of our own; empty where it is.
     """
 
     group: str
@@ -69,6 +72,7 @@ class Comparison:
     verdict: str
     used: bool
     note: str
+    apart: str = ""
 
     @property
     def criterion(self) -> str:
@@ -132,6 +136,7 @@ def judge(
     used: bool = False,
     cannot_tell: str = "",
     note: str = "",
+    apart: str = "",
 ) -> Comparison:
     """Compare one number with a published one.
 
@@ -153,6 +158,8 @@ def judge(
         Why nothing can be decided; the verdict is then "cannot tell", and this the remark.
     note : str
         A remark; it follows ``cannot_tell`` where both are given.
+    apart : str
+        Why the line is no part of the score.
 
     Returns
     -------
@@ -193,6 +200,7 @@ def judge(
         verdict=verdict,
         used=used,
         note="; ".join(part for part in (cannot_tell, note) if part),
+        apart=apart,
     )
 
 
@@ -279,7 +287,8 @@ def markdown(
                 number += 1
                 mark = f" [{number}]"
                 remarks.append(f"- [{number}] {row.fact}: {row.note}")
-            verdict = f"**{_verdict(row)}**" if row.verdict == "differs" else _verdict(row)
+            counts = row.verdict == "differs" and not row.apart
+            verdict = f"**{_verdict(row)}**" if counts else _verdict(row)
             cells = (
                 row.fact,
                 row.where,
@@ -318,13 +327,18 @@ def to_csv(rows: Iterable[Comparison]) -> str:
 
 
 def verdicts(rows: Sequence[Comparison]) -> str:
-    """How many statements agree, differ, or cannot tell, in words."""
-    found = {verdict: sum(row.verdict == verdict for row in rows) for verdict in VERDICTS}
-    used = sum(row.verdict == "agree" and row.used for row in rows)
+    """How many statements agree, differ, or cannot tell, in words, and how many lines stand
+    apart.
+    """
+    counted = [row for row in rows if not row.apart]
+    found = {verdict: sum(row.verdict == verdict for row in counted) for verdict in VERDICTS}
+    used = sum(row.verdict == "agree" and row.used for row in counted)
     note = f" ({used} used to identify)" if used else ""
+    rest = len(rows) - len(counted)
+    apart = f"; {rest} lines stand apart" if rest > 1 else "; 1 line stands apart" if rest else ""
     return (
         f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot "
-        "tell"
+        f"tell{apart}"
     )
 
 
@@ -333,7 +347,10 @@ def _published(row: Comparison) -> str:
 
 
 def _verdict(row: Comparison) -> str:
-    return row.verdict + (" (used to identify)" if row.used else "")
+    verdict = row.verdict + (" (used to identify)" if row.used else "")
+    if not row.apart:
+        return verdict
+    return f"({row.apart})" if row.verdict == "cannot tell" else f"({row.apart}: {verdict})"
 
 
 def _cell(value: Any) -> str:

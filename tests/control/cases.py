@@ -13,6 +13,7 @@ from pamrs.control import (
     Cascade,
     DeadZoneCompensation,
     Feedforward,
+    FullTorque,
     Fuzzy,
     HysteresisCompensation,
     Neural,
@@ -28,6 +29,8 @@ FULL = ArmModel.from_rig(SHOULDER)
 SIMPLIFIED = ArmModel.from_rig(SHOULDER, torque="simplified")
 GAYLORD = ArmModel.from_rig(SHOULDER, torque="gaylord")
 AIR = AirModel(SHOULDER)
+#: Another torque than that of FULL, so that a feedforward has two branches.
+LENGTHENING = FullTorque(SHOULDER.with_parameters({"muscle.modulus_scale": 0.8}), lengthening=True)
 DIAGNOSED = SHOULDER.with_effect(
     "muscle_hysteresis", {"friction_constant": 15.0, "friction_pressure": 8e-5, "presliding": 1e-3}
 ).with_effect("valve_dead_zone", {"half_width": 0.04})
@@ -47,6 +50,9 @@ CONTROLLERS = {
     "feedforward": lambda x: Feedforward(FULL, AIR, 1.0 * x, period=PERIOD),
     "feedforward friction": lambda x: Feedforward(
         FULL.scaled(x), AIR, 5.0, friction=True, pressure_filter=0.01, period=PERIOD
+    ),
+    "feedforward measured": lambda x: Feedforward(
+        FULL, AIR, 1.0 * x, motion="measured", lengthening=LENGTHENING, period=PERIOD
     ),
     "feedforward + pid": lambda x: Parallel(
         Feedforward(FULL, AIR, 1.0, period=PERIOD), PID(x, 0.3, period=PERIOD)

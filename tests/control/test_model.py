@@ -74,6 +74,58 @@ def test_desired_pressure_holds_the_simulated_arm_where_it_should_be():
         )
 
 
+def test_air_of_the_feedforward_is_that_of_the_motion_it_is_told():
+    """(4.13) at a pressure that is wanted: what flows makes up for the volume that grows."""
+    air, arm = AirModel(SHOULDER), ArmModel.from_rig(SHOULDER)
+    aim = Reference(math.radians(60.0), 0.4, 0.0)
+    wanted = float(Feedforward(arm, air, 1.0).desired_pressure(aim))
+    supply = air.supply_pressure
+
+    def command(motion, degrees):
+        """At the second of two samples 1 s apart in which the joint turns by 0.1 rad."""
+        controller = Feedforward(arm, air, 1.0, motion=motion, rate_filter=0.0, period=1.0)
+        last = math.radians(degrees)
+        for time, angle in ((0.0, last - 0.1), (1.0, last)):
+            volts = controller.update(time, {"joint_angle": angle, "muscle_pressure": wanted}, aim)
+        return volts - 5.0
+
+    told = air.command(0.0, wanted, supply, aim.angle, aim.rate)
+    assert told > 0.1
+    for degrees in (40.0, 70.0):
+        assert command("commanded", degrees) == pytest.approx(told, rel=1e-12)
+        there = air.command(0.0, wanted, supply, math.radians(degrees), 0.1)
+        assert command("measured", degrees) == pytest.approx(there, rel=1e-9)
+    with pytest.raises(ParameterError, match=r"motion = 'guessed' is not allowed: 'commanded' or"):
+        Feedforward(arm, air, 1.0, motion="guessed")
+
+
+def test_a_muscle_of_two_branches_has_two_desired_pressures():
+    """(4.12) with (4.4) up and with (4.7) down: each gives the torque in its own direction."""
+    muscle = SHOULDER.muscle.replace(
+        model="elbow_linear", bladder_modulus=1.5e6, extension_factors=(0.3, 0.8, 0.8)
+    )
+    rig = pamrs.Rig("two", {**SHOULDER.model, "muscle": {**muscle.parameters, "count": 6}})
+    arm, joint = ArmModel.from_rig(rig), Joint.from_model(rig.model["joint"])
+    down = FullTorque(rig, lengthening=True)
+    both = Feedforward(arm, AirModel(rig), 1.0, lengthening=down)
+    angle = math.radians(60.0)
+    contraction = float(joint.shortening(angle)) / muscle.parameters["rest_length"]
+    pressures = []
+    for rate, direction in ((0.3, -1.0), (0.0, -1.0), (-0.3, 1.0)):
+        pressure = float(both.desired_pressure(Reference(angle, rate, 0.0)))
+        torque = 6 * muscle.force(pressure, contraction, direction) * joint.torque_arm(angle)
+        assert float(torque) == pytest.approx(float(arm.weight) * math.sin(angle), rel=1e-7)
+        pressures.append(pressure)
+    assert pressures[0] == pressures[1] > pressures[2] + 1e3
+    rates = np.array([0.3, 0.0, -0.3])
+    together = both.desired_pressure(Reference(angle + 0.0 * rates, rates, 0.0 * rates))
+    np.testing.assert_allclose(together, pressures, rtol=1e-12)
+    # friction is no part of a line in the pressure
+    rubbing = {**rig.model["muscle"], "friction_coefficient": 0.16}
+    same = torque_line(pamrs.Rig("rubbing", {**rig.model, "muscle": rubbing}), angle)
+    np.testing.assert_array_equal(same, torque_line(rig, angle))
+
+
 def test_orifice_inverse_against_the_core():
     gas = SHOULDER.model["gas"]
     values = (

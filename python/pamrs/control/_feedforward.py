@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 
 from pamrs.control._air import AirModel
 from pamrs.control._joint_sensor import JointSensor
-from pamrs.control._model import ArmModel
+from pamrs.control._model import ArmModel, TorqueModel
 from pamrs.control._parts import LowPass
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Fixed, Restorer, SampledController
-from pamrs.control._values import as_value, clip, sin
+from pamrs.control._values import as_value, clip, sin, where
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -26,7 +26,8 @@ class Feedforward(SampledController):
 
     ``tau_d = I theta_d'' + m g r sin(theta_d)``, ``P_d`` that gives it at ``theta_d``,
     ``P_d' = kM (P_d - P)``, and the valve command that :meth:`pamrs.control.AirModel.command` finds
-    at the measured angle, rate and pressures.
+    with the measured pressures and the volume and its rate where the joint is to be, or where it
+    is.
 
     Parameters
     ----------
@@ -41,14 +42,22 @@ class Feedforward(SampledController):
         Time between two updates [s].
     friction : bool
         Whether ``b theta_d'`` is added to ``tau_d``; as printed it is not.
+    motion : {"commanded", "measured"}
+        Angle and rate of which ``V`` and ``V'`` in (4.13) are: of the commanded trajectory, as the
+        dissertation has it (the pressure is its only measurement, 4.3.2.1), or of the joint.
+    lengthening : TorqueModel, optional
+        Torque of the muscles while they lengthen, taken for ``P_d`` where the commanded rate is
+        below zero: (4.7) in the place of (4.4). By default the arm's own torque, both ways.
     pressure_filter, rate_filter, angle_filter : float or ndarray, shape (n,)
-        Time constants of the low-passes on pressure, rate and angle [s].
+        Time constants of the low-passes on pressure, rate and angle [s]; the last two with the
+        measured motion only.
     measured_rate : bool
-        As for :class:`pamrs.control.PID`.
+        As for :class:`pamrs.control.PID`, with the measured motion only.
 
     Notes
     -----
-    The supply's pressure is that of the channel ``supply_pressure`` where there is one, else the
+    With the commanded motion no angle is needed; one that is there is checked all the same. The
+    supply's pressure is that of the channel ``supply_pressure`` where there is one, else the
     rig's initial one. With ``km = 0`` the whole feedforward is switched off, also what would hold
     the pressure while the volume changes, as in the dissertation's series (kM = 0 is pure feedback
     there).
@@ -71,12 +80,18 @@ class Feedforward(SampledController):
         *,
         period: float = 1e-3,
         friction: bool = False,
+        motion: str = "commanded",
+        lengthening: TorqueModel | None = None,
         pressure_filter: Value = 0.0,
         rate_filter: Value = 0.02,
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        self.arm, self.air = arm, air
+        if motion not in ("commanded", "measured"):
+            raise ParameterError(
+                f"motion = {motion!r} is not allowed: 'commanded' or 'measured' is needed"
+            )
+        self.arm, self.air, self.motion, self.lengthening = arm, air, motion, lengthening
         self._km = as_value("km", km, lower=0.0)
         self._on: Value = (
             (1.0 if self._km > 0.0 else 0.0)
@@ -122,7 +137,11 @@ class Feedforward(SampledController):
         torque = arm.inertia * reference.acceleration + arm.weight * sin(reference.angle)
         if self._friction:
             torque = torque + arm.viscous * reference.rate
-        return clip(arm.pressure(torque, reference.angle), 0.0, arm.pressure_limit)
+        pressure = arm.pressure(torque, reference.angle)
+        if self.lengthening is not None:
+            c1, c2 = self.lengthening.at(reference.angle)
+            pressure = where(reference.rate < 0.0, (torque - c2) / c1, pressure)
+        return clip(pressure, 0.0, arm.pressure_limit)
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
         """Valve command [V] for a sample; see :meth:`pamrs.control.Controller.update`."""
@@ -139,9 +158,15 @@ class Feedforward(SampledController):
             if "supply_pressure" in measurement
             else self.air.supply_pressure
         )
-        angle, rate = self.sensor.read(self, measurement)
-        self._tick(time)
-        angle, rate = self.sensor.update(angle, rate)
+        if self.motion == "commanded":
+            if "joint_angle" in measurement:
+                self._read(measurement, "joint_angle")  # a batch of another length is refused
+            self._tick(time)
+            angle, rate = aim.angle, aim.rate
+        else:
+            angle, measured = self.sensor.read(self, measurement)
+            self._tick(time)
+            angle, rate = self.sensor.update(angle, measured)
         pressure = self.low_pass.update(pressure)
         change = self._km * (self.desired_pressure(aim) - pressure)
         return self._on * self.air.command(change, pressure, supply, angle, rate)

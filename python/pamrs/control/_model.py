@@ -77,9 +77,9 @@ def _supply_pressure(rig: Rig) -> float:
     return max(float(supply["initial_pressure"]) for supply in supplies.values())
 
 
-def torque_line(rig: Rig, angle: ArrayLike) -> tuple[Array, Array]:
-    """``C1`` and ``C2`` of the full model at angles, exact: the core's muscle while contracting,
-    without friction.
+def torque_line(rig: Rig, angle: ArrayLike, *, lengthening: bool = False) -> tuple[Array, Array]:
+    """``C1`` and ``C2`` of the full model at angles, exact: the core's muscle in one direction of
+    motion, without friction.
 
     Parameters
     ----------
@@ -87,6 +87,8 @@ def torque_line(rig: Rig, angle: ArrayLike) -> tuple[Array, Array]:
         With one muscle (or bundle), one joint and a one-link arm.
     angle : array_like
         Angles [rad].
+    lengthening : bool
+        Whether the muscle lengthens: another branch with the model ``elbow_linear``, (4.7).
 
     Returns
     -------
@@ -100,8 +102,15 @@ def torque_line(rig: Rig, angle: ArrayLike) -> tuple[Array, Array]:
     """
     muscle, joint, _ = _parts(rig)
     count, pressure = int(muscle.parameters["count"]), 1e6
-    zero = joint.torque(muscle, 0.0, angle, count=count)
-    return np.asarray((joint.torque(muscle, pressure, angle, count=count) - zero) / pressure), zero
+    smooth = muscle.replace(
+        friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0
+    )
+    contraction = joint.shortening(angle) / float(muscle.parameters["rest_length"])
+    direction, arm = (1.0 if lengthening else -1.0), joint.torque_arm(angle)
+    zero, full = (
+        np.asarray(count * smooth.force(p, contraction, direction) * arm) for p in (0.0, pressure)
+    )
+    return (full - zero) / pressure, zero
 
 
 class FullTorque:
@@ -113,6 +122,8 @@ class FullTorque:
     Parameters
     ----------
     rig : Rig
+        As for :func:`torque_line`.
+    lengthening : bool
         As for :func:`torque_line`.
 
     Attributes
@@ -127,10 +138,10 @@ class FullTorque:
         As :func:`torque_line`.
     """
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, *, lengthening: bool = False) -> None:
         _, _, table = _parts(rig)
         low, high = float(table["min_angle"]), float(table["max_angle"])
-        c1, c2 = torque_line(rig, np.linspace(low, high, _NODES))
+        c1, c2 = torque_line(rig, np.linspace(low, high, _NODES), lengthening=lengthening)
         self._floor = float(_LEAST_SLOPE * c1.max())
         if not self._floor > 0.0:
             raise ParameterError(
@@ -141,7 +152,7 @@ class FullTorque:
         between = 0.5 * (np.linspace(low, high, _NODES)[1:] + np.linspace(low, high, _NODES)[:-1])
         pairs = zip(
             (self.slope(between), self.rest(between)),
-            torque_line(rig, between),
+            torque_line(rig, between, lengthening=lengthening),
             (c1, c2),
             strict=True,
         )

@@ -21,6 +21,7 @@ __all__ = [
     "positive_number",
     "sign",
     "sin",
+    "where",
 ]
 
 #: How many of a unit are in a radian.
@@ -143,3 +144,10 @@ def sin(value: Value) -> Value:
     if value.__class__ is float:
         return math.sin(value)
     return np.sin(value)
+
+
+def where(condition: Any, value: Value, other: Value) -> Value:
+    """``value`` where a condition holds, ``other`` elsewhere."""
+    if isinstance(condition, bool) and value.__class__ is float and other.__class__ is float:
+        return value if condition else other
+    return np.where(condition, value, other)

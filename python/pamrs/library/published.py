@@ -13,7 +13,7 @@ from pamrs.library import Entry, Fact, entry, names
 from pamrs.library.evaluate import KINDS
 from pamrs.units import parse_unit
 
-__all__ = ["Comparison", "compare", "compare_all", "headings", "table", "verdicts"]
+__all__ = ["Comparison", "compare", "compare_all", "compare_entry", "headings", "table", "verdicts"]
 
 
 def compare(name: str) -> list[Comparison]:
@@ -33,7 +33,21 @@ def compare(name: str) -> list[Comparison]:
     ParameterError
         If there is no such muscle, or its file has a kind of fact that is not known.
     """
-    item = entry(name)
+    return compare_entry(entry(name))
+
+
+def compare_entry(item: Entry) -> list[Comparison]:
+    """Compare every published fact of a muscle, which may be the library's with another number.
+
+    Parameters
+    ----------
+    item : Entry
+        The muscle.
+
+    Returns
+    -------
+    list of Comparison
+    """
     return [_compare(item, fact) for fact in item.facts]
 
 

@@ -19,11 +19,31 @@ from pamrs.comparison import Comparison, Told
 from pamrs.reproduce import _chapter5_comparison as chapter5_comparison
 from pamrs.reproduce import _tracking as tracking
 from pamrs.reproduce._chapter5_statements import GROUPS, Group, listed
+from pamrs.reproduce._score import OTHER, OWN, SAME, TRIAL, Apart, scored
 from pamrs.reproduce._tracking import KINDS, PAYLOADS, SETTLED, Track
 from pamrs.reproduce._tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
 
 __all__ = ["GROUPS", "TITLE", "chosen", "facts", "headings", "in_short", "share_by_angle"]
 
+#: Lines that are no part of the score: of one statement with several payloads that of 25 lb counts,
+#: the payload taken where the chapter names none, else the first.
+APART: Final[tuple[Apart, ...]] = (
+    (".*", ".*: the gains used are the best of the grid", OWN),
+    ("sliding.*", "error with estimates times .*, (0|50) lb", SAME),
+    ("sliding.*", "the same with 25 lb and a switching gain .*", OWN),
+    ("adaptive.*", "late error over early error, (ten times ours .*|ours)", OTHER),
+    ("adaptive.*", "move of b in the last fifth .*", SAME),
+    ("adaptive.*", "the same with our gain of m g r", OTHER),
+    ("neural.*", "error of the last fifth over the first, from zero, (0|50) lb", SAME),
+    ("neural.*", "error over the record, 50 lb over 25 lb", SAME),
+    ("neural.*", "mean G after learning over Gaylord's estimate, 0 lb", SAME),
+    ("comparison.*", "neural over sliding in the last half of the record, 25 lb", OTHER),
+    ("comparison.*", "neural at the end of its training over sliding, 25 lb", OTHER),
+    ("comparison.*", "error above 1.5 Hz, adaptive sliding over neural", SAME),
+    ("comparison.*", ".*: rms", OWN),
+    ("what the model leaves out.*", ".*", TRIAL),
+    ("hysteresis.*", "probability .*", OWN),
+)
 TITLE: Final = "Chapter 5: advanced control of manipulators"
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
@@ -70,7 +90,7 @@ def facts(
     for text, part in parts.items():
         tell(f"chapter 5: {text}")
         rows += part()
-    return rows
+    return scored(rows, APART)
 
 
 def headings() -> dict[str, str]:
@@ -360,7 +380,7 @@ def _learning(group: Group, run: Track) -> None:
         else:
             group.smaller(
                 (f"late error over early error, {name}"),
-                ("5.4.2: 'somewhat useful after a learning period'"),
+                ("5.4.2: 'somewhat useful for improving trajectory-following'"),
                 late[k] / early[k],
                 text,
             )
@@ -489,7 +509,7 @@ def _from_zero(group: Group, zero: Track) -> None:
     for low, high in ((0.0, 25.0), (25.0, 50.0)):
         group.say(
             (f"error over the record, {high:g} lb over {low:g} lb"),
-            ("5.4.3: 'generally, error increases with payload'"),
+            ("5.4.3: 'Generally, error increases with increasing payload'"),
             1.0,
             whole[_ZERO[high]] / whole[_ZERO[low]],
             relation="above",
@@ -497,7 +517,7 @@ def _from_zero(group: Group, zero: Track) -> None:
         )
     group.say(
         "error of the last fifth, from zero, 50 lb",
-        "5.4.3: 'nearly converged ... very low error'",
+        "5.4.3: 'nearly converged', 'with very low error'",
         math.nan,
         late[_ZERO[50.0]],
         "deg",
@@ -522,7 +542,7 @@ def _from_model(group: Group, zero: Track, later: Track) -> None:
     (weights, seen), other = _gravity(zero), np.array(later.noted["G"][-1])[_MODEL]
     group.say(
         "deviation of G from zero from G from the model, over its mean, where the arm was",
-        "5.4.3, Figs. 5.12 and 5.13: 'final structures very similar'",
+        "5.4.3, Figs. 5.12 and 5.13: 'very similar'",
         0.1,
         float(np.sqrt(np.mean((weights[seen] - other[seen]) ** 2)) / np.mean(other[seen])),
         relation="below",
@@ -535,7 +555,7 @@ def _from_model(group: Group, zero: Track, later: Track) -> None:
     above = (degrees > 94.0) & (degrees < 111.0)
     group.say(
         "G from zero over G from the model, 95 to 110 deg, 50 lb",
-        "5.4.3: 'ability to construct the function at angles above 90 deg is limited'",
+        "5.4.3: 'at angles above 90 deg is limited'",
         0.5,
         float(weights[above].mean() / other[above].mean()),
         relation="below",
@@ -575,7 +595,7 @@ def _from_gaylord(group: Group, zero: Track, later: Track) -> None:
         there = _visited(later, _GUESS, first.size)
         group.say(
             (f"mean {name} after learning over Gaylord's estimate, 0 lb"),
-            ("5.5, Fig. 5.22: 'initial estimate is low'"),
+            ("5.5, Fig. 5.22: 'initial estimate provided by this model is low'"),
             1.0,
             float(last[there].mean() / first[there].mean()),
             relation="above",

@@ -248,7 +248,7 @@ def hysteresis(plan: Plan, search: bool) -> list[Comparison]:
         )
         group.say(
             "probability that the diagnosis gives to muscle_hysteresis",
-            "5.5: 'a key example ... is hysteresis'",
+            "5.5: 'A key example of one such nonlinearity'",
             0.9,
             math.nan if named is None else named["probability"],
             relation="above",
@@ -260,7 +260,7 @@ def hysteresis(plan: Plan, search: bool) -> list[Comparison]:
     before, after = plan.compensated(False), plan.compensated(True)
     group.smaller(
         "sliding error with compensation over without, plant with hysteresis",
-        "5.5: 'major improvements are expected if hysteresis can be properly compensated'",
+        "5.5: 'are expected if hysteresis can be properly compensated'",
         float(after.rms()[0] / before.rms()[0]),
         (
             f"{before.rms()[0]:.2f} to {after.rms()[0]:.2f} deg rms, largest "

@@ -10,7 +10,9 @@ it, and the chapter's equations (3.1)-(3.8) begin there, at no contraction.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any, Final
@@ -30,10 +32,10 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FOOT_POUND", "HYSTERESIS", "INCH", "LAWS", "POUND", "PSI", "StaticCurve", "Step", "arm_rig",
-    "at_same_pressure", "elbow_torque",
+    "at_same_pressure", "braid", "braid_angle", "elbow_torque",
     "mooney_rivlin", "payload_torque", "ramp_and_hold", "rest_angle", "rotation_reached",
     "static_curve", "steeper_braid", "step",
-    "torque_range", "triangle", "valve_for_peak", "without_supply",
+    "torque_range", "triangle", "valve_for_peak", "with_muscle", "without_supply",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -103,7 +105,36 @@ def arm_rig(
         values["supply.initial_pressure"] = psi * PSI
     if area is not None:
         values["valve.discharge_area_max"] = area
-    return _with(named("elbow").with_parameters(values), joint={"kind": LAWS[law]})
+    degrees = _BRAID.get()
+    rig = named("elbow")
+    if degrees is not None:
+        rig = with_muscle(rig, steeper_braid(degrees))
+    return _with(rig.with_parameters(values), joint={"kind": LAWS[law]})
+
+
+@contextmanager
+def braid(degrees: float) -> Iterator[None]:
+    """Every experiment inside has the elbow's muscle with another braid angle,
+    :func:`steeper_braid`.
+
+    Parameters
+    ----------
+    degrees : float
+        Braid angle [deg].
+    """
+    before = _BRAID.set(degrees)
+    try:
+        yield
+    finally:
+        _BRAID.reset(before)
+
+
+def braid_angle() -> float | None:
+    """The braid angle that :func:`braid` has set [deg]; None for the rig's own."""
+    return _BRAID.get()
+
+
+_BRAID: ContextVar[float | None] = ContextVar("braid", default=None)
 
 
 def _with(rig: Rig, **blocks: dict[str, Any] | None) -> Rig:
@@ -111,6 +142,32 @@ def _with(rig: Rig, **blocks: dict[str, Any] | None) -> Rig:
     model = rig.model
     for block, entries in blocks.items():
         model[block] = None if entries is None else {**model[block], **entries}
+    return Rig(rig.name, model)
+
+
+def with_muscle(rig: Rig, muscle: Muscle | None = None, **changes: Any) -> Rig:
+    """A rig with another muscle, or with other entries of its own.
+
+    Parameters
+    ----------
+    rig : Rig
+        With one muscle.
+    muscle : Muscle, optional
+        As many of it; the rig's own by default.
+    **changes
+        Entries of ``[muscle]``, SI.
+
+    Returns
+    -------
+    Rig
+    """
+    model = rig.model
+    own = (
+        model["muscle"]
+        if muscle is None
+        else {**muscle.parameters, "count": model["muscle"]["count"]}
+    )
+    model["muscle"] = {**own, **changes}
     return Rig(rig.name, model)
 
 
@@ -136,16 +193,20 @@ def rest_angle() -> float:
     return float(named("elbow").parameter("joint.rest_angle").value)
 
 
-def _muscle() -> Muscle:
+def _own_muscle() -> Muscle:
     muscle = named("elbow").muscle
     assert muscle is not None
     return muscle
 
 
+def _muscle() -> Muscle:
+    degrees = _BRAID.get()
+    return _own_muscle() if degrees is None else steeper_braid(degrees)
+
+
 # -------------------------------------------------------------------------- statics
 
 
-@cache
 def mooney_rivlin(share: float = 0.5) -> Muscle:
     """The muscle of (3.21), Gaylord's force less a Mooney-Rivlin bladder, its constants from the
     free contraction of 3.2.2.
@@ -167,8 +228,14 @@ def mooney_rivlin(share: float = 0.5) -> Muscle:
     """
     if not 0.0 <= share <= 1.0:
         raise ParameterError(f"share = {share} is not allowed: from 0 to 1")
+    return _mooney_rivlin(share, _BRAID.get())
+
+
+@cache
+def _mooney_rivlin(share: float, degrees: float | None) -> Muscle:
     unit = 1e6
-    soft = _muscle().replace(model="mooney_rivlin", c10=(1.0 - share) * unit, c01=share * unit)
+    braided = _own_muscle() if degrees is None else steeper_braid(degrees)
+    soft = braided.replace(model="mooney_rivlin", c10=(1.0 - share) * unit, c01=share * unit)
     pressure = 150.0 * PSI
     # the force is linear in the constants
     gas = float(soft.replace(modulus_scale=0.0).force(pressure, _FREE))
@@ -190,7 +257,7 @@ def steeper_braid(degrees: float = 73.5) -> Muscle:
     -------
     Muscle
     """
-    soft, pressure = _muscle().replace(braid_angle=math.radians(degrees)), 150.0 * PSI
+    soft, pressure = _own_muscle().replace(braid_angle=math.radians(degrees)), 150.0 * PSI
     gas = float(soft.replace(modulus_scale=0.0).force(pressure, _FREE))
     return soft.replace(modulus_scale=gas / (gas - float(soft.force(pressure, _FREE))))
 

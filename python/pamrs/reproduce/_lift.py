@@ -20,6 +20,7 @@ from pamrs.control import (
     AirModel,
     ArmModel,
     Feedforward,
+    FullTorque,
     Fuzzy,
     Metrics,
     Parallel,
@@ -30,7 +31,8 @@ from pamrs.control.metrics import combined, evaluate
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import perturbed
 from pamrs.errors import ParameterError
-from pamrs.reproduce._elbow import POUND
+from pamrs.reproduce._elbow import HYSTERESIS, POUND, with_muscle
+from pamrs.reproduce._two_branches import two_branches
 from pamrs.rig import Rig
 from pamrs.rigs import named
 
@@ -41,18 +43,25 @@ __all__ = [
     "PAYLOADS",
     "PERIOD",
     "VARIANTS",
+    "Gains",
     "Lifts",
     "Map",
     "Variant",
     "assumed",
+    "derivative_line",
     "fuzzy_map",
+    "lengthening",
     "lifts",
     "pid_map",
     "plant",
+    "predicted",
+    "rate_line",
     "trajectory",
 ]
 
 Array = NDArray[np.float64]
+#: Gains of a controller, each one number or one for each payload.
+Gains = tuple[float | tuple[float, ...], ...]
 
 #: [kg], 25, 50, 75 and 100 lb.
 PAYLOADS: Final = tuple(pounds * POUND for pounds in (25.0, 50.0, 75.0, 100.0))
@@ -88,6 +97,14 @@ class Variant:
 
     Attributes
     ----------
+    printed : bool
+        Whether plant and controllers have the muscle of (4.4)-(4.7), else the library's smooth one.
+    motion : {"commanded", "measured"}
+        Of the feedforward's flow, see :class:`pamrs.control.Feedforward`.
+    both_ways : bool
+        Whether the feedforward takes (4.4) down too, where 4.3.2.1 has (4.7).
+    hysteresis : bool
+        Whether the plant's muscles have the friction (2.36), which no controller knows.
     known : mapping of str to float
         Parameters that the controller's model has too, SI: ``valve.discharge_area_max``.
     hidden : mapping of str to float
@@ -99,6 +116,10 @@ class Variant:
         model has a supply that holds.
     """
 
+    printed: bool = True
+    motion: str = "commanded"
+    both_ways: bool = False
+    hysteresis: bool = False
     known: Mapping[str, float] = field(default_factory=dict)
     hidden: Mapping[str, float] = field(default_factory=dict)
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -117,14 +138,30 @@ def _activation(pressure: float) -> dict[str, dict[str, float]]:
     return {"activation_pressure": {"threshold": pressure}}
 
 
-_HYSTERESIS: Final = {
-    "muscle_hysteresis": {"friction_constant": 15.0, "friction_pressure": 1e-4, "presliding": 1e-3}
-}
-#: One candidate at a time, and the pairs that it takes two of.
+_STRONG: Final = {**_damping(12000.0), **_activation(5e4)}
+#: The plant that the chapter prints; other readings of it; one change of it at a time; and the
+#: library's smooth muscle, with what would have to be added.
 VARIANTS: Final[Mapping[str, Variant]] = {
-    "the rig": Variant(),
+    "as printed": Variant(),
+    "as printed, measured motion": Variant(motion="measured"),
+    "as printed, (4.4) both ways in the feedforward": Variant(both_ways=True),
+    "smooth muscle, hysteresis (2.36)": Variant(printed=False, hysteresis=True),
+    "smooth muscle, hysteresis (2.36), measured motion": Variant(
+        printed=False, hysteresis=True, motion="measured"
+    ),
+    "as printed, and hysteresis (2.36)": Variant(hysteresis=True),
+    "smooth muscle": Variant(printed=False),
+    "smooth muscle, measured motion": Variant(printed=False, motion="measured"),
+    "smooth muscle, damping 6000 N s/m": Variant(printed=False, effects=_damping(6000.0)),
+    "smooth muscle, damping 12000 N s/m, activation 50 kPa": Variant(
+        printed=False, effects=_STRONG
+    ),
+    "smooth muscle, damping 12000 N s/m, activation 50 kPa, measured motion": Variant(
+        printed=False, motion="measured", effects=_STRONG
+    ),
     "valve 4.2 mm2": Variant(known=_valve(4.2)),
     "valve 2.44 mm2": Variant(known=_valve(2.44)),
+    "supply 1.03 MPa": Variant(known={"supply.initial_pressure": 1.03e6}),
     "supply 0.45 MPa": Variant(known={"supply.initial_pressure": 0.45e6}),
     "regulated supply, dead band 50 kPa": Variant(
         effects={"supply_regulator_deadband": {"dead_band": 5e4}}, regulated=True
@@ -133,22 +170,12 @@ VARIANTS: Final[Mapping[str, Variant]] = {
     "pressure lag 50 ms": Variant(effects={"pressure_lag": {"time_constant": 0.05}}),
     "tube 2e-9 m3/(s Pa)": Variant(effects={"tube_flow_restriction": {"conductance": 2e-9}}),
     "valve dead zone 3 %": Variant(effects={"valve_dead_zone": {"half_width": 0.03}}),
-    "hysteresis 15 N + 1 cm2 P": Variant(effects=_HYSTERESIS),
     "joint friction 15 N m": Variant(hidden={"arm.coulomb": 15.0}),
     "stiction 10 N m more": Variant(effects={"joint_coulomb_stribeck": {"stiction": 10.0}}),
     "activation pressure 50 kPa": Variant(effects=_activation(5e4)),
     "heat transfer": Variant(effects={"heat_transfer": {}}),
     "muscle damping 3000 N s/m": Variant(effects=_damping(3000.0)),
-    "muscle damping 6000 N s/m": Variant(effects=_damping(6000.0)),
     "muscle damping 12000 N s/m": Variant(effects=_damping(12000.0)),
-    "damping 6000 N s/m, valve 4.2 mm2": Variant(_valve(4.2), {}, _damping(6000.0)),
-    "damping 12000 N s/m, activation 50 kPa": Variant(
-        effects={**_damping(12000.0), **_activation(5e4)}
-    ),
-    "damping 6000 N s/m, valve 2.44 mm2": Variant(_valve(2.44), {}, _damping(6000.0)),
-    "damping 12000 N s/m, activation 50 kPa, valve 4.2 mm2": Variant(
-        _valve(4.2), {}, {**_damping(12000.0), **_activation(5e4)}
-    ),
 }
 
 
@@ -157,13 +184,18 @@ def trajectory() -> Trajectory:
     return lift_hold_return(*degrees(LOW, HIGH), delay=5.0)
 
 
-def assumed(variant: Variant = VARIANTS["the rig"]) -> Rig:
+def assumed(variant: Variant = VARIANTS["as printed"]) -> Rig:
     """The rig as the controllers know it."""
-    return named("elbow").with_parameters(variant.known)
+    rig = named("elbow")
+    if variant.printed:
+        rig = with_muscle(rig, two_branches())
+    return rig.with_parameters(variant.known)
 
 
 def plant(
-    variant: Variant = VARIANTS["the rig"], payload: float = PAYLOADS[1], seed: int | None = _SEED
+    variant: Variant = VARIANTS["as printed"],
+    payload: float = PAYLOADS[1],
+    seed: int | None = _SEED,
 ) -> Rig:
     """What is controlled.
 
@@ -183,6 +215,8 @@ def plant(
     rig = perturbed(
         assumed(variant).with_parameters({"arm.payload": payload}), seed
     ).with_parameters(variant.hidden)
+    if variant.hysteresis:
+        rig = with_muscle(rig, None, **HYSTERESIS)
     if variant.regulated:
         model = rig.model
         fed = {
@@ -256,27 +290,40 @@ class Lifts:
         return np.asarray(np.degrees(self.metrics.phases[phase][kind]), dtype=np.float64)
 
 
+def lengthening(variant: Variant, base: Rig) -> FullTorque | None:
+    """What the feedforward knows of a muscle that lengthens: (4.7) where it has it."""
+    return FullTorque(base, lengthening=True) if variant.printed and not variant.both_ways else None
+
+
 def _controller(
-    gains: Sequence[tuple[float, ...]], base: Rig, mass: Array, anti_windup: str
+    gains: Sequence[tuple[float, ...]], variant: Variant, mass: Array, anti_windup: str
 ) -> Parallel:
     """One controller for a batch: the gains of each plant, all of the same kind of feedback, and
     the payload that it knows.
     """
+    base = assumed(variant)
     arm, table = ArmModel.from_rig(base), base.model["arm"]
     arms = arm.replace(
         inertia=table["inertia"] + mass * table["length"] ** 2,
         weight=(table["first_moment"] + mass * table["length"]) * table["gravity"],
     )
     columns = [np.array(column, dtype=np.float64) for column in zip(*gains, strict=True)]
-    feedforward = Feedforward(arms, AirModel(base), columns[0], period=PERIOD)
+    feedforward = Feedforward(
+        arms,
+        AirModel(base),
+        columns[0],
+        period=PERIOD,
+        motion=variant.motion,
+        lengthening=lengthening(variant, base),
+    )
     if len(columns) == 3:
         return Parallel(feedforward, PID(*columns[1:], period=PERIOD, anti_windup=anti_windup))
     return Parallel(feedforward, Fuzzy(*columns[1:], period=PERIOD))
 
 
 def lifts(
-    names: Sequence[str] = ("the rig",),
-    gains: Mapping[str, tuple[float, ...]] = GAINS,
+    names: Sequence[str] = ("as printed",),
+    gains: Mapping[str, Gains] = GAINS,
     *,
     payloads: Sequence[float] = PAYLOADS,
     anti_windup: str = "none",
@@ -290,8 +337,8 @@ def lifts(
     ----------
     names : sequence of str
         Of :data:`VARIANTS`.
-    gains : mapping of str to tuple of float
-        As :data:`GAINS`.
+    gains : mapping of str to tuple
+        As :data:`GAINS`; a gain may be a tuple, one for each payload.
     payloads : sequence of float
         [kg]
     anti_windup : {"none", "clamping", "back_calculation"}
@@ -316,9 +363,9 @@ def lifts(
             raise ParameterError(f"names has {name!r}; the plants are: {', '.join(VARIANTS)}")
     groups: dict[tuple[Any, ...], list[str]] = {}
     for name in names:
-        groups.setdefault(
-            (VARIANTS[name].regulated, *sorted(VARIANTS[name].known.items())), []
-        ).append(name)
+        one = VARIANTS[name]
+        key = (one.printed, one.motion, one.both_ways, one.regulated, *sorted(one.known.items()))
+        groups.setdefault(key, []).append(name)
     found: dict[str, dict[str, Lifts]] = {name: {} for name in names}
     for members in groups.values():
         for size in (3, 4):
@@ -331,7 +378,7 @@ def lifts(
 def _run(
     found: dict[str, dict[str, Lifts]],
     members: Sequence[str],
-    gains: Mapping[str, tuple[float, ...]],
+    gains: Mapping[str, Gains],
     payloads: tuple[float, ...],
     anti_windup: str,
     seed: int | None,
@@ -342,12 +389,17 @@ def _run(
     rigs: list[Rig] = []
     for i in range(len(members)):
         rigs += made[i * len(payloads) : (i + 1) * len(payloads)] * len(gains)
-    each = [values for _ in members for values in gains.values() for _ in payloads]
+    each = [
+        tuple(float(value[i] if isinstance(value, tuple) else value) for value in values)
+        for _ in members
+        for values in gains.values()
+        for i in range(len(payloads))
+    ]
     mass = np.array([m for _ in members for _ in gains for m in payloads])
     path, base = trajectory(), assumed(VARIANTS[members[0]])
     run = sweep(
         rigs,
-        _controller(each, base, mass, anti_windup),
+        _controller(each, VARIANTS[members[0]], mass, anti_windup),
         path,
         duration,
         sample_time=PERIOD,
@@ -390,6 +442,31 @@ def _at_rest(rigs: Sequence[Rig]) -> dict[str, Array]:
             known[id(rig)] = float(arm.pressure(float(arm.weight) * float(np.sin(low)), low))
     pressure = np.array([max(known[id(rig)], 0.0) for rig in rigs])
     return {"joint_angle": np.full(len(rigs), low), "muscle_pressure": pressure}
+
+
+def predicted(run: Lifts, payloads: Sequence[float] = PAYLOADS) -> Array:
+    """Pressure that the printed model wants along the trajectory (4.12), shape (payloads, rows)
+    [Pa]: the dotted line of Fig. 4.14.
+
+    Parameters
+    ----------
+    run : Lifts
+        Whose rows are taken.
+    payloads : sequence of float
+        [kg]
+
+    Returns
+    -------
+    ndarray
+    """
+    variant, aim = VARIANTS["as printed"], trajectory()(run.time)
+    base = assumed(variant)
+    wanted = []
+    for mass in payloads:
+        arm = ArmModel.from_rig(base.with_parameters({"arm.payload": mass}))
+        model = Feedforward(arm, AirModel(base), lengthening=lengthening(variant, base))
+        wanted.append(np.asarray(model.desired_pressure(aim), dtype=np.float64))
+    return np.array(wanted)
 
 
 # ------------------------------------------------------------------------ gain maps
@@ -438,7 +515,7 @@ class Map:
 def pid_map(
     kp: Sequence[float],
     ki: Sequence[float],
-    name: str = "the rig",
+    name: str = "as printed",
     payloads: Sequence[float] = PAYLOADS[:3],
 ) -> Map:
     """Gains kP and kI [V/rad, V/(rad s)] of the PID with kD = 0, in one batch.
@@ -467,7 +544,7 @@ def pid_map(
 def fuzzy_map(
     g1: Sequence[float],
     h: Sequence[float],
-    name: str = "the rig",
+    name: str = "as printed",
     payloads: Sequence[float] = PAYLOADS[:3],
     *,
     g2: float = 0.6,
@@ -476,6 +553,34 @@ def fuzzy_map(
     :func:`pid_map`.
     """
     return _map({"g1": g1, "h": h}, name, payloads, lambda a, b: Fuzzy(a, g2, b, period=PERIOD))
+
+
+def derivative_line(
+    kd: Sequence[float], best: Sequence[tuple[float, float]], name: str = "as printed"
+) -> Map:
+    """The PID's gain kD [V s/rad] beside the kP and kI of each payload; as :func:`pid_map`."""
+    kp, ki = (np.repeat(column, len(kd)) for column in zip(*best, strict=True))
+    return _map(
+        {"kD": kd, "only": [0.0]},
+        name,
+        PAYLOADS[: len(best)],
+        lambda d, _: PID(kp, ki, d, period=PERIOD, anti_windup="none"),
+    )
+
+
+def rate_line(
+    g2: Sequence[float], best: Sequence[tuple[float, float]], name: str = "as printed"
+) -> Map:
+    """The fuzzy controller's gain g2 [rad/s] beside the g1 and h of each payload; as
+    :func:`pid_map`.
+    """
+    g1, h = (np.repeat(column, len(g2)) for column in zip(*best, strict=True))
+    return _map(
+        {"g2": g2, "only": [0.0]},
+        name,
+        PAYLOADS[: len(best)],
+        lambda b, _: Fuzzy(g1, b, h, period=PERIOD),
+    )
 
 
 def _map(

@@ -82,7 +82,12 @@ SYMBOLS: Final = (
         "",
         ("ch4",),
     ),
-    Symbol("kP, kI", "proportional and integral gain of the PID", "V/rad, V/(rad s)", ("ch4",)),
+    Symbol(
+        "kP, kI, kD",
+        "proportional, integral and derivative gain of the PID",
+        "V/rad, V/(rad s), V s/rad",
+        ("ch4",),
+    ),
     Symbol(
         "kM",
         "gain of the feedforward, from pressure error to wanted rate of pressure; 0: none",
@@ -90,9 +95,9 @@ SYMBOLS: Final = (
         ("ch4",),
     ),
     Symbol(
-        "g1, h",
-        "error at which a fuzzy input is full, and voltage of a full output",
-        "rad, V",
+        "g1, g2, h",
+        "error and its rate at which a fuzzy input is full, and voltage of a full output",
+        "rad, rad/s, V",
         ("ch4",),
     ),
     Symbol("lag", "by how much the angle is late, by least squares", "s", ("ch4",)),

@@ -100,6 +100,9 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
             "statement chose one of our numbers, so that"
         ),
         "agreement proves nothing.",
+        "Each published statement counts once. A line with its verdict in brackets stands apart:",
+        "another reading of a statement that counts already, a trial, a check of our own.",
+        "Words in quotes are the source's, word for word; what is not in quotes is put in ours.",
         (
             'Under "where", 3.2.4 is a section of the source and (3.24) an equation; [1] is a '
             "remark below its table."
