@@ -244,7 +244,7 @@ def test_every_finding_is_told_at_once(plain: Table, tmp_path: Path) -> None:
 
 def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
     # a limit cycle: most of the pressure's change is the volume's, against the valve
-    name, payload = "the rig", lift.PAYLOADS[1]
+    name, payload = "smooth muscle", lift.PAYLOADS[1]
     truth = lift.plant(lift.VARIANTS[name], payload, seed=None)
     model = lift.assumed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
     record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)

@@ -63,7 +63,7 @@ def test_an_effect_is_named_beside_it() -> None:
     true = SHOULDER.with_effect("muscle_hysteresis", {"friction_pressure": 1e-4})
     case = pamrs.Case("loads", SHOULDER, recordings(true, told=True), Path())
     found = pamrs.diagnose(case)
-    assert found.probabilities["muscle_hysteresis"] > 0.9
+    assert found.probabilities["muscle_hysteresis"] > 0.8
     assert found.fit["gap_closed"] > 0.9
 
 

@@ -89,7 +89,7 @@ def test_a_load_cell_that_is_not_zeroed_is_no_missing_physics() -> None:
 def test_what_a_force_lacks_is_named(effect: str, values: dict[str, float]) -> None:
     found = pamrs.diagnose(pulled(BENCH.with_effect(effect, values)))
     assert found.verdict == "effects"
-    assert found.probabilities[effect] > 0.9
+    assert found.probabilities[effect] > 0.8
     assert found.where["block"] == "force"
     for name, value in values.items():
         told = found.effects[0]["parameters"][name]
@@ -143,7 +143,7 @@ def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
         "joint_coulomb_stribeck", {"stiction": 3.0, "stribeck_speed": 0.08}
     )
     found = pamrs.diagnose(turned(true))
-    assert found.probabilities["joint_coulomb_stribeck"] > 0.9
+    assert found.probabilities["joint_coulomb_stribeck"] > 0.8
     assert found.where["block"] == "arm"
     torque = next(m for b in found.blocks for m in b.mismatch if m.block == "torque")
     assert not torque.fitted.refit.more_than_noise

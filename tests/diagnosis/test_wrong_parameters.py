@@ -73,7 +73,7 @@ def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor
     assert found.rig.parameter(name).value == pytest.approx(true, rel=0.05)
     assert all(error["after"] < error["before"] for error in wrong["held_out"].values())
     assert found.effects == []
-    assert found.probabilities[name] > 0.9
+    assert found.probabilities[name] > 0.8
     # the excess is the wrong value's, not that of parameters that bend inside their tolerances
     (share,) = (t.share for t in found.budget if t.id == name and t.block == wrong["block"])
     assert share > 0.85
@@ -97,7 +97,7 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     found = pamrs.diagnose(case(true, rig, force=4e-3))
     assert found.verdict == "effects"
     assert [e["id"] for e in found.effects] == ["valve_dead_zone"]
-    assert found.effects[0]["probability"] > 0.9
+    assert found.effects[0]["probability"] > 0.8
     assert found.where["block"] == "chamber"
     gas, arm = found.blocks
     assert (gas["blocks"], gas["verdict"], gas["effects"]) == (

@@ -235,6 +235,17 @@ class Pull:
     chamber: int
     coordinate: int
     transmission: Transmission
+    buckling_load: float
+
+    def held(self, force: float) -> float:
+        """Force of one muscle that bows out where it is pushed: a push grows with a slope that
+        falls from 1 at none to 0 at twice the load.
+        """
+        load = self.buckling_load
+        if force >= 0.0 or load >= 1e9:
+            return force
+        push = min(-force, 2.0 * load)
+        return -(push - push**2 / (4.0 * load))
 
 
 # ------------------------------------------------------------------ gas nodes and coordinates
@@ -440,7 +451,9 @@ class Network:
         shortening = list(_possible(means, np.linspace(at.low - depth, at.high + depth, 201)))
         low = max(min(shortening) / rest - 1e-3, (1.0 - 1e-4) * muscle.geometry.min_contraction)
         high = min(max(shortening) / rest + 1e-3, muscle.geometry.max_contraction)
-        return Pull(muscle, tabulate(muscle, low, high), self.index[part["chamber"]], number, means)
+        load = part["muscle"]["buckling_load"]
+        table = tabulate(muscle, low, high)
+        return Pull(muscle, table, self.index[part["chamber"]], number, means, load)
 
     # ---------------------------------------------------------------- states
 
@@ -566,6 +579,7 @@ class Network:
             moment_arm = pull.transmission.moment_arm(position[k])
             e = pull.transmission.contraction(position[k]) / rest
             one, air, slope = pull.table(e, pressure[pull.chamber] - gas.ambient_pressure)
+            one = pull.held(one)
             volume[pull.chamber] += n * air
             volume_rate[pull.chamber] += n * slope * moment_arm * rate[k] / rest
             force[k] += n * one * moment_arm

@@ -61,7 +61,7 @@ _LABELS = {
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
 
-SETTLED = 0.9
+SETTLED = 0.75
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
 settled, `VerdictSettings.settled`)."""
 

@@ -55,8 +55,8 @@ class Muscle:
         Motion over which the force goes from one branch of the hysteresis to the other in a
         simulation [m].
     buckling_load : float
-        The most that one muscle pushes in a rig, where it bows out [N]; 1e9: it pushes like a strut,
-        without end. The methods here are those of a muscle that is held straight.
+        The most that one muscle pushes in a rig, where it bows out [N]; 1e9: it pushes like a
+        strut, without end. The methods here are those of a muscle that is held straight.
     count : int
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float

@@ -181,7 +181,7 @@ def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[li
     """
     healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
     others = [p for key, p in probabilities.items() if key not in HEALTHY]
-    if max(healthy, *others, 0.0) >= settings.settled:
+    if max(healthy, *others, 0.0) > settings.settled:
         return []
     found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= settings.in_set]
     return found if len(found) > 1 else []
