@@ -191,12 +191,12 @@ def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagn
         (
             _judged(
                 "unlisted",
-                {"unlisted": 0.88, "muscle_creep": 0.04, "payload_change": 0.04, "none": 0.04},
+                {"unlisted": 0.7, "muscle_creep": 0.16, "payload_change": 0.1, "none": 0.04},
             ),
-            "nothing is probable enough to be named: an effect outside the catalogue (0.88), "
-            "muscle creep (0.04) or payload change (0.04)",
+            "nothing is probable enough to be named: an effect outside the catalogue (0.70), "
+            "muscle creep (0.16) or payload change (0.10)",
             "missing physics, no name",
-            0.88,
+            0.7,
         ),
         (
             _judged("unlisted", {"unlisted": 0.96, "muscle_creep": 0.04}),

@@ -451,7 +451,7 @@ class Network:
         shortening = list(_possible(means, np.linspace(at.low - depth, at.high + depth, 201)))
         low = max(min(shortening) / rest - 1e-3, (1.0 - 1e-4) * muscle.geometry.min_contraction)
         high = min(max(shortening) / rest + 1e-3, muscle.geometry.max_contraction)
-        load = part["muscle"]["buckling_load"]
+        load = part["muscle"].get("buckling_load", 1e9)
         table = tabulate(muscle, low, high)
         return Pull(muscle, table, self.index[part["chamber"]], number, means, load)
 
