@@ -178,6 +178,76 @@ def test_air_through_a_valve_in_both_directions(command: float, pressure: float)
     assert not beyond(misses(run.core(1e-4), run.reference()), SMOOTH)
 
 
+def iso_valve(fill: float, vent: float) -> Blocks:
+    """A valve by ISO 6358 with another critical ratio on each path."""
+    own = {
+        "flow": "iso_6358",
+        "fill_conductance": fill,
+        "fill_critical_ratio": 0.25,
+        "vent_conductance": vent,
+        "vent_critical_ratio": 0.4,
+    }
+    return {key: value for key, value in valve(1.0).items() if key != "discharge_area_max"} | own
+
+
+@pytest.mark.parametrize(
+    ("command", "pressure"),
+    [(8.0, 6e5), (2.0, -5e4), (8.0, 1e5), (2.0, 6e5)],
+    ids=["back into the supply", "in from the ambient", "filling", "venting"],
+)
+def test_air_through_an_iso_valve_in_both_directions(command: float, pressure: float) -> None:
+    run = Run(
+        one_chamber({"valve": iso_valve(2e-9, 3e-9)}),
+        0.01,
+        41,
+        {"muscle_pressure": pressure},
+        {"valve_command": np.full(41, command)},
+    )
+    assert not beyond(misses(run.core(1e-4), run.reference()), SMOOTH)
+
+
+def test_a_choked_iso_valve_fills_by_its_conductance() -> None:
+    """P' = alpha R T C rho0 p_up / V where the ratio is below b, at 293.15 K."""
+    rig = rig_of(
+        {
+            "gas": GAS,
+            "supply": {"kind": "constant", "initial_pressure": 9e5},
+            "valve": iso_valve(2e-9, 0.0),
+            "chamber": {"dead_volume": 1e-3, "alpha_in": 1.0, "alpha_out": 1.0, "alpha": 1.0},
+        }
+    )
+    run = pamrs.simulate(rig, np.full(21, 10.0), sample_time=0.01)
+    flow = 2e-9 * 1.185 * (9e5 + AMBIENT)
+    wanted = RT * flow / 1e-3 * run.time
+    np.testing.assert_allclose(run["muscle_pressure"], wanted, rtol=1e-9, atol=1e-6)
+    shut = pamrs.simulate(rig, np.zeros(21), sample_time=0.01, initial={"muscle_pressure": 3e5})
+    np.testing.assert_allclose(shut["muscle_pressure"], 3e5, rtol=1e-12)
+
+
+def test_two_switching_valves_fill_and_vent_one_chamber() -> None:
+    """2/2 valves: one only fills, one only vents, each wide open above its switching voltage."""
+    switch = {"null_voltage": 12.0, "half_range": 12.0, "opening": [0.0, 1.0]}
+    switch["fraction"] = [1.0, 1.0]
+    rig = rig_of(
+        {
+            "gas": GAS,
+            "supply": {"kind": "constant", "initial_pressure": 6e5},
+            "valve.into": iso_valve(2e-9, 0.0) | switch,
+            "valve.out": iso_valve(0.0, 2e-9) | switch,
+            "chamber": {"dead_volume": 1e-4, "alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2},
+        }
+    )
+    into = np.where(np.arange(61) < 20, 24.0, 0.0)
+    out = np.where(np.arange(61) < 40, 24.0, 0.0)  # without current it vents
+    run = pamrs.simulate(rig, {"into": into, "out": out}, sample_time=0.005)
+    pressure = run["muscle_pressure"]
+    assert pressure[20] > 1.5e5
+    np.testing.assert_allclose(pressure[20:41], pressure[20], rtol=1e-12)
+    absolute = pressure[40:51] + AMBIENT  # choked: an exponential
+    fall = RT * 2e-9 * 1.185 / 1e-4 * 0.005 * np.arange(11)
+    np.testing.assert_allclose(absolute, absolute[0] * np.exp(-fall), rtol=1e-9)
+
+
 @pytest.mark.parametrize("pressure", [-5e4, 6e5])
 def test_air_through_a_line_in_both_directions(pressure: float) -> None:
     run = Run(

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
 from typing import Any, Literal, Protocol
 
@@ -24,7 +24,7 @@ from numpy.polynomial import Chebyshev
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
 
-from .gas import LAMINAR_RATIO, Valve, orifice_flow
+from .gas import LAMINAR_RATIO, Valve, iso_flow, orifice_flow
 from .geometry import GeometryReference
 from .muscle import MuscleReference, MuscleTable
 from .planar import Link, PlanarArm
@@ -84,6 +84,21 @@ class Orifice:
             gas.gas_constant,
             gas.heat_capacity_ratio,
         )
+        return flow if first > second else -flow
+
+
+@dataclass(frozen=True)
+class Conductance:
+    """Restriction of a sonic conductance (m^3/(s Pa)) and a critical ratio, in both directions."""
+
+    conductance: float
+    critical: float
+    gas: Gas
+
+    def __call__(self, first: float, second: float) -> float:
+        """Mass flow from the first to the second, kg/s."""
+        high, low = max(first, second), min(first, second)
+        flow = iso_flow(self.conductance, self.critical, high, low, self.gas.temperature)
         return flow if first > second else -flow
 
 
@@ -408,7 +423,13 @@ class Network:
             flow: Flow = tubes[own] if own in tubes else Orifice(line["discharge_area"], gas)
             self.pipes.append((flow, self.index[line["from"] or own], self.index[line["to"]]))
         for part in model["valves"]:
-            valve = Valve(**{key.name: part[key.name] for key in fields(Valve)})
+            valve = Valve(**{key.name: part[key.name] for key in fields(Valve) if key.name in part})
+            if part.get("flow") == "iso_6358":
+                paths = [
+                    (part[f"{way}_conductance"], part[f"{way}_critical_ratio"])
+                    for way in ("fill", "vent")
+                ]
+                valve = replace(valve, iso=(paths[0], paths[1]))
             self.valves.append(
                 (valve, part["name"], self.index[part["from"]], self.index[part["to"]])
             )
@@ -544,11 +565,16 @@ class Network:
         """Every open way at a command, with its two ends."""
         ways = list(self.pipes)
         for valve, name, source, target in self.valves:
-            area = valve.area(command[suffix("valve_command", name)])
-            if area > 0.0:
-                ways.append((Orifice(area, self.gas), source, target))
-            elif area < 0.0:
-                ways.append((Orifice(-area, self.gas), target, self.index["ambient"]))
+            share = valve.share(command[suffix("valve_command", name)])
+            if share == 0.0:
+                continue
+            ends = (source, target) if share > 0.0 else (target, self.index["ambient"])
+            if valve.iso is None:
+                flow: Flow = Orifice(valve.discharge_area_max * abs(share), self.gas)
+            else:
+                conductance, critical = valve.iso[share < 0.0]
+                flow = Conductance(conductance * abs(share), critical, self.gas)
+            ways.append((flow, *ends))
         return ways
 
     def derivative(

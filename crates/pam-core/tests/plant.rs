@@ -77,7 +77,24 @@ fn sensitivities_agree_with_differences() {
         "heat_transfer",
         &[("heat_transfer_coefficient", 60.0), ("initial_temperature_rise", 3.0), ("share", 0.4)],
     )];
-    let cases: [(&RigSpec, Block, &[&str]); 5] = [
+    let mut conducting = with_effects.clone();
+    let valve = &mut conducting.valves[0];
+    valve.flow = "iso_6358".into();
+    valve.null_voltage = 5.4; // it vents and fills, both below choking
+    (valve.fill_conductance, valve.fill_critical_ratio) = (1.5e-8, 0.1);
+    (valve.vent_conductance, valve.vent_critical_ratio) = (1.8e-8, 0.2);
+    let cases: [(&RigSpec, Block, &[&str]); 6] = [
+        (
+            &conducting,
+            Block::Chamber(0),
+            &[
+                "valve.fill_conductance",
+                "valve.fill_critical_ratio",
+                "valve.vent_conductance",
+                "valve.vent_critical_ratio",
+                "valve.null_voltage",
+            ],
+        ),
         (
             &with_effects,
             Block::Supply(0),
@@ -207,6 +224,10 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
     match name {
         "supply.volume" => &mut spec.supplies[0].volume,
         "valve.discharge_area_max" => &mut spec.valves[0].discharge_area_max,
+        "valve.fill_conductance" => &mut spec.valves[0].fill_conductance,
+        "valve.fill_critical_ratio" => &mut spec.valves[0].fill_critical_ratio,
+        "valve.vent_conductance" => &mut spec.valves[0].vent_conductance,
+        "valve.vent_critical_ratio" => &mut spec.valves[0].vent_critical_ratio,
         "valve.null_voltage" => &mut spec.valves[0].null_voltage,
         "chamber.dead_volume" => &mut spec.chambers[0].dead_volume,
         "chamber.alpha" => &mut spec.chambers[0].alpha,

@@ -102,8 +102,8 @@ class AirModel:
     Raises
     ------
     ParameterError
-        If it has not, or its area table is level somewhere but at its ends, so that it has no
-        inverse.
+        If it has not, its valve has conductances in the place of an area, or its area table is
+        level somewhere but at its ends, so that it has no inverse.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -120,6 +120,11 @@ class AirModel:
             next(iter(rig.tables("valve").values())),
             next(iter(rig.tables("chamber").values())),
         )
+        if valve["flow"] != "orifice":
+            raise ParameterError(
+                f"valve.flow = {valve['flow']!r} is not allowed: a controller's model inverts a "
+                "valve with an area, flow = 'orifice'"
+            )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
         self.supply_pressure = _supply_pressure(rig)

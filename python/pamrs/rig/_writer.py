@@ -154,7 +154,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
         "gas": model["gas"],
         "supplies": [{"name": name, **table} for name, table in tables_of(model, "supply").items()],
         "valves": [
-            {"name": name, **ports["valve"][name], **table}
+            {"name": name, **ports["valve"][name], **_valve(table)}
             for name, table in tables_of(model, "valve").items()
         ],
         "lines": [_line(name, table, ports) for name, table in tables_of(model, "line").items()],
@@ -199,6 +199,12 @@ def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
     values = {key: value for key, value in table.items() if key != "kind"}
     ends = ports["line"][name]
     return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}
+
+
+def _valve(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A valve with an area is the core's usual one, and needs no word for it."""
+    usual = kind_of("valve", table) == "orifice"
+    return {key: value for key, value in table.items() if key != "flow" or not usual}
 
 
 def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:

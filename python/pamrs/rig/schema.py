@@ -107,10 +107,12 @@ _TURN = 2 * math.pi
 _TENDON = ("tendon", "published")
 _TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
 _ONE_LINK = ("one_link",)
+_ISO = ("iso_6358",)
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
 _KINDS: Final = {
     "supply": ("kind", "tank"),
+    "valve": ("flow", "orifice"),
     "line": ("kind", "tube"),
     "muscle": ("model", "robinson"),
     "transmission": ("kind", "tendon"),
@@ -167,7 +169,18 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         ),
     ),
     "valve": (
-        Key("discharge_area_max", "m2", 1e-11, 1e-2),
+        Key(
+            "flow",
+            default="orifice",
+            kind="choice",
+            choices=("orifice", "iso_6358"),
+            note="one area, or conductance and critical ratio of either path",
+        ),
+        Key("discharge_area_max", "m2", 1e-11, 1e-2, only=("orifice",)),
+        Key("fill_conductance", "m3/(s Pa)", 0.0, 1e-4, only=_ISO, note="sonic, C"),
+        Key("fill_critical_ratio", "1", 0.0, 0.9, only=_ISO, note="b"),
+        Key("vent_conductance", "m3/(s Pa)", 0.0, 1e-4, only=_ISO, note="0 where it has no vent"),
+        Key("vent_critical_ratio", "1", 0.0, 0.9, only=_ISO),
         Key("null_voltage", "V", -50.0, 50.0),
         Key("half_range", "V", 1e-3, 100.0),
         Key("opening", "1", 0.0, 1.0, kind="vector", path=("area_fraction", "opening")),

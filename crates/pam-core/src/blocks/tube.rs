@@ -42,6 +42,12 @@ impl<S: Scalar> Tube<S> {
         Self { flow_factor: conductance * factor, critical_ratio }
     }
 
+    /// One whose conductance is a share of this one's [1].
+    #[inline]
+    pub fn part(&self, share: S) -> Self {
+        Self { flow_factor: self.flow_factor * share, critical_ratio: self.critical_ratio }
+    }
+
     /// The same without derivatives.
     #[inline]
     pub fn re(&self) -> Tube<f64> {

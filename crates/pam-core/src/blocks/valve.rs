@@ -1,10 +1,88 @@
-//! Proportional 5/3 servo-valve: spool command to discharge area.
+//! Valve from a supply to a chamber and from there to the ambient: command to opening.
 //!
 //! `x = clip((u - u0)/half_range, -1, 1)`; `A = A_max a(|x|)` with a piecewise linear area table;
-//! `x > 0` fills the chamber from the supply, `x < 0` vents it.
+//! `x > 0` fills the chamber from the supply, `x < 0` vents it. In the place of one area it may have
+//! a sonic conductance `C` and a critical pressure ratio `b` for either path (ISO 6358-1:2013, which
+//! gives every path of a component its own): `C a(|x|)`, the same `b` at every opening.
 
+use super::gas::Gas;
+use super::tube::Tube;
 use crate::error::{Error, Result};
 use crate::scalar::{constant, Scalar};
+
+/// What air passes through between two pressures.
+#[derive(Debug, Clone, Copy)]
+pub enum Opening<S> {
+    /// Discharge area `Cd A` [m2] of an orifice.
+    Area(S),
+    /// Sonic conductance and critical pressure ratio.
+    Conductance(Tube<S>),
+}
+
+impl<S: Scalar> Opening<S> {
+    /// A share of it [1].
+    #[inline(always)]
+    pub fn part(&self, share: S) -> Self {
+        match self {
+            Self::Area(area) => Self::Area(*area * share),
+            Self::Conductance(tube) => Self::Conductance(tube.part(share)),
+        }
+    }
+
+    /// Mass flow [kg/s] between two absolute pressures [Pa], negative against the arrow.
+    #[inline(always)]
+    pub fn mass_flow(&self, gas: &Gas, upstream: S, downstream: S) -> S {
+        match self {
+            Self::Area(area) => gas.mass_flow(*area, upstream, downstream),
+            Self::Conductance(tube) => tube.mass_flow(upstream, downstream),
+        }
+    }
+
+    /// Whether nothing passes.
+    #[inline]
+    pub fn shut(&self) -> bool {
+        match self {
+            Self::Area(area) => area.re() <= 0.0,
+            Self::Conductance(tube) => tube.flow_factor() <= 0.0,
+        }
+    }
+
+    /// The same without derivatives.
+    #[inline]
+    pub fn re(&self) -> Opening<f64> {
+        match self {
+            Self::Area(area) => Opening::Area(area.re()),
+            Self::Conductance(tube) => Opening::Conductance(tube.re()),
+        }
+    }
+
+    /// Largest change of mass flow per pressure [kg/(s Pa)].
+    pub fn steepest(&self, gas: &Gas) -> f64 {
+        match self {
+            Self::Area(area) => gas.steepest(area.re()),
+            Self::Conductance(tube) => tube.steepest(),
+        }
+    }
+
+    /// Pressure ratio below which the flow is choked [1].
+    pub fn critical_ratio(&self, gas: &Gas) -> f64 {
+        match self {
+            Self::Area(_) => gas.critical_ratio(),
+            Self::Conductance(tube) => tube.critical_ratio(),
+        }
+    }
+}
+
+impl Opening<f64> {
+    /// The same in another scalar type.
+    #[inline]
+    pub fn lift<S: Scalar>(&self) -> Opening<S> {
+        match self {
+            Self::Area(area) => Opening::Area(constant(*area)),
+            Self::Conductance(tube) => Opening::Conductance(tube.lift()),
+        }
+    }
+}
 
 /// Normalised area table `a(|x|)` of a valve.
 #[derive(Debug, Clone, PartialEq)]
@@ -90,6 +168,24 @@ mod tests {
         assert!(AreaTable::new(&[0.0, 1.0], &[0.5, 0.1]).is_err());
         assert!(AreaTable::new(&[0.0, f64::NAN, 1.0], &[0.0, 0.5, 1.0]).is_err());
         assert!(AreaTable::new(&[0.0], &[0.0]).is_err());
+    }
+
+    #[test]
+    fn an_iso_valve_with_the_orifice_s_numbers_passes_about_as_much() {
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        let area = 8.4e-6;
+        let conductance = area / gas.area_of_conductance(1.0);
+        let tube = Tube::<f64>::of_conductance(conductance, gas.critical_ratio(), 293.15);
+        let (orifice, iso) = (Opening::Area(area), Opening::Conductance(tube));
+        for (up, down) in [(7e5, 1e5), (7e5, 3.9e5), (7e5, 5e5), (7e5, 6.9e5), (2e5, 7e5)] {
+            let ratio = iso.mass_flow(&gas, up, down) / orifice.mass_flow(&gas, up, down);
+            assert!((ratio - 1.0).abs() < 0.008, "{up} {down}: {ratio}");
+        }
+        assert_eq!(iso.part(0.0).mass_flow(&gas, 7e5, 1e5), 0.0);
+        assert!(iso.part(0.0).shut() && !iso.shut());
+        let half = iso.part(0.5).mass_flow(&gas, 7e5, 5e5) / iso.mass_flow(&gas, 7e5, 5e5);
+        assert!((half - 0.5).abs() < 1e-15);
+        assert_eq!(iso.critical_ratio(&gas), orifice.critical_ratio(&gas));
     }
 
     #[test]

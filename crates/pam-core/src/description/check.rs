@@ -77,6 +77,7 @@ impl RigSpec {
         }
         for valve in &self.valves {
             let block = Block { kind: "valve", name: &valve.name };
+            block.choice("flow", &valve.flow, &["orifice", "iso_6358"])?;
             block.range("half_range", valve.half_range, 1e-9, 1e3, "V")?;
         }
         for line in &self.lines {

@@ -40,8 +40,8 @@ pub struct SupplySpec {
     pub droop: f64,
 }
 
-/// Proportional servo-valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a
-/// line.
+/// Valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a line, and from
+/// there to the ambient.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,11 +50,27 @@ pub struct ValveSpec {
     pub name: String,
     pub from: Port,
     pub to: Port,
+    /// `orifice` (one area) or `iso_6358` (conductance and critical ratio of either path).
+    #[serde(default = "default_flow")]
+    pub flow: String,
+    #[serde(default)]
     pub discharge_area_max: f64,
+    #[serde(default)]
+    pub fill_conductance: f64,
+    #[serde(default)]
+    pub fill_critical_ratio: f64,
+    #[serde(default)]
+    pub vent_conductance: f64,
+    #[serde(default)]
+    pub vent_critical_ratio: f64,
     pub null_voltage: f64,
     pub half_range: f64,
     pub opening: Vec<f64>,
     pub fraction: Vec<f64>,
+}
+
+fn default_flow() -> String {
+    "orifice".into()
 }
 
 /// Tube or orifice; an empty `from` means that valves feed an inlet node of its own.

@@ -2,6 +2,7 @@
 
 use crate::blocks::chamber::ChamberState;
 use crate::blocks::gas::Gas;
+use crate::blocks::valve::Opening;
 use crate::scalar::{constant, Scalar};
 use serde::Serialize;
 use std::fmt::Debug;
@@ -215,10 +216,17 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         share
     }
 
-    /// [`Port::Passage`]: mass flow [kg/s] through an area [m2] between two pressures; against the
+    /// [`Port::Passage`]: mass flow [kg/s] through an opening between two pressures; against the
     /// arrow where it vents.
-    fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, _venting: bool) -> S {
-        gas.mass_flow(area, upstream, downstream)
+    fn through(
+        &self,
+        gas: &Gas,
+        opening: &Opening<S>,
+        upstream: S,
+        downstream: S,
+        _venting: bool,
+    ) -> S {
+        opening.mass_flow(gas, upstream, downstream)
     }
 
     /// [`Port::Passage`]: whether the pressure sensor sits between the valve and what the flow
@@ -228,7 +236,14 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     }
 
     /// [`Port::Passage`]: pressure there, with the arguments of [`Self::through`].
-    fn between(&self, _gas: &Gas, _area: S, _upstream: S, downstream: S, _venting: bool) -> S {
+    fn between(
+        &self,
+        _gas: &Gas,
+        _opening: &Opening<S>,
+        _upstream: S,
+        downstream: S,
+        _venting: bool,
+    ) -> S {
         downstream
     }
 

@@ -21,6 +21,7 @@ use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, 
 use crate::blocks::gas::Gas;
 use crate::blocks::pipe::Pipe;
 use crate::blocks::tube::Tube;
+use crate::blocks::valve::Opening;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 use num_dual::Dual64;
@@ -127,41 +128,41 @@ impl Passage<f64> {
     }
 }
 
-/// Mass flow [kg/s] through an area [m2] and then a tube, between two absolute pressures [Pa]; the
+/// Mass flow [kg/s] through an opening and then a tube, between two absolute pressures [Pa]; the
 /// other way round if `tube_first`. Negative when the downstream pressure is the higher one.
 pub fn mass_flow<S: Scalar>(
     gas: &Gas,
-    area: S,
+    opening: &Opening<S>,
     tube: &Passage<S>,
     upstream: S,
     downstream: S,
     tube_first: bool,
 ) -> S {
     if upstream.re() < downstream.re() {
-        return -mass_flow(gas, area, tube, downstream, upstream, !tube_first);
+        return -mass_flow(gas, opening, tube, downstream, upstream, !tube_first);
     }
-    let series = Series { gas, area, tube: *tube, tube_first };
+    let series = Series { gas, opening: *opening, tube: *tube, tube_first };
     series.flows(upstream, series.exact_node(upstream, downstream), downstream).1
 }
 
-/// Absolute pressure [Pa] between an area and a tube, of the same arguments as [`mass_flow`].
+/// Absolute pressure [Pa] between an opening and a tube, of the same arguments as [`mass_flow`].
 pub fn node<S: Scalar>(
     gas: &Gas,
-    area: S,
+    opening: &Opening<S>,
     tube: &Passage<S>,
     upstream: S,
     downstream: S,
     tube_first: bool,
 ) -> S {
     if upstream.re() < downstream.re() {
-        return node(gas, area, tube, downstream, upstream, !tube_first);
+        return node(gas, opening, tube, downstream, upstream, !tube_first);
     }
-    Series { gas, area, tube: *tube, tube_first }.exact_node(upstream, downstream)
+    Series { gas, opening: *opening, tube: *tube, tube_first }.exact_node(upstream, downstream)
 }
 
 struct Series<'a, S> {
     gas: &'a Gas,
-    area: S,
+    opening: Opening<S>,
     tube: Passage<S>,
     tube_first: bool,
 }
@@ -170,16 +171,16 @@ impl<S: Scalar> Series<'_, S> {
     /// Flow into and out of the node.
     fn flows(&self, upstream: S, node: S, downstream: S) -> (S, S) {
         if self.tube_first {
-            (self.tube.mass_flow(upstream, node), self.gas.mass_flow(self.area, node, downstream))
+            (self.tube.mass_flow(upstream, node), self.opening.mass_flow(self.gas, node, downstream))
         } else {
-            (self.gas.mass_flow(self.area, upstream, node), self.tube.mass_flow(node, downstream))
+            (self.opening.mass_flow(self.gas, upstream, node), self.tube.mass_flow(node, downstream))
         }
     }
 
     /// Pressure at the node [Pa] with its derivatives.
     fn exact_node(&self, upstream: S, downstream: S) -> S {
         let Self { gas, tube_first, .. } = *self;
-        let start = Series::<f64> { gas, area: self.area.re(), tube: self.tube.re(), tube_first };
+        let start = Series::<f64> { gas, opening: self.opening.re(), tube: self.tube.re(), tube_first };
         let (node, slope) = start.node(upstream.re(), downstream.re());
         let fixed = constant::<S>(node);
         let (a, b) = self.flows(upstream, fixed, downstream);
@@ -196,7 +197,7 @@ impl Series<'_, f64> {
     fn node(&self, upstream: f64, downstream: f64) -> (f64, f64) {
         let dual = Series {
             gas: self.gas,
-            area: Dual64::from(self.area),
+            opening: self.opening.lift::<Dual64>(),
             tube: self.tube.lift::<Dual64>(),
             tube_first: self.tube_first,
         };
@@ -270,10 +271,10 @@ impl<S: Scalar> Effect<S> for Hose<S> {
         }
     }
 
-    fn through(&self, gas: &Gas, area: S, upstream: S, downstream: S, venting: bool) -> S {
+    fn through(&self, gas: &Gas, opening: &Opening<S>, upstream: S, downstream: S, venting: bool) -> S {
         match &self.tube {
-            Some(tube) => mass_flow(gas, area, tube, upstream, downstream, venting),
-            None => gas.mass_flow(area, upstream, downstream),
+            Some(tube) => mass_flow(gas, opening, tube, upstream, downstream, venting),
+            None => opening.mass_flow(gas, upstream, downstream),
         }
     }
 
@@ -281,9 +282,9 @@ impl<S: Scalar> Effect<S> for Hose<S> {
         self.tapped && self.tube.is_some()
     }
 
-    fn between(&self, gas: &Gas, area: S, upstream: S, downstream: S, venting: bool) -> S {
+    fn between(&self, gas: &Gas, opening: &Opening<S>, upstream: S, downstream: S, venting: bool) -> S {
         match &self.tube {
-            Some(tube) => node(gas, area, tube, upstream, downstream, venting),
+            Some(tube) => node(gas, opening, tube, upstream, downstream, venting),
             None => downstream,
         }
     }
@@ -302,7 +303,7 @@ mod tests {
     }
 
     fn flow(area: f64, conductance: f64, p: [f64; 2], tube_first: bool) -> f64 {
-        mass_flow(&gas(), area, &tube(conductance, 293.15), p[0], p[1], tube_first)
+        mass_flow(&gas(), &Opening::Area(area), &tube(conductance, 293.15), p[0], p[1], tube_first)
     }
 
     #[test]
@@ -336,14 +337,14 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_differences() {
         let gas = gas();
-        let run = |x: [f64; 4]| mass_flow(&gas, x[0], &tube(x[1], 293.15), x[2], x[3], false);
+        let run = |x: [f64; 4]| mass_flow(&gas, &Opening::Area(x[0]), &tube(x[1], 293.15), x[2], x[3], false);
         for x in
             [[8e-6, 1.2e-8, 8e5, 2e5], [2e-6, 1.2e-8, 8e5, 7.8e5], [8e-6, 1.2e-8, 3e5, 2.9995e5]]
         {
             for k in 0..4 {
                 let mut d = x.map(Dual64::from);
                 d[k].eps = 1.0;
-                let exact = mass_flow(&gas, d[0], &tube(d[1], 293.15), d[2], d[3], false).eps;
+                let exact = mass_flow(&gas, &Opening::Area(d[0]), &tube(d[1], 293.15), d[2], d[3], false).eps;
                 let h = 1e-6 * x[k];
                 let (mut up, mut down) = (x, x);
                 up[k] += h;

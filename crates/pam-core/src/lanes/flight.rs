@@ -8,7 +8,7 @@ use super::rates::Lanes;
 use super::reads::Reads;
 use super::rk4::Rk4;
 use super::Plan;
-use crate::blocks::valve::spool_position;
+use crate::blocks::valve::{spool_position, Opening};
 use crate::plant::Plant;
 use crate::simulate::drive::Drive;
 use crate::simulate::{Failure, Progress, Timing, Trajectory};
@@ -343,7 +343,10 @@ pub(super) fn opening(plant: &Plant<'_, f64>, valve: usize, spool: f64) -> f64 {
         return 0.0; // neither, whatever its table begins with
     }
     let table = &plant.rig().wiring.valves[valve].table;
-    plant.valves[valve].area * table.eval(spool.abs()) * spool.signum()
+    match plant.valves[valve].paths[0] {
+        Opening::Area(area) => area * table.eval(spool.abs()) * spool.signum(),
+        Opening::Conductance(_) => 0.0, // no such rig is planned in lanes
+    }
 }
 
 /// A call that is compiled for the registers of the flight.

@@ -29,7 +29,7 @@ pub(crate) use solo::Solo;
 
 use self::blocks::Orifice;
 use self::curves::Curves;
-use crate::plant::{BodyUnit, Group, Rig};
+use crate::plant::{BodyUnit, Group, Passes, Rig};
 
 /// How far beyond its stops a coordinate may go in lanes, in ranges of it.
 const BEYOND: f64 = 0.25;
@@ -52,8 +52,9 @@ impl Plan {
         // the curves hold torques, which know nothing of a muscle that goes slack
         let plain = wiring.ports.effects.is_empty()
             && wiring.groups.iter().all(|g| !g.direction && !g.muscle.buckles());
-        let valves = wiring.groups.iter().all(|g| g.coordinate == 0);
-        if !(body && plain && valves) {
+        let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
+        let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
+        if !(body && plain && one_joint && areas) {
             return None;
         }
         let curves = wiring.groups.iter().map(|group| curves(rig, group));

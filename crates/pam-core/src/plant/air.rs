@@ -4,6 +4,7 @@ use super::ports::{Flow, Place};
 use super::rates::{Controls, Line, Plant, Scratch};
 use super::units::Node;
 use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberState};
+use crate::blocks::valve::Opening;
 use crate::effects::Extremes;
 use crate::scalar::{constant, Scalar};
 
@@ -38,13 +39,13 @@ impl<S: Scalar> Plant<'_, S> {
             let spool = controls.spool[k];
             let pressure = state[self.layout.pressure(unit.to)];
             if spool.re() > 0.0 {
-                let area = valve.area * self.share(k, unit.table.eval(spool), false);
+                let opening = valve.paths[0].part(self.share(k, unit.table.eval(spool), false));
                 let upstream = self.pressure_at(unit.from, state);
-                let flow = self.valve_flow(k, area, upstream, pressure, false);
+                let flow = self.valve_flow(k, &opening, upstream, pressure, false);
                 here.pass(unit.from, Node::Gas(unit.to), flow);
             } else if spool.re() < 0.0 {
-                let area = valve.area * self.share(k, unit.table.eval(-spool), true);
-                let flow = self.valve_flow(k, area, pressure, ambient, true);
+                let opening = valve.paths[1].part(self.share(k, unit.table.eval(-spool), true));
+                let flow = self.valve_flow(k, &opening, pressure, ambient, true);
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
@@ -61,7 +62,7 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Share of a valve's largest area where its table gives one [1].
+    /// Share of a valve's widest opening where its table gives one [1].
     #[inline(always)]
     pub(super) fn share(&self, valve: usize, share: S, venting: bool) -> S {
         if self.altered.areas {
@@ -81,11 +82,18 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Mass flow through an opening of a valve [kg/s], and what lies behind it.
     #[inline(always)]
-    fn valve_flow(&self, valve: usize, area: S, upstream: S, downstream: S, venting: bool) -> S {
+    fn valve_flow(
+        &self,
+        valve: usize,
+        opening: &Opening<S>,
+        upstream: S,
+        downstream: S,
+        venting: bool,
+    ) -> S {
         if self.altered.passages {
-            self.altered_valve_flow(valve, area, upstream, downstream, venting)
+            self.altered_valve_flow(valve, opening, upstream, downstream, venting)
         } else {
-            self.rig.gas.mass_flow(area, upstream, downstream)
+            opening.mass_flow(&self.rig.gas, upstream, downstream)
         }
     }
 
@@ -93,15 +101,17 @@ impl<S: Scalar> Plant<'_, S> {
     fn altered_valve_flow(
         &self,
         valve: usize,
-        area: S,
+        opening: &Opening<S>,
         upstream: S,
         downstream: S,
         venting: bool,
     ) -> S {
         let gas = &self.rig.gas;
         match &self.wiring.ports.passage[valve] {
-            None => gas.mass_flow(area, upstream, downstream),
-            Some(acting) => self.effect(acting).through(gas, area, upstream, downstream, venting),
+            None => opening.mass_flow(gas, upstream, downstream),
+            Some(acting) => {
+                self.effect(acting).through(gas, opening, upstream, downstream, venting)
+            }
         }
     }
 
@@ -234,9 +244,10 @@ impl Plant<'_, f64> {
         let valves = self.wiring.valves.iter().zip(&self.valves).zip(&controls.spool);
         let valves = valves.map(move |((unit, valve), spool)| {
             let other = if *spool > 0.0 { unit.from } else { Node::Ambient };
-            let open = valve.area * unit.table.eval(spool.abs()) > 0.0;
+            let path = &valve.paths[usize::from(*spool <= 0.0)];
+            let open = !path.part(unit.table.eval(spool.abs())).shut();
             let ends = open.then(|| (pressure(Node::Gas(unit.to)), pressure(other)));
-            (ends, gas.critical_ratio())
+            (ends, path.critical_ratio(gas))
         });
         let lines = self.wiring.lines.iter().zip(&self.lines).map(move |(unit, line)| {
             let critical = match line {
@@ -267,7 +278,8 @@ impl Plant<'_, f64> {
         for (k, (unit, valve)) in wiring.valves.iter().zip(&self.valves).enumerate() {
             let full = unit.table.eval(1.0);
             let most = self.share(k, full, false).max(self.share(k, full, true));
-            let slope = gas.steepest(valve.area * most);
+            let [fill, vent] = valve.paths.map(|path| path.part(most).steepest(gas));
+            let slope = fill.max(vent);
             add(Node::Gas(unit.to), unit.from, slope);
             add(unit.from, Node::Gas(unit.to), slope);
         }

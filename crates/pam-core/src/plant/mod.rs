@@ -26,7 +26,7 @@ pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
 pub(crate) use ports::{moves, Acting, Place};
 pub(crate) use rates::{Controls, Line, Plant, Scratch, Simulated};
-pub(crate) use units::{BodyUnit, Group, Node, Path};
+pub(crate) use units::{BodyUnit, Group, Node, Passes, Path};
 
 use self::units::Wiring;
 use crate::blocks::gas::Gas;

@@ -9,12 +9,13 @@ use super::body::Body;
 use super::layout::{Channel, Layout, BALANCE_COUNT};
 use super::memory::Memory;
 use super::ports::{Acting, Place, Ports};
-use super::units::{LineUnit, Path, SupplyUnit, Wiring};
+use super::units::{LineUnit, Passes, Path, SupplyUnit, ValveUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
 use crate::blocks::supply::Supply;
 use crate::blocks::tube::Tube;
+use crate::blocks::valve::Opening;
 use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
@@ -116,7 +117,8 @@ pub struct Controls<S> {
 
 #[derive(Debug, Clone)]
 pub(crate) struct Valve<S> {
-    pub area: S,
+    /// Wide open, where it fills and where it vents.
+    pub paths: [Opening<S>; 2],
     pub null: S,
 }
 
@@ -222,6 +224,13 @@ impl<'a, S: Number> Plant<'a, S> {
             }
             Path::Orifice(_) => constant(0.0),
         };
+        let paths = |valve: &ValveUnit| match valve.passes {
+            Passes::Area(area) => [Opening::Area(values[area]); 2],
+            Passes::Conductances(paths) => paths.map(|[conductance, ratio]| {
+                let (c, b) = (values[conductance], values[ratio]);
+                Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
+            }),
+        };
         let isothermal =
             Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
         Ok(Self {
@@ -253,7 +262,7 @@ impl<'a, S: Number> Plant<'a, S> {
                 })
                 .collect(),
             valves: (wiring.valves.iter())
-                .map(|valve| Valve { area: values[valve.area], null: values[valve.null] })
+                .map(|valve| Valve { paths: paths(valve), null: values[valve.null] })
                 .collect(),
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),

@@ -3,6 +3,7 @@
 
 use super::ports::Acting;
 use super::rates::{Controls, Plant};
+use crate::blocks::valve::Opening;
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -47,15 +48,15 @@ impl<S: Scalar> Plant<'_, S> {
     pub fn at_sensor(&self, gas: usize, state: &[S], controls: &Controls<S>) -> S {
         let inside = state[self.layout.pressure(gas)];
         let Some((valve, acting)) = self.tap(gas) else { return inside };
-        let (area, filling) = self.opening(valve, controls.spool[valve]);
+        let (opening, filling) = self.opening(valve, controls.spool[valve]);
         let (air, effect) = (&self.rig.gas, self.effect(acting));
-        if area.re() <= 0.0 {
+        if opening.shut() {
             inside
         } else if filling {
             let outside = self.pressure_at(self.wiring.valves[valve].from, state);
-            effect.between(air, area, outside, inside, false)
+            effect.between(air, &opening, outside, inside, false)
         } else {
-            effect.between(air, area, inside, constant(air.ambient_pressure), true)
+            effect.between(air, &opening, inside, constant(air.ambient_pressure), true)
         }
     }
 
@@ -64,15 +65,15 @@ impl<S: Scalar> Plant<'_, S> {
     /// At most the highest that the rig can have.
     pub fn behind_tube(&self, gas: usize, there: S, state: &[S], spool: S) -> S {
         let Some((valve, acting)) = self.tap(gas) else { return there };
-        let (area, filling) = self.opening(valve, spool);
+        let (opening, filling) = self.opening(valve, spool);
         let air = &self.rig.gas;
-        if area.re() <= 0.0 || there.re() <= 0.0 {
+        if opening.shut() || there.re() <= 0.0 {
             return there;
         }
         let flow = if filling {
-            air.mass_flow(area, self.pressure_at(self.wiring.valves[valve].from, state), there)
+            opening.mass_flow(air, self.pressure_at(self.wiring.valves[valve].from, state), there)
         } else {
-            -air.mass_flow(area, there, constant(air.ambient_pressure))
+            -opening.mass_flow(air, there, constant(air.ambient_pressure))
         };
         let inside = self.effect(acting).behind(there, flow);
         let highest = self.rig.highest_pressure().max(there.re());
@@ -83,14 +84,14 @@ impl<S: Scalar> Plant<'_, S> {
         }
     }
 
-    /// Discharge area of a valve [m2], and whether it opens to where it is fed from.
-    fn opening(&self, valve: usize, spool: S) -> (S, bool) {
+    /// Opening of a valve, and whether it opens to where it is fed from.
+    fn opening(&self, valve: usize, spool: S) -> (Opening<S>, bool) {
         let filling = spool.re() > 0.0;
-        let table = &self.wiring.valves[valve].table;
+        let path = &self.valves[valve].paths[usize::from(!filling)];
         if spool.re() == 0.0 {
-            return (constant(0.0), filling);
+            return (path.part(constant(0.0)), filling);
         }
-        let share = table.eval(if filling { spool } else { -spool });
-        (self.valves[valve].area * self.share(valve, share, !filling), filling)
+        let share = self.wiring.valves[valve].table.eval(if filling { spool } else { -spool });
+        (path.part(self.share(valve, share, !filling)), filling)
     }
 }

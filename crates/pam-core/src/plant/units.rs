@@ -37,12 +37,21 @@ pub(crate) enum SupplyUnit {
     Regulator { time_constant: ParameterId, droop: ParameterId },
 }
 
+/// What a valve passes where it is wide open.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Passes {
+    /// The same area on both paths.
+    Area(ParameterId),
+    /// Conductance and critical ratio where it fills, and where it vents.
+    Conductances([[ParameterId; 2]; 2]),
+}
+
 #[derive(Debug, Clone)]
 pub(crate) struct ValveUnit {
     pub from: Node,
     pub to: usize,
     pub table: AreaTable,
-    pub area: ParameterId,
+    pub passes: Passes,
     pub null: ParameterId,
     pub half_range: f64,
 }

@@ -4,11 +4,11 @@
 use super::parameters::Parameters;
 use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{
-    Coordinate, GasUnit, Group, LineUnit, Node, Path, SupplyUnit, ValveUnit, Wiring,
+    Coordinate, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, Wiring,
 };
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::valve::AreaTable;
-use crate::description::{dotted, RigSpec, SupplySpec};
+use crate::description::{dotted, RigSpec, SupplySpec, ValveSpec};
 use crate::effects::EffectInfo;
 use crate::{Error, Result};
 
@@ -188,11 +188,7 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
             from,
             to,
             table: AreaTable::new(&valve.opening, &valve.fraction)?,
-            area: table.add(
-                format!("{block}.discharge_area_max"),
-                valve.discharge_area_max,
-                (0.0, 1.0, "m2"),
-            )?,
+            passes: passes(valve, &block, table)?,
             null: table.add(
                 format!("{block}.null_voltage"),
                 valve.null_voltage,
@@ -202,6 +198,26 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
         });
     }
     Ok(units)
+}
+
+/// What a valve passes where it is wide open.
+fn passes(valve: &ValveSpec, block: &str, table: &mut Parameters) -> Result<Passes> {
+    let mut add = |key: &str, value, bounds| table.add(format!("{block}.{key}"), value, bounds);
+    if valve.flow == "orifice" {
+        let area = add("discharge_area_max", valve.discharge_area_max, (0.0, 1.0, "m2"))?;
+        return Ok(Passes::Area(area));
+    }
+    let (conductance, ratio) = ((0.0, 1.0, "m3/(s Pa)"), (0.0, 0.9, ""));
+    Ok(Passes::Conductances([
+        [
+            add("fill_conductance", valve.fill_conductance, conductance)?,
+            add("fill_critical_ratio", valve.fill_critical_ratio, ratio)?,
+        ],
+        [
+            add("vent_conductance", valve.vent_conductance, conductance)?,
+            add("vent_critical_ratio", valve.vent_critical_ratio, ratio)?,
+        ],
+    ]))
 }
 
 type Lines = (Vec<LineUnit>, Vec<(usize, Node)>);

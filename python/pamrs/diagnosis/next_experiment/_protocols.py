@@ -17,10 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs import _core
 from pamrs.control import OrificeInverse
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
+from pamrs.rig.schema import BLOCKS
 from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
 
 __all__ = ["Experiment", "Range", "is_sealed", "library", "pressure_range", "trial_of"]
@@ -155,7 +157,11 @@ def trial_of(
     orifice = OrificeInverse(
         ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
     )
-    widest = valve["discharge_area_max"]
+    if valve["flow"] == "orifice":
+        widest = valve["discharge_area_max"]
+    else:  # the loop makes good what this misses of the larger path
+        unit = _core.Gas(*(gas[key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+        widest = unit * max(valve["fill_conductance"], valve["vent_conductance"])
     fractions, openings = np.asarray(valve["fraction"]), np.asarray(valve["opening"])
     null, half = valve["null_voltage"], valve["half_range"]
     slope = np.gradient(reference, sample_time)

@@ -71,7 +71,14 @@ class Block:
 
 
 _SUPPLY = ("volume", "time_constant", "droop")
-_VALVE = ("discharge_area_max", "null_voltage")
+_VALVE = (
+    "discharge_area_max",
+    "fill_conductance",
+    "fill_critical_ratio",
+    "vent_conductance",
+    "vent_critical_ratio",
+    "null_voltage",
+)
 _LINE = ("length", "diameter", "discharge_area")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha")
 _MUSCLE = ("modulus_scale",)

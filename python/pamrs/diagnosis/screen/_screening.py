@@ -24,7 +24,7 @@ from pamrs.diagnosis.settings import ScreenSettings
 from pamrs.effects import EFFECTS, EffectParameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
-from pamrs.rig.schema import BLOCKS, qualified
+from pamrs.rig.schema import BLOCKS
 
 __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
 
@@ -389,6 +389,10 @@ def _nearest(
     return [tried[k] for k in (order[0], *far[:1])]
 
 
+#: Of a valve by ISO 6358.
+_CONDUCTANCES = ("fill_conductance", "vent_conductance")
+
+
 def _beside(
     starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig
 ) -> list[Start]:
@@ -396,10 +400,13 @@ def _beside(
     a block could show them.
     """
     kind, _, area = parameter.like.partition(".")
-    areas = [rig.parameter(f"{qualified(kind, name)}.{area}").value for name in rig.tables(kind)]
     unit = _core.Gas(*(rig.model["gas"][key.name] for key in BLOCKS["gas"])).area_of_conductance(
         1.0
     )
+    areas = [
+        table[area] if area in table else unit * max(table[key] for key in _CONDUCTANCES)
+        for table in rig.tables(kind).values()
+    ]
     name = f"{starts[0].effect}.{parameter.name}"
     return [
         replace(start, free=start.free | {name: part * max(areas) / unit})

@@ -1,0 +1,83 @@
+"""A valve with conductances: what of it is wrong is named, on the path on which it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import RigError
+from pamrs.recordings import Recording
+from pamrs.rig import parse_rig
+
+TEXT = """
+schema = "pamrs.rig/1"
+name = "iso"
+[gas]
+[supply]
+volume           = { value = 20, unit = "l", tol = 0.1 }
+initial_pressure = { value = 6, unit = "bar" }
+[valve]
+flow                = "iso_6358"
+fill_conductance    = { value = 0.20, unit = "l/(s bar)", tol = 0.01 }
+fill_critical_ratio = { value = 0.30, unit = "1", tol = 0.05 }
+vent_conductance    = { value = 0.26, unit = "l/(s bar)", tol = 0.01 }
+vent_critical_ratio = { value = 0.35, unit = "1", tol = 0.05 }
+null_voltage        = { value = 5.0, unit = "V", tol = 0.005 }
+half_range          = { value = 5.0, unit = "V" }
+area_fraction       = { opening = [0.0, 1.0], fraction = [0.0, 1.0] }
+[chamber]
+dead_volume = { value = 0.5, unit = "l", tol = 0.005 }
+alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
+alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
+alpha       = { value = 1.2, unit = "1" }
+"""
+
+
+def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:
+    """Ten seconds at 200 Hz of a chamber that is filled and vented in steps."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 10.0, 0.005)
+    steps = 5.0 + rng.uniform(0.5, 4.0, 20) * np.tile([1.0, -1.0], 10)
+    command = steps[(time / 0.5).astype(int)]
+    run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
+    channels = {"valve_command": command}
+    for name in ("supply_pressure", "muscle_pressure"):
+        channels[name] = run[name] + 400.0 * rng.standard_normal(time.size)
+    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
+    return Recording(f"r{seed}", role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+
+
+def diagnosed(**true: float) -> pamrs.Diagnosis:
+    nominal = parse_rig(TEXT)
+    factors = {f"valve.{name}": factor for name, factor in true.items()}
+    rig = nominal.with_parameters(
+        {name: nominal.parameter(name).value * factor for name, factor in factors.items()}
+    )
+    roles = ("fit", "fit", "held_out")
+    recordings = [recorded(rig, role, seed) for seed, role in enumerate(roles)]
+    return pamrs.diagnose(pamrs.Case("case", nominal, recordings, Path()))
+
+
+def test_a_healthy_valve_misses_nothing() -> None:
+    assert diagnosed().verdict == "none"
+
+
+def test_a_wrong_vent_is_named() -> None:
+    found = diagnosed(vent_conductance=1.5)
+    assert found.verdict == "parameters"
+    (wrong,) = found.wrong_parameters
+    assert wrong["name"] == "valve.vent_conductance"
+    assert wrong["value"] == pytest.approx(1.5 * wrong["nominal"], rel=0.03)
+
+
+def test_a_file_reads_back_and_mixed_keys_are_named() -> None:
+    rig = parse_rig(TEXT)
+    assert parse_rig(rig.to_toml_text()).model == rig.model
+    assert rig.parameter("valve.fill_conductance").value == pytest.approx(2e-9)
+    with pytest.raises(RigError, match=r"valve\.fill_conductance is not allowed with 'orifice'"):
+        parse_rig(TEXT.replace('flow                = "iso_6358"', ""))
+    with pytest.raises(RigError, match=r"valve\.fill_critical_ratio = 0\.95"):
+        parse_rig(TEXT.replace("value = 0.30", "value = 0.95"))
