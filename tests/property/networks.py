@@ -99,6 +99,9 @@ def sources(draw: st.DrawFn) -> tuple[Blocks, str]:
         "regulator": {
             "time_constant": draw(st.floats(0.03, 0.2)),
             "droop": draw(st.floats(0.0, 4e6)),
+            "dead_time": draw(st.sampled_from([0.0, 0.013])),
+            "rise_limit": draw(st.sampled_from([2e6, 1e12])),
+            "fall_limit": draw(st.sampled_from([3e6, 1e12])),
         },
     }[kind]
     pressure = draw(st.floats(6e5, 8e5))

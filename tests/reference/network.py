@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import lru_cache, partial
+from itertools import pairwise
 from typing import Any, Literal, Protocol
 
 import numpy as np
@@ -281,6 +282,10 @@ class Node:
     alpha: float = 1.0
     time_constant: float = math.nan
     droop: float = 0.0
+    #: Of a regulator: how late a command acts (s), fastest rise and fall of its outlet (Pa/s).
+    dead_time: float = 0.0
+    rise_limit: float = math.inf
+    fall_limit: float = math.inf
 
 
 @dataclass(frozen=True)
@@ -386,7 +391,14 @@ class Network:
         for supply in model["supplies"]:
             numbers = {
                 key: supply[key]
-                for key in ("volume", "time_constant", "droop")
+                for key in (
+                    "volume",
+                    "time_constant",
+                    "droop",
+                    "dead_time",
+                    "rise_limit",
+                    "fall_limit",
+                )
                 if supply.get(key) is not None
             }
             start = ambient + supply["initial_pressure"]
@@ -622,9 +634,8 @@ class Network:
             if node.kind == "constant":
                 pressure_rate.append(0.0)
             elif node.kind == "regulator":
-                pressure_rate.append(
-                    (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
-                )
+                wanted = (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
+                pressure_rate.append(min(max(wanted, -node.fall_limit), node.rise_limit))
             else:  # a tank is isothermal: its coefficients are one
                 moved = self.rt * (node.alpha_in * inflow[i] - node.alpha_out * outflow[i])
                 pressure_rate.append(
@@ -690,6 +701,13 @@ def _rhs(
         return [math.nan] * state.size
 
 
+def _edges(dead_times: Iterable[float], sample_time: float) -> list[float]:
+    """Instants of a sample (s) between which late commands are constant, its ends included."""
+    late = {dead_time % sample_time for dead_time in dead_times}
+    inside = {time for time in late if 1e-9 < time / sample_time < 1.0 - 1e-9}
+    return [0.0, *sorted(inside), sample_time]
+
+
 def simulate(
     model: Mapping[str, Any],
     commands: Mapping[str, ArrayLike],
@@ -750,26 +768,36 @@ def simulate(
     atol = rig.tolerances(states[0], rtol)
     first = min(1e-3, sample_time)
     for k in range(n - 1):
-        set_pressure = [node.start for node in rig.nodes]
-        for i, name in regulators.items():
-            if name in held:
-                set_pressure[i] = rig.gas.ambient_pressure + float(held[name][k])
         ways = rig.flows({name: float(values[k]) for name, values in held.items()})
-        rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
-        left: list[str] = []
-        slope = partial(_rhs, rate=rate, left=left)
-        settings = {"rtol": rtol, "atol": atol, "first_step": first, "dense_output": True}
-        solution = solve_ivp(slope, (0.0, sample_time), states[k], method=method, **settings)
-        if not solution.success:
-            raise RuntimeError(
-                f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
-            )
-        states[k + 1] = solution.y[:, -1]
-        work = rig.split(solution.sol(np.linspace(0.0, sample_time, 1001)).T)[-1][
-            :, len(BOOKS) - 1 :
-        ]
-        positive[k + 1] = positive[k] + np.maximum(np.diff(work, axis=0), 0.0).sum()
-        first = min(float(np.diff(solution.t).max()), sample_time)
+        state, positive[k + 1] = states[k], positive[k]
+        edges = _edges([rig.nodes[i].dead_time for i in regulators], sample_time)
+        for begin, end in pairwise(edges):
+            set_pressure = [node.start for node in rig.nodes]
+            for i, name in regulators.items():
+                late = (k * sample_time + 0.5 * (begin + end) - rig.nodes[i].dead_time) / sample_time
+                if name in held and late >= 0.0:
+                    set_pressure[i] = rig.gas.ambient_pressure + float(held[name][int(late)])
+            rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
+            left: list[str] = []
+            slope = partial(_rhs, rate=rate, left=left)
+            settings = {
+                "rtol": rtol,
+                "atol": atol,
+                "first_step": min(first, end - begin),
+                "dense_output": True,
+            }
+            solution = solve_ivp(slope, (begin, end), state, method=method, **settings)
+            if not solution.success:
+                raise RuntimeError(
+                    f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
+                )
+            state = solution.y[:, -1]
+            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-1][
+                :, len(BOOKS) - 1 :
+            ]
+            positive[k + 1] += np.maximum(np.diff(work, axis=0), 0.0).sum()
+            first = min(float(np.diff(solution.t).max()), sample_time)
+        states[k + 1] = state
     return {
         "time": sample_time * np.arange(n, dtype=np.float64),
         **rig.channels(states),

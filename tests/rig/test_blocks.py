@@ -386,6 +386,9 @@ def test_json_of_lines_regulators_and_links() -> None:
             "initial_pressure": 0.0,
             "time_constant": 0.1,
             "droop": pytest.approx(3e6),
+            "dead_time": 0.0,
+            "rise_limit": 1e12,
+            "fall_limit": 1e12,
         },
     ]
     assert (fed["lines"][0]["from"], fed["lines"][0]["to"]) == ("supply", "chamber")

@@ -1,6 +1,6 @@
 //! Signals that are seen later than they were there: readings, and commands that are held.
 
-use crate::scalar::Scalar;
+use crate::scalar::{constant, Scalar};
 
 /// A reading so late [samples], from the readings of the samples before (newest last) and the
 /// present one.
@@ -19,6 +19,9 @@ pub fn late(past: impl Fn(usize) -> Option<f64>, present: f64, shift: f64) -> f6
     near + (far - near) * (shift - back as f64)
 }
 
+/// How near to an edge a time lies on it [samples]: rounding.
+const ON_EDGE: f64 = 1e-9;
+
 /// Mean over a step [s] that begins at a time of values that are held over each sample, seen later
 /// by a shift.
 pub fn held_mean<S: Scalar>(
@@ -31,10 +34,15 @@ pub fn held_mean<S: Scalar>(
     // In samples; what lies nearer to an edge than rounding lies on it.
     let from = -shift / sample_time + time / sample_time;
     let to = from + step / sample_time;
-    let cell = |x: f64| (x + 1e-9).floor();
-    let (first, last) = (cell(from.re()), cell(to.re() - 2e-9).max(cell(from.re())));
+    let cell = |x: f64| (x + ON_EDGE).floor();
+    let (first, last) = (cell(from.re()), cell(to.re() - 2.0 * ON_EDGE).max(cell(from.re())));
     if first == last {
-        return value(first as i64);
+        let (now, edge) = (value(first as i64), -from + first);
+        if edge.re().abs() > ON_EDGE {
+            return now;
+        }
+        // an edge on the step's beginning moves into it when the shift grows
+        return now + edge * (value(first as i64 - 1) - now) / (step / sample_time);
     }
     let mut sum = (-from + (first + 1.0)) * value(first as i64);
     let mut k = first + 1.0;
@@ -43,6 +51,23 @@ pub fn held_mean<S: Scalar>(
         k += 1.0;
     }
     (sum + (to - last) * value(last as i64)) / (step / sample_time)
+}
+
+/// Which values that are held over each sample a step [s], no longer than a sample, begins and ends
+/// with, seen later by a shift, and the share of the step until it changes.
+pub fn held_edge<S: Scalar>(time: f64, step: f64, sample_time: f64, shift: S) -> (i64, i64, S) {
+    let from = -shift / sample_time + time / sample_time;
+    let to = from + step / sample_time;
+    let cell = |x: f64| (x + ON_EDGE).floor();
+    let (first, last) = (cell(from.re()), cell(to.re() - 2.0 * ON_EDGE).max(cell(from.re())));
+    if first == last {
+        let edge = -from + first;
+        if edge.re().abs() > ON_EDGE {
+            return (first as i64, last as i64, constant(0.0));
+        }
+        return (first as i64 - 1, last as i64, edge / (step / sample_time));
+    }
+    (first as i64, last as i64, (-from + last) / (step / sample_time))
 }
 
 #[cfg(test)]
@@ -59,6 +84,22 @@ mod tests {
         let slope =
             held_mean(|k| Dual64::from(value(k)), 0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0)).eps;
         assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
+    }
+
+    #[test]
+    fn an_edge_on_the_beginning_of_a_step_has_a_slope() {
+        let value = |k: i64| Dual64::from(if k < 3 { 1.0 } else { 5.0 });
+        let shift = |by: f64| Dual64::new(by, 1.0);
+        let mean = held_mean(value, 0.015, 1e-3, 5e-3, shift(0.0));
+        assert!((mean.re - 5.0).abs() < 1e-9 && (mean.eps + 4.0 / 1e-3).abs() < 1e-6);
+        let (first, last, share) = held_edge(0.02, 1e-3, 5e-3, shift(5e-3));
+        assert_eq!((first, last), (2, 3));
+        assert!(share.re.abs() < 1e-9 && (share.eps - 1.0 / 1e-3).abs() < 1e-6);
+        let (first, last, share) = held_edge(0.022, 1e-3, 5e-3, shift(5e-3));
+        assert_eq!((first, last, share.eps), (3, 3, 0.0));
+        let (first, last, share) = held_edge(0.017, 1e-3, 5e-3, shift(2.25e-3));
+        assert_eq!((first, last), (2, 3));
+        assert!((share.re - 0.25).abs() < 1e-9);
     }
 
     #[test]

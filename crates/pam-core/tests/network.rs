@@ -1,6 +1,7 @@
 //! Laws of rigs of several blocks: what is conserved, what they come to rest at, order, stability,
 //! and what is refused.
 
+use pam_core::blocks::supply::FASTEST;
 use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
@@ -237,6 +238,9 @@ fn a_regulator_settles_and_its_droop_follows_the_flow() {
         initial_pressure: 4e5,
         time_constant: 0.05,
         droop: 4e6,
+        dead_time: 0.0,
+        rise_limit: FASTEST,
+        fall_limit: FASTEST,
     }];
     let rig = Rig::new(spec).unwrap();
     let out = run(&rig, 500, &[], 0.02, 1e-3);
@@ -446,6 +450,9 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
         initial_pressure: 0.0,
         time_constant: 0.0,
         droop: 0.0,
+        dead_time: 0.0,
+        rise_limit: FASTEST,
+        fall_limit: FASTEST,
     }];
     let mut through_line = spec.clone();
     through_line.lines = vec![orifice("supply", "chamber", 8.4e-6)];

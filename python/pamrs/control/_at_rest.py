@@ -9,12 +9,14 @@ from __future__ import annotations
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 
 __all__ = ["check_smooth", "resting", "without_dry_friction"]
 
 
 def check_smooth(rig: Rig, *, supplies: bool) -> None:
-    """Refuse a rig with an effect that has no derivative where a valve is closed and a joint rests.
+    """Refuse a rig with a dead time, or with an effect that has no derivative where a valve is
+    closed and a joint rests.
 
     Parameters
     ----------
@@ -26,8 +28,15 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
     Raises
     ------
     ParameterError
-        With the effect's name.
+        With the name of the effect or of the dead time.
     """
+    for name, table in rig.tables("supply").items():
+        late = table.get("dead_time", 0.0)
+        if supplies and late > 0.0:
+            raise ParameterError(
+                f"{qualified('supply', name)}.dead_time = {late:g} is not allowed: it is no state "
+                "of a linear model; set it to 0, and give it as the delay of the loop"
+            )
     for effect in rig.effects:
         kink = EFFECTS[effect["id"]].kink
         if kink is None:

@@ -167,6 +167,27 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             only=("regulator",),
             note="fall of the outlet pressure per mass flow",
         ),
+        Key(
+            "dead_time", "s", 0.0, 10.0, 0.0, only=("regulator",), note="how late a command acts"
+        ),
+        Key(
+            "rise_limit",
+            "Pa/s",
+            1.0,
+            1e12,
+            1e12,
+            only=("regulator",),
+            note="fastest rise of the outlet pressure; 1e12 Pa/s: none",
+        ),
+        Key(
+            "fall_limit",
+            "Pa/s",
+            1.0,
+            1e12,
+            1e12,
+            only=("regulator",),
+            note="fastest fall of the outlet pressure; 1e12 Pa/s: none",
+        ),
     ),
     "valve": (
         Key(

@@ -3,9 +3,40 @@
 //! A tank empties isothermally, `dP/dt = -(R T/V) mdot` (dissertation 6.3); a constant source keeps
 //! its pressure; a relieving regulator brings its outlet to the set pressure with a lag, less by
 //! its droop under flow: `dP/dt = (P_set - k mdot - P)/tau` (P. Beater, *Pneumatic Drives*, 2007,
-//! ch. 8).
+//! ch. 8), no faster up and down than its limits, and later by its dead time.
 
 use crate::scalar::{constant, Scalar};
+
+/// Rate of a regulator's outlet pressure that is no limit [Pa/s].
+pub const FASTEST: f64 = 1e12;
+
+/// Set pressure of a regulator over a step [Pa, absolute]: one, and then another.
+///
+/// Limits of the outlet's rate act on each, and not on their mean, so that an edge inside a step
+/// moves the outlet as far as it lies from the step's end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SetPressure<S> {
+    /// At the end of the step.
+    pub now: S,
+    /// At its beginning.
+    pub before: S,
+    /// Share of the step until it changes [1].
+    pub share_before: S,
+}
+
+impl<S: Scalar> SetPressure<S> {
+    /// The same pressure all the time.
+    #[inline]
+    pub fn steady(pressure: S) -> Self {
+        Self { now: pressure, before: pressure, share_before: constant(0.0) }
+    }
+
+    /// Whether it is not the same at both ends of the step.
+    #[inline]
+    pub fn changes(&self) -> bool {
+        self.before.re() != self.now.re()
+    }
+}
 
 /// A supply of air.
 #[derive(Debug, Clone, Copy)]
@@ -20,20 +51,60 @@ pub enum Supply<S> {
         time_constant: S,
         /// Fall of the outlet pressure under flow [Pa s/kg].
         droop: S,
+        /// Fastest rise of the outlet pressure [Pa/s].
+        rise_limit: S,
+        /// Fastest fall of it [Pa/s].
+        fall_limit: S,
+        /// How late the command acts [s].
+        dead_time: S,
     },
 }
 
 impl<S: Scalar> Supply<S> {
     /// Rate of the absolute pressure [Pa/s] while a mass flow [kg/s] goes out; `rt` is `R T`
-    /// [J/kg], `set` the set pressure [Pa, absolute].
+    /// [J/kg].
     #[inline]
-    pub fn pressure_rate(&self, pressure: S, outflow: S, rt: f64, set: S) -> S {
+    pub fn pressure_rate(&self, pressure: S, outflow: S, rt: f64, set: &SetPressure<S>) -> S {
         match self {
             Self::Tank(volume) => -(outflow * rt) / *volume,
             Self::Constant => constant(0.0),
-            Self::Regulator { time_constant, droop } => {
-                (-pressure - *droop * outflow + set) / *time_constant
+            Self::Regulator { time_constant, droop, rise_limit, fall_limit, .. } => {
+                let towards = |set: S| {
+                    let rate = (-pressure - *droop * outflow + set) / *time_constant;
+                    if rate.re() > rise_limit.re() {
+                        *rise_limit
+                    } else if rate.re() < -fall_limit.re() {
+                        -*fall_limit
+                    } else {
+                        rate
+                    }
+                };
+                let rate = towards(set.now);
+                if set.changes() {
+                    rate + set.share_before * (towards(set.before) - rate)
+                } else {
+                    rate
+                }
             }
+        }
+    }
+
+    /// Whether it follows its command at once, and as fast as its lag lets it.
+    pub fn first_order(&self) -> bool {
+        match self {
+            Self::Regulator { rise_limit, fall_limit, dead_time, .. } => {
+                rise_limit.re().min(fall_limit.re()) >= FASTEST && dead_time.re() <= 0.0
+            }
+            _ => true,
+        }
+    }
+
+    /// How late its command acts [s].
+    #[inline]
+    pub fn dead_time(&self) -> S {
+        match self {
+            Self::Regulator { dead_time, .. } => *dead_time,
+            _ => constant(0.0),
         }
     }
 
@@ -43,7 +114,7 @@ impl<S: Scalar> Supply<S> {
         match self {
             Self::Tank(volume) => rt * steepest / volume.re(),
             Self::Constant => 0.0,
-            Self::Regulator { time_constant, droop } => {
+            Self::Regulator { time_constant, droop, .. } => {
                 (1.0 + droop.re() * steepest) / time_constant.re()
             }
         }
@@ -56,10 +127,24 @@ mod tests {
 
     #[test]
     fn a_regulator_settles_at_the_set_pressure_less_its_droop() {
-        let regulator = Supply::<f64>::Regulator { time_constant: 0.1, droop: 1e7 };
-        assert!(regulator.pressure_rate(5e5 - 1e4, 1e-3, 8.4e4, 5e5).abs() < 1e-6);
-        assert!((regulator.pressure_rate(4e5, 0.0, 8.4e4, 5e5) - 1e6).abs() < 1e-6);
-        assert_eq!(Supply::<f64>::Constant.pressure_rate(1e5, 1.0, 8.4e4, 0.0), 0.0);
-        assert!((Supply::Tank(0.01).pressure_rate(1e5, 1e-3, 8.4e4, 0.0) + 8.4e3_f64).abs() < 1e-9);
+        let regulator = Supply::<f64>::Regulator {
+            time_constant: 0.1,
+            droop: 1e7,
+            rise_limit: 2e6,
+            fall_limit: 3e6,
+            dead_time: 0.03,
+        };
+        assert_eq!(regulator.dead_time(), 0.03);
+        let at = SetPressure::steady;
+        assert_eq!(regulator.pressure_rate(1e5, 0.0, 8.4e4, &at(5e5)), 2e6);
+        assert_eq!(regulator.pressure_rate(5e5, 0.0, 8.4e4, &at(1e5)), -3e6);
+        let edge = SetPressure { now: 5e5, before: 1e5, share_before: 0.25 };
+        assert_eq!(regulator.pressure_rate(1e5, 0.0, 8.4e4, &edge), 1.5e6);
+        assert!(regulator.pressure_rate(5e5 - 1e4, 1e-3, 8.4e4, &at(5e5)).abs() < 1e-6);
+        assert!((regulator.pressure_rate(4e5, 0.0, 8.4e4, &at(5e5)) - 1e6).abs() < 1e-6);
+        assert_eq!(Supply::<f64>::Constant.pressure_rate(1e5, 1.0, 8.4e4, &at(0.0)), 0.0);
+        assert!(
+            (Supply::Tank(0.01).pressure_rate(1e5, 1e-3, 8.4e4, &at(0.0)) + 8.4e3_f64).abs() < 1e-9
+        );
     }
 }

@@ -233,7 +233,7 @@ impl<'a, S: Number> Cut<'a, S> {
     /// Controls of sample `k` from a time [s] on.
     fn command(&self, k: usize, time: f64, clocks: &Clocks<S>, out: &mut Controls<S>) {
         let (plant, commands) = (&self.stepper.plant, &self.measured.commands);
-        if !plant.skewed() {
+        if !plant.delayed() {
             // most commands are held over many samples
             if k == 0 || commands.iter().any(|command| command[k] != command[k - 1]) {
                 plant.command(|input| commands[input][k], out);
@@ -242,7 +242,7 @@ impl<'a, S: Number> Cut<'a, S> {
         }
         let last = self.measured.samples as i64 - 1;
         let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
-        plant.skewed_controls(
+        plant.delayed_controls(
             clocks.command,
             time,
             self.timing.step(),
@@ -265,7 +265,7 @@ impl<'a, S: Number> Cut<'a, S> {
         let Course { state, memory, last } = course;
         for i in 0..self.timing.substeps {
             let time = (k as f64 + i as f64 * h) * dt;
-            if i > 0 && self.stepper.plant.skewed() {
+            if i > 0 && self.stepper.plant.delayed() {
                 clocks = Clocks::of(&self.stepper.plant, self.block, time);
                 self.command(k, time, &clocks, controls);
             }

@@ -2,6 +2,7 @@
 
 mod check;
 
+use crate::blocks::supply::FASTEST;
 use crate::muscle::MuscleSpec;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -38,6 +39,16 @@ pub struct SupplySpec {
     pub time_constant: f64,
     #[serde(default)]
     pub droop: f64,
+    #[serde(default)]
+    pub dead_time: f64,
+    #[serde(default = "no_limit")]
+    pub rise_limit: f64,
+    #[serde(default = "no_limit")]
+    pub fall_limit: f64,
+}
+
+fn no_limit() -> f64 {
+    FASTEST
 }
 
 /// Valve from a supply (or a chamber: a manifold) to a chamber or the inlet of a line, and from

@@ -60,7 +60,7 @@ impl<'a> Solo<'a> {
             self.lanes.open(k, &[opening(plant, k, *spool)]);
         }
         for (k, set) in controls.set_pressure.iter().enumerate() {
-            self.lanes.set(k, &[*set]);
+            self.lanes.set(k, &[set.now]);
         }
         let stayed = Arch::new().dispatch(Advance { solo: self, plant, state, steps, look });
         stayed && self.holds(plant, state)

@@ -4,6 +4,7 @@ use super::ports::{Flow, Place};
 use super::rates::{Controls, Line, Plant, Scratch};
 use super::units::Node;
 use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberState};
+use crate::blocks::supply::SetPressure;
 use crate::blocks::valve::Opening;
 use crate::effects::Extremes;
 use crate::scalar::{constant, Scalar};
@@ -147,13 +148,18 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Rate of a supply's pressure with the effects on it [Pa/s].
     #[inline(never)]
-    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: S) -> S {
+    fn altered_supply(&self, k: usize, state: &[S], drawn: S, rt: f64, set: &SetPressure<S>) -> S {
         let pressure = state[self.layout.supply(k)];
-        let (mut drawn, mut set) = (drawn, set);
-        for acting in &self.wiring.ports.feed[k] {
-            self.effect(acting).feed(self.own(acting, state), pressure, &mut drawn, &mut set);
-        }
-        self.supplies[k].pressure_rate(pressure, drawn, rt, set)
+        let altered = |mut set: S| {
+            let mut drawn = drawn;
+            for acting in &self.wiring.ports.feed[k] {
+                self.effect(acting).feed(self.own(acting, state), pressure, &mut drawn, &mut set);
+            }
+            (drawn, set)
+        };
+        let (drawn, now) = altered(set.now);
+        let before = if set.changes() { altered(set.before).1 } else { now };
+        self.supplies[k].pressure_rate(pressure, drawn, rt, &SetPressure { now, before, ..*set })
     }
 
     #[inline(always)]
@@ -167,7 +173,7 @@ impl<S: Scalar> Plant<'_, S> {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
         for (k, supply) in self.supplies.iter().enumerate() {
-            let set = controls.set_pressure[k];
+            let set = &controls.set_pressure[k];
             out[layout.supply(k)] = if self.altered.supplies {
                 self.altered_supply(k, state, here.drawn[k], rt, set)
             } else {

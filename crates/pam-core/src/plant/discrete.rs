@@ -4,9 +4,9 @@
 use super::ports::{moves, Acting};
 use super::rates::{Controls, Plant};
 use super::units::SupplyUnit;
-use crate::blocks::supply::Supply;
+use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::valve::spool_position;
-use crate::clock::held_mean;
+use crate::clock::{held_edge, held_mean};
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -14,7 +14,8 @@ impl<S: Scalar> Plant<'_, S> {
     pub fn controls(&self, commands: impl Fn(usize) -> f64) -> Controls<S> {
         let zeros = |n: usize| vec![constant(0.0); n];
         let (supplies, valves) = (self.wiring.supplies.len(), self.wiring.valves.len());
-        let mut out = Controls { set_pressure: zeros(supplies), spool: zeros(valves), time: 0.0 };
+        let unset = vec![SetPressure::steady(constant(0.0)); supplies];
+        let mut out = Controls { set_pressure: unset, spool: zeros(valves), time: 0.0 };
         self.command(commands, &mut out);
         out
     }
@@ -25,13 +26,14 @@ impl<S: Scalar> Plant<'_, S> {
         let mut regulator = wiring.valves.len();
         let supplies = wiring.supplies.iter().zip(&self.rig.spec().supplies);
         for ((unit, supply), set) in supplies.zip(&mut out.set_pressure) {
-            *set = match unit {
+            let pressure = match unit {
                 SupplyUnit::Regulator { .. } => {
                     regulator += 1;
-                    self.set_pressure(commands(regulator - 1))
+                    commands(regulator - 1)
                 }
-                _ => self.set_pressure(supply.initial_pressure),
+                _ => supply.initial_pressure,
             };
+            *set = SetPressure::steady(self.absolute(pressure));
         }
         for (k, spool) in out.spool.iter_mut().enumerate() {
             *spool = self.opened(k, self.commanded(k, commands(k)));
@@ -39,7 +41,7 @@ impl<S: Scalar> Plant<'_, S> {
         out.time = 0.0;
     }
 
-    fn set_pressure(&self, gauge: f64) -> S {
+    fn absolute(&self, gauge: f64) -> S {
         constant(gauge + self.rig.gas.ambient_pressure)
     }
 
@@ -58,9 +60,24 @@ impl<S: Scalar> Plant<'_, S> {
         path.iter().fold(commanded, |x, acting| self.effect(acting).position(&[], x, 0.0))
     }
 
-    /// Whether commands act later than they are recorded.
+    /// Whether pressures, angles and commands are recorded by different clocks.
     pub fn skewed(&self) -> bool {
         !self.wiring.ports.clock.is_empty()
+    }
+
+    /// Whether some command acts later than it is recorded.
+    pub fn delayed(&self) -> bool {
+        self.skewed() || self.dead_time() > 0.0
+    }
+
+    /// Whether regulators follow their commands at once, and as fast as their lag lets them.
+    pub fn first_order(&self) -> bool {
+        self.supplies.iter().all(Supply::first_order)
+    }
+
+    /// The longest dead time of a regulator [s].
+    pub fn dead_time(&self) -> f64 {
+        self.supplies.iter().map(|supply| supply.dead_time().re()).fold(0.0, f64::max)
     }
 
     /// How late pressures and angles are recorded at a time [s]; negative where their clock is
@@ -73,10 +90,10 @@ impl<S: Scalar> Plant<'_, S> {
         })
     }
 
-    /// Commands over a step that begins at a time [s], later by a shift [s]; `command` gives those
-    /// of a sample.
+    /// Commands over a step that begins at a time [s], later by a shift [s] and by the regulators'
+    /// dead times; `command` gives those of a sample.
     #[allow(clippy::too_many_arguments)]
-    pub fn skewed_controls(
+    pub fn delayed_controls(
         &self,
         shift: S,
         time: f64,
@@ -93,10 +110,12 @@ impl<S: Scalar> Plant<'_, S> {
             *spool = self.opened(k, mean);
         }
         let mut input = wiring.valves.len();
-        for (unit, set) in wiring.supplies.iter().zip(&mut controls.set_pressure) {
-            if matches!(unit, SupplyUnit::Regulator { .. }) {
-                let pressure = |sample| self.set_pressure(command(input, sample));
-                *set = held_mean(pressure, time, step, sample_time, shift);
+        for (supply, set) in self.supplies.iter().zip(&mut controls.set_pressure) {
+            if matches!(supply, Supply::Regulator { .. }) {
+                let late = shift + supply.dead_time();
+                let (first, last, share_before) = held_edge(time, step, sample_time, late);
+                let pressure = |sample| self.absolute(command(input, sample));
+                *set = SetPressure { now: pressure(last), before: pressure(first), share_before };
                 input += 1;
             }
         }

@@ -16,6 +16,7 @@ use super::parameters::unit;
 use super::ports::Acting;
 use super::rates::{Controls, Plant, Simulated};
 use super::{Rig, StateRole};
+use crate::blocks::supply::SetPressure;
 use crate::blocks::valve::spool_position;
 use crate::description::dotted;
 use crate::effects::{Dual, Role, BEGUN, LANES};
@@ -375,7 +376,9 @@ impl<S: Scalar> Plant<'_, S> {
         let supplies = self.rig.spec().supplies.iter();
         Controls {
             spool: vec![constant(0.0); self.valves.len()],
-            set_pressure: supplies.map(|s| constant(s.initial_pressure + ambient)).collect(),
+            set_pressure: supplies
+                .map(|s| SetPressure::steady(constant(s.initial_pressure + ambient)))
+                .collect(),
             time: 0.0,
         }
     }

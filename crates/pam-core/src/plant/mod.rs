@@ -59,6 +59,8 @@ pub struct Rig {
     /// Effects to choose from.
     effects: &'static [&'static EffectInfo],
     gas_step: f64,
+    /// Whether regulators follow their commands at once, and as fast as their lag lets them.
+    first_order: bool,
     body_step: f64,
     /// How it runs in lanes, found when it is first asked for.
     lanes: Arc<OnceLock<Option<Plan>>>,
@@ -111,6 +113,7 @@ impl Rig {
             parameters,
             effects,
             gas_step: endless,
+            first_order: true,
             body_step: endless,
             lanes: Arc::default(),
             spec,
@@ -232,7 +235,9 @@ impl Rig {
         let plant = Plant::new(self, self.parameters.lift::<f64>(), false)?;
         plant.check_masses()?;
         let steps = self.stable_steps(&plant)?;
+        let first_order = plant.first_order();
         (self.gas_step, self.body_step) = steps;
+        self.first_order = first_order;
         Ok(())
     }
 
@@ -287,9 +292,10 @@ impl Rig {
         &self.spec
     }
 
-    /// How the rig runs in lanes, None where it cannot; whatever the values of its parameters.
+    /// How the rig runs in lanes, None where it cannot: whatever the values of its parameters,
+    /// dead times and limits of regulators apart.
     pub(crate) fn lanes(&self) -> Option<&Plan> {
-        self.lanes.get_or_init(|| Plan::new(self)).as_ref()
+        self.lanes.get_or_init(|| Plan::new(self)).as_ref().filter(|_| self.first_order)
     }
 
     /// Longest Runge-Kutta step [s] that openings next to volumes, stops, springs and friction

@@ -13,7 +13,7 @@ use super::units::{LineUnit, Passes, Path, SupplyUnit, ValveUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
-use crate::blocks::supply::Supply;
+use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::tube::Tube;
 use crate::blocks::valve::Opening;
 use crate::effects::{Effect, Number};
@@ -109,8 +109,8 @@ fn runs(driven: &[bool]) -> Vec<Range<usize>> {
 pub struct Controls<S> {
     /// Normalised spool position of each valve, -1 to 1.
     pub(crate) spool: Vec<S>,
-    /// Set pressure of each supply [Pa, absolute].
-    pub(crate) set_pressure: Vec<S>,
+    /// Set pressure of each supply.
+    pub(crate) set_pressure: Vec<SetPressure<S>>,
     /// Time since the start [s], where an effect asks for it.
     pub(crate) time: f64,
 }
@@ -203,6 +203,23 @@ pub struct Scratch<S> {
     now: Vec<S>,
 }
 
+/// A supply with the values of its parameters.
+fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
+    match unit {
+        SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
+        SupplyUnit::Constant => Supply::Constant,
+        SupplyUnit::Regulator { time_constant, droop, rise_limit, fall_limit, dead_time } => {
+            Supply::Regulator {
+                time_constant: values[*time_constant],
+                droop: values[*droop],
+                rise_limit: values[*rise_limit],
+                fall_limit: values[*fall_limit],
+                dead_time: values[*dead_time],
+            }
+        }
+    }
+}
+
 impl<'a, S: Number> Plant<'a, S> {
     /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`]
     /// behind the states.
@@ -236,16 +253,7 @@ impl<'a, S: Number> Plant<'a, S> {
         Ok(Self {
             layout: rig.layout,
             balanced,
-            supplies: (wiring.supplies.iter())
-                .map(|supply| match supply {
-                    SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
-                    SupplyUnit::Constant => Supply::Constant,
-                    SupplyUnit::Regulator { time_constant, droop } => Supply::Regulator {
-                        time_constant: values[*time_constant],
-                        droop: values[*droop],
-                    },
-                })
-                .collect(),
+            supplies: wiring.supplies.iter().map(|unit| supply(unit, &values)).collect(),
             fixed_volume: (wiring.gases.iter())
                 .map(|gas| {
                     gas.tubes.iter().fold(values[gas.volume], |sum, line| sum + half_volume(*line))

@@ -34,7 +34,13 @@ impl Node {
 pub(crate) enum SupplyUnit {
     Tank(ParameterId),
     Constant,
-    Regulator { time_constant: ParameterId, droop: ParameterId },
+    Regulator {
+        time_constant: ParameterId,
+        droop: ParameterId,
+        rise_limit: ParameterId,
+        fall_limit: ParameterId,
+        dead_time: ParameterId,
+    },
 }
 
 /// What a valve passes where it is wide open.

@@ -7,6 +7,7 @@ use super::units::{
     Coordinate, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, Wiring,
 };
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
+use crate::blocks::supply::FASTEST;
 use crate::blocks::valve::AreaTable;
 use crate::description::{dotted, RigSpec, SupplySpec, ValveSpec};
 use crate::effects::EffectInfo;
@@ -158,6 +159,17 @@ fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
                     (1e-5, 1e3, "s"),
                 )?,
                 droop: table.add(name("droop"), supply.droop, (0.0, 1e13, "Pa s/kg"))?,
+                rise_limit: table.add(
+                    name("rise_limit"),
+                    supply.rise_limit,
+                    (1.0, FASTEST, "Pa/s"),
+                )?,
+                fall_limit: table.add(
+                    name("fall_limit"),
+                    supply.fall_limit,
+                    (1.0, FASTEST, "Pa/s"),
+                )?,
+                dead_time: table.add(name("dead_time"), supply.dead_time, (0.0, 10.0, "s"))?,
             },
             _ => SupplyUnit::Constant,
         })

@@ -8,7 +8,7 @@ mod row;
 pub mod run;
 pub(crate) mod team;
 
-use self::drive::Drive;
+use self::drive::{set_pressure, Drive};
 use self::events::Event;
 pub use self::initial::Initial;
 use self::integrate::Rk4;
@@ -307,7 +307,7 @@ impl Progress {
             flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
-        let kept = if plant.skewed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
+        let kept = if plant.delayed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
         Self { state, memory, flags, samples: 0, past: Vec::new(), kept }
     }
 
@@ -475,22 +475,26 @@ impl Progress {
         self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
         self.past.extend(gauges(plant.rig()).flat_map(|channel| readings[channel].last().copied()));
         let (skew, _) = plant.skew(self.samples as f64 * timing.sample_time);
-        let most = self.kept * (2 + (skew.max(0.0) / timing.sample_time).ceil() as usize);
+        let latest = skew.max(0.0) + plant.dead_time();
+        let most = self.kept * (2 + (latest / timing.sample_time).ceil() as usize);
         self.past.drain(..self.past.len().saturating_sub(most));
     }
 
     /// Commands over the step that begins at a time, the newest being those of the present sample:
     /// as late as the angles.
-    fn skewed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
+    fn delayed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
         let rows = self.past.len() / self.kept;
         let command = |input: usize, sample: i64| {
+            if sample < 0 && input >= plant.rig().wiring.valves.len() {
+                return set_pressure(plant.rig(), input); // nobody has set the regulator yet
+            }
             let back = (self.samples as i64 - sample).clamp(0, rows as i64 - 1) as usize;
             self.past[(rows - 1 - back) * self.kept + input]
         };
         let (_, shift) = plant.skew(time);
         let (step, sample_time) = (timing.step(), timing.sample_time);
         let mut controls = plant.controls(|_| 0.0);
-        plant.skewed_controls(shift.max(0.0), time, step, sample_time, command, &mut controls);
+        plant.delayed_controls(shift.max(0.0), time, step, sample_time, command, &mut controls);
         controls
     }
 
@@ -625,13 +629,13 @@ impl Progress {
         let began = self.samples as f64 * timing.sample_time;
         if self.kept > 0 {
             run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
-            run.controls = run.next.skewed(&run.stepper.plant, began, timing);
+            run.controls = run.next.delayed(&run.stepper.plant, began, timing);
         }
         run.begin(began, &mut out.events);
         for sub in 0..timing.substeps {
             if self.kept > 0 {
                 let from = began + sub as f64 * timing.step();
-                run.controls = run.next.skewed(&run.stepper.plant, from, timing);
+                run.controls = run.next.delayed(&run.stepper.plant, from, timing);
             }
             run.step(&ends, timing, began, sub, &mut out.events);
             run.seen(1, look)?;

@@ -70,7 +70,7 @@ class Block:
         return self.kind in ("arm", "pull")
 
 
-_SUPPLY = ("volume", "time_constant", "droop")
+_SUPPLY = ("volume", "time_constant", "droop", "dead_time", "rise_limit", "fall_limit")
 _VALVE = (
     "discharge_area_max",
     "fill_conductance",

@@ -176,13 +176,10 @@ def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
 
 
 def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
-    """Sizes of pressures, by themselves and beside the rig file."""
-    rated = {
-        dotted("supply_pressure", name): float(table["initial_pressure"])
-        for name, table in rig.tables("supply").items()
-    }
+    """Sizes of pressures, by themselves and beside the rig file or a regulator's command."""
+    rated = _rated(recording, rig)
     largest = max(
-        [*rated.values(), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())],
+        [*(size for size, _ in rated.values()), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())],
         default=0.0,
     )
     low, top = (
@@ -209,12 +206,29 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
                 f"{name} reaches {high:.3g} Pa gauge; at most {top:.3g} Pa is allowed: are its "
                 "values in Pa, kPa or psi under a heading in bar?"
             )
-        elif name in rated and rated[name] > 0.0 and not least <= high / rated[name] <= most:
-            yield (
-                f"{name} is at most {high:.3g} Pa and the rig file has {rated[name]:.3g} Pa; "
-                f"{least * rated[name]:.3g} to {most * rated[name]:.3g} Pa is allowed: right "
-                "column and unit?"
-            )
+        elif name in rated:
+            size, source = rated[name]
+            if size > 0.0 and not least <= high / size <= most:
+                yield (
+                    f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
+                    f"{least * size:.3g} to {most * size:.3g} Pa is allowed: right column and unit?"
+                )
+
+
+def _rated(recording: Recording, rig: Rig) -> dict[str, tuple[float, str]]:
+    """About the highest pressure [Pa gauge] that each supply's gauge should show, and who says so.
+
+    A regulator may be set to anything: its largest command tells, where it was recorded.
+    """
+    found = {}
+    for name, table in rig.tables("supply").items():
+        size, source = float(table["initial_pressure"]), "the rig file has"
+        if table["kind"] == "regulator":
+            command = dotted("supply_command", name)
+            known = _values(recording, command)
+            size, source = float(known.max(initial=0.0)), f"the largest {command} is"
+        found[dotted("supply_pressure", name)] = (size, source)
+    return found
 
 
 def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
@@ -551,9 +565,7 @@ def _sense(
         raw = prepared.raw | {name: offset + factor * prepared.raw[name]}
         noise = prepared.noise | {name: abs(factor) * prepared.noise[name]}
         shown_as = {**signals, **swapped, name: (offset + factor * value, factor * slope)}
-        other = Prepared(
-            prepared.recording, prepared.commands, shown_as, raw, noise, prepared.settings
-        )
+        other = replace(prepared.shaken(shown_as), raw=raw, noise=noise, _begun={})
         try:
             model = predicted(block, core, other)[rows]
         except SimulationError:
