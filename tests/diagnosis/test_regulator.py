@@ -104,7 +104,7 @@ def test_a_healthy_regulator_misses_nothing() -> None:
 def test_a_longer_dead_time_is_told_but_not_from_another_clock() -> None:
     """Pressures that come later than commands come later by either: the data are the same."""
     found = diagnosed(dead_time=0.03)
-    assert [["supply.dead_time"], ["clock_skew"]] == found.ambiguity[:2]
+    assert found.ambiguity[:2] == [["supply.dead_time"], ["clock_skew"]]
     odds = found.probabilities
     assert odds["supply.dead_time"] + odds["clock_skew"] > 0.85
     assert min(odds["supply.dead_time"], odds["clock_skew"]) > 0.2

@@ -774,7 +774,9 @@ def simulate(
         for begin, end in pairwise(edges):
             set_pressure = [node.start for node in rig.nodes]
             for i, name in regulators.items():
-                late = (k * sample_time + 0.5 * (begin + end) - rig.nodes[i].dead_time) / sample_time
+                late = (
+                    k * sample_time + 0.5 * (begin + end) - rig.nodes[i].dead_time
+                ) / sample_time
                 if name in held and late >= 0.0:
                     set_pressure[i] = rig.gas.ambient_pressure + float(held[name][int(late)])
             rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
@@ -792,9 +794,7 @@ def simulate(
                     f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
                 )
             state = solution.y[:, -1]
-            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-1][
-                :, len(BOOKS) - 1 :
-            ]
+            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-1][:, len(BOOKS) - 1 :]
             positive[k + 1] += np.maximum(np.diff(work, axis=0), 0.0).sum()
             first = min(float(np.diff(solution.t).max()), sample_time)
         states[k + 1] = state

@@ -42,6 +42,7 @@ pub fn held_mean<S: Scalar>(
             return now;
         }
         // an edge on the step's beginning moves into it when the shift grows
+        let edge = edge - edge.re(); // its slope, without what rounding leaves
         return now + edge * (value(first as i64 - 1) - now) / (step / sample_time);
     }
     let mut sum = (-from + (first + 1.0)) * value(first as i64);
@@ -65,6 +66,7 @@ pub fn held_edge<S: Scalar>(time: f64, step: f64, sample_time: f64, shift: S) ->
         if edge.re().abs() > ON_EDGE {
             return (first as i64, last as i64, constant(0.0));
         }
+        let edge = edge - edge.re();
         return (first as i64 - 1, last as i64, edge / (step / sample_time));
     }
     (first as i64, last as i64, (-from + last) / (step / sample_time))

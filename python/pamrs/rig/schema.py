@@ -167,9 +167,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             only=("regulator",),
             note="fall of the outlet pressure per mass flow",
         ),
-        Key(
-            "dead_time", "s", 0.0, 10.0, 0.0, only=("regulator",), note="how late a command acts"
-        ),
+        Key("dead_time", "s", 0.0, 10.0, 0.0, only=("regulator",), note="how late a command acts"),
         Key(
             "rise_limit",
             "Pa/s",

@@ -179,7 +179,10 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
     """Sizes of pressures, by themselves and beside the rig file or a regulator's command."""
     rated = _rated(recording, rig)
     largest = max(
-        [*(size for size, _ in rated.values()), *(float(t["initial_pressure"]) for t in rig.tables("chamber").values())],
+        [
+            *(size for size, _ in rated.values()),
+            *(float(t["initial_pressure"]) for t in rig.tables("chamber").values()),
+        ],
         default=0.0,
     )
     low, top = (
