@@ -50,16 +50,17 @@ def test_holes_stay_holes() -> None:
     assert slow.channels["muscle_pressure"][4] == pytest.approx(23.0)
 
 
-def test_only_long_cases_are_averaged_and_no_further_than_needed() -> None:
+def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:
     one = run()
     blocks = available_blocks(pamrs.rigs.shoulder(), NAMES, SETTINGS.prepare)
-    few = replace(SETTINGS.prepare, ample_samples=3000)
+    few = replace(SETTINGS.prepare, ample_samples=40)
     assert averaged_to_need([one], blocks, "a", SETTINGS.prepare) == ([one], [1])
     assert averaged_to_need([one], blocks, "a", few)[1] == [1]  # at the rate that is needed
     quick = run(dt=0.001, duration=4.0)
-    assert averaged_to_need([quick, one], blocks, "a", few)[1] == [5, 1]
+    assert averaged_to_need([quick, one], blocks, "a", few)[1] == [9, 1]
+    assert averaged_to_need([quick], blocks, "a", SETTINGS.prepare)[1] == [3]  # it is short
     with pytest.raises(
-        DiagnosisError, match=r"'long': .* 3999 samples .* at most 3500 .* start and"
+        DiagnosisError, match=r"'long': .* 3644 samples .* at most 3500 .* start and"
     ):
         averaged_to_need([quick, one], blocks, "long", replace(few, most_samples=3500))
     sealed = available_blocks(pamrs.rigs.sealed_chamber(), ("muscle_pressure",), SETTINGS.prepare)
@@ -80,7 +81,7 @@ def test_channels_without_use_are_told_everywhere() -> None:
         "temperature": rng.normal(293.0, 0.1, size),
     }
     hold: Recording = of("hold", "fit", 0.02, channels)
-    settings = SETTINGS.with_values({"prepare.ample_samples": 1000})
+    settings = SETTINGS.with_values({"prepare.ample_samples": 500})
     found = pamrs.diagnose(pamrs.Case("hold", rig, [hold], Path()), settings=settings)
     assert [e.id for e in found.effects][:1] == ["leak_muscle"]
     (own,) = json.loads(found.to_json())["data"]

@@ -1,4 +1,4 @@
-"""Long recordings averaged to the rate that the fastest block of a rig needs."""
+"""Fast recordings averaged to the rate that the fastest block of a rig needs."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ _HELD = ("valve_command", "supply_command", "reference")
 def averaged_to_need(
     recordings: Sequence[Recording], blocks: Sequence[Block], case: str, settings: PrepareSettings
 ) -> tuple[list[Recording], list[int]]:
-    """Recordings of a case that is not too long to be diagnosed.
+    """Recordings of a case at the rate that its blocks need.
 
-    As they are, where all of them have `ample_samples` at the most together; else means over so
-    many samples that the fastest block still has the sample time that it needs.
+    Means over so many samples that the fastest block still has the sample time that it needs, and
+    that `ample_samples` are left; a short or slow recording stays as it is.
 
     Parameters
     ----------
@@ -53,13 +53,12 @@ def averaged_to_need(
     DiagnosisError
         If there are more than `most_samples` even so.
     """
-    counts = [1 for _ in recordings]
-    found = list(recordings)
-    if sum(len(r) for r in found) > settings.ample_samples:
-        sealed = bool(blocks) and all(block.window is None for block in blocks)
-        needed = settings.needed_sealed_sample_time if sealed else settings.needed_sample_time
-        counts = [_odd(needed / r.sample_time) for r in recordings]
-        found = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
+    sealed = bool(blocks) and all(block.window is None for block in blocks)
+    needed = settings.needed_sealed_sample_time if sealed else settings.needed_sample_time
+    counts = [
+        _odd(min(needed / r.sample_time, len(r) / settings.ample_samples)) for r in recordings
+    ]
+    found = [averaged(r, count) for r, count in zip(recordings, counts, strict=True)]
     total = sum(len(r) for r in found)
     if total > settings.most_samples:
         longest = max(found, key=len)

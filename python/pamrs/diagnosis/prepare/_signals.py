@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
+from scipy.stats import chi2
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
@@ -20,6 +21,7 @@ __all__ = ["Prepared", "binned", "noise_level", "prepare", "smoothed"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+Lengths = NDArray[np.intp]
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
@@ -45,6 +47,8 @@ class Prepared:
         The same channels as measured, holes bridged.
     noise : dict of str to float
         Standard deviation of each channel's sample noise, quantisation included.
+    lengths : dict of str to (n,) array of int
+        Samples of the filter at each sample of a channel.
     settings : DiagnosisSettings
         What it was made ready by.
     """
@@ -54,6 +58,7 @@ class Prepared:
     signals: dict[str, tuple[Array, Array]]
     raw: dict[str, Array]
     noise: dict[str, float]
+    lengths: dict[str, Lengths]
     settings: DiagnosisSettings
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
@@ -174,11 +179,74 @@ def filter_length(dt: float, settings: PrepareSettings) -> int:
     return max(7, round(settings.smoothing_time / dt) | 1)
 
 
-def smoothed(values: Array, dt: float, settings: PrepareSettings) -> tuple[Array, Array]:
-    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative."""
+def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings) -> Lengths:
+    """Samples over which each sample of a channel can be smoothed: the longest filter to which a
+    cubic fits but for the noise, 1 where none does.
+
+    A pressure has a corner where a valve or a regulator switches, and a filter over the corner
+    makes it a bow. What a cubic misses is compared with the noise, or with what it misses at most
+    samples where that is more: hum and drift are everywhere, corners are not.
+
+    Parameters
+    ----------
+    values : (n,) array
+        The channel, holes bridged.
+    noise : float
+        Standard deviation of its noise.
+    dt : float
+        Sample time [s].
+    settings : PrepareSettings
+        Length of the filter, and how seldom noise alone may shorten it.
+
+    Returns
+    -------
+    (n,) array of int
+    """
+    length = filter_length(dt, settings)
+    found = np.ones(values.size, dtype=np.intp)
+    tried = sorted({7, *(max(7, round(length * share) | 1) for share in (0.5, 1.0))})
+    for count in tried:
+        basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
+        frames = np.lib.stride_tricks.sliding_window_view(values - values.mean(), count)
+        missed = np.sum((frames - (frames @ basis) @ basis.T) ** 2, axis=1) / (count - 4)
+        usual = max(noise**2, float(np.median(missed)))
+        fits = missed <= usual * chi2.isf(settings.smoothing_odds, count - 4) / (count - 4)
+        half = count // 2
+        inside = np.concatenate([np.full(half, fits[0]), fits, np.full(half, fits[-1])])
+        found[inside] = count
+    return found
+
+
+def smoothed(
+    values: Array, dt: float, settings: PrepareSettings, lengths: Lengths | None = None
+) -> tuple[Array, Array]:
+    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative.
+
+    Parameters
+    ----------
+    values : (n,) array
+        The channel, holes bridged.
+    dt : float
+        Sample time [s].
+    settings : PrepareSettings
+        Length of the filter.
+    lengths : (n,) array of int, optional
+        Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is.
+
+    Returns
+    -------
+    value, slope : (n,) arrays
+    """
     length = filter_length(dt, settings)
     value = savgol_filter(values, length, 3)
     slope = savgol_filter(values, length, 3, deriv=1, delta=dt)
+    for count in np.unique(lengths) if lengths is not None else ():
+        rows = lengths == count
+        if count == 1:
+            value[rows], slope[rows] = values[rows], np.gradient(values, dt)[rows]
+        elif count != length:
+            value[rows] = savgol_filter(values, int(count), 3)[rows]
+            slope[rows] = savgol_filter(values, int(count), 3, deriv=1, delta=dt)[rows]
     return np.ascontiguousarray(value), np.ascontiguousarray(slope)
 
 
@@ -272,7 +340,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         )
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
-    signals, raw, noise = {}, {}, {}
+    signals, raw, noise, lengths = {}, {}, {}, {}
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
     for name in (*drives, *pulls_of(rig).values()):
         if name not in recording.channels:
@@ -284,12 +352,13 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
                 f"{name} are usable"
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
-        signals[name] = smoothed(filled, recording.sample_time, own)
         noise[name] = noise_level(recording.channels[name], mask, seed=settings.seed)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
+        lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
+        signals[name] = smoothed(filled, recording.sample_time, own, lengths[name])
     commands = {name: _command(recording, rig, name) for name in core.inputs}
-    return Prepared(recording, commands, signals, raw, noise, settings)
+    return Prepared(recording, commands, signals, raw, noise, lengths, settings)
 
 
 def pulls_of(rig: Rig) -> dict[str, str]:

@@ -21,6 +21,15 @@ class PrepareSettings(SettingsGroup):
         "least seven samples: longer smears steps, shorter leaves noise in the slopes",
         origin="docs/decisions/0022; judgement for recordings of 200 Hz",
     )
+    smoothing_odds: float = setting(
+        1e-3,
+        unit="1",
+        above=0.0,
+        most=0.5,
+        reason="chance by which noise alone makes that filter shorter at a sample: a cubic has to "
+        "miss more than that to be a corner",
+        origin="docs/decisions/0056",
+    )
     start_reaches: tuple[float, ...] = setting(
         (0.04, 0.08, 0.16),
         unit="s",
@@ -84,12 +93,12 @@ class PrepareSettings(SettingsGroup):
         origin="judgement",
     )
     ample_samples: int = setting(
-        250_000,
+        1000,
         unit="count",
         least=32,
-        reason="samples of all recordings of a case up to which they are used as they are; more "
-        "are averaged to the sample time that the fastest block needs",
-        origin="docs/decisions/0039: the published trials stay below it",
+        reason="samples that a recording keeps at least where it is averaged to the sample time "
+        "that the fastest block needs: a short one is used as it is",
+        origin="judgement: ten seconds of what is needed",
     )
     most_samples: int = setting(
         500_000,
@@ -99,11 +108,11 @@ class PrepareSettings(SettingsGroup):
         origin="docs/decisions/0039: some five minutes",
     )
     needed_sample_time: float = setting(
-        0.005,
+        0.01,
         unit="s",
         above=0.0,
         reason="sample time that tanks, fed chambers, joints and loads need",
-        origin="that of the published trials",
+        origin="docs/decisions/0057: the same verdicts as with every sample of 500 and 1000 Hz",
     )
     needed_sealed_sample_time: float = setting(
         0.1,
@@ -175,18 +184,18 @@ class PrepareSettings(SettingsGroup):
         origin="judgement",
     )
     arm_step: float = setting(
-        2.5e-3,
-        unit="s",
-        above=0.0,
-        reason="longest integration step of joints and loads between measured pressures",
-        origin="judgement: the error is below the noise level (docs/convergence.md)",
-    )
-    gas_step: float = setting(
         5e-3,
         unit="s",
         above=0.0,
+        reason="longest integration step of joints and loads between measured pressures",
+        origin="docs/decisions/0057: the error is 0.03 noises, 0.17 at the strongest friction",
+    )
+    gas_step: float = setting(
+        1e-2,
+        unit="s",
+        above=0.0,
         reason="the same for tanks and chambers; the core divides it until it is stable",
-        origin="judgement: the error is below the noise level (docs/convergence.md)",
+        origin="docs/decisions/0057: the error is 0.003 noises",
     )
     sealed_step: float = setting(
         0.025,
