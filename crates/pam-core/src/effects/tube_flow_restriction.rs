@@ -171,16 +171,23 @@ impl<S: Scalar> Series<'_, S> {
     /// Flow into and out of the node.
     fn flows(&self, upstream: S, node: S, downstream: S) -> (S, S) {
         if self.tube_first {
-            (self.tube.mass_flow(upstream, node), self.opening.mass_flow(self.gas, node, downstream))
+            (
+                self.tube.mass_flow(upstream, node),
+                self.opening.mass_flow(self.gas, node, downstream),
+            )
         } else {
-            (self.opening.mass_flow(self.gas, upstream, node), self.tube.mass_flow(node, downstream))
+            (
+                self.opening.mass_flow(self.gas, upstream, node),
+                self.tube.mass_flow(node, downstream),
+            )
         }
     }
 
     /// Pressure at the node [Pa] with its derivatives.
     fn exact_node(&self, upstream: S, downstream: S) -> S {
         let Self { gas, tube_first, .. } = *self;
-        let start = Series::<f64> { gas, opening: self.opening.re(), tube: self.tube.re(), tube_first };
+        let start =
+            Series::<f64> { gas, opening: self.opening.re(), tube: self.tube.re(), tube_first };
         let (node, slope) = start.node(upstream.re(), downstream.re());
         let fixed = constant::<S>(node);
         let (a, b) = self.flows(upstream, fixed, downstream);
@@ -271,7 +278,14 @@ impl<S: Scalar> Effect<S> for Hose<S> {
         }
     }
 
-    fn through(&self, gas: &Gas, opening: &Opening<S>, upstream: S, downstream: S, venting: bool) -> S {
+    fn through(
+        &self,
+        gas: &Gas,
+        opening: &Opening<S>,
+        upstream: S,
+        downstream: S,
+        venting: bool,
+    ) -> S {
         match &self.tube {
             Some(tube) => mass_flow(gas, opening, tube, upstream, downstream, venting),
             None => opening.mass_flow(gas, upstream, downstream),
@@ -282,7 +296,14 @@ impl<S: Scalar> Effect<S> for Hose<S> {
         self.tapped && self.tube.is_some()
     }
 
-    fn between(&self, gas: &Gas, opening: &Opening<S>, upstream: S, downstream: S, venting: bool) -> S {
+    fn between(
+        &self,
+        gas: &Gas,
+        opening: &Opening<S>,
+        upstream: S,
+        downstream: S,
+        venting: bool,
+    ) -> S {
         match &self.tube {
             Some(tube) => node(gas, opening, tube, upstream, downstream, venting),
             None => downstream,
@@ -337,14 +358,18 @@ mod tests {
     #[test]
     fn derivatives_are_those_of_differences() {
         let gas = gas();
-        let run = |x: [f64; 4]| mass_flow(&gas, &Opening::Area(x[0]), &tube(x[1], 293.15), x[2], x[3], false);
+        let run = |x: [f64; 4]| {
+            mass_flow(&gas, &Opening::Area(x[0]), &tube(x[1], 293.15), x[2], x[3], false)
+        };
         for x in
             [[8e-6, 1.2e-8, 8e5, 2e5], [2e-6, 1.2e-8, 8e5, 7.8e5], [8e-6, 1.2e-8, 3e5, 2.9995e5]]
         {
             for k in 0..4 {
                 let mut d = x.map(Dual64::from);
                 d[k].eps = 1.0;
-                let exact = mass_flow(&gas, &Opening::Area(d[0]), &tube(d[1], 293.15), d[2], d[3], false).eps;
+                let exact =
+                    mass_flow(&gas, &Opening::Area(d[0]), &tube(d[1], 293.15), d[2], d[3], false)
+                        .eps;
                 let h = 1e-6 * x[k];
                 let (mut up, mut down) = (x, x);
                 up[k] += h;
