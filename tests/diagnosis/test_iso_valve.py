@@ -11,7 +11,9 @@ import pamrs
 from pamrs.errors import RigError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
+from tests.diagnosis.noisy import noisy
 
+NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
 TEXT = """
 schema = "pamrs.rig/1"
 name = "iso"
@@ -44,10 +46,8 @@ def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:
     command = steps[(time / 0.5).astype(int)]
     run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
     channels = {"valve_command": command}
-    for name in ("supply_pressure", "muscle_pressure"):
-        channels[name] = run[name] + 400.0 * rng.standard_normal(time.size)
-    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
-    return Recording(f"r{seed}", role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    channels |= {name: run[name] for name in NOISE}
+    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [1, seed])
 
 
 def diagnosed(**true: float) -> pamrs.Diagnosis:

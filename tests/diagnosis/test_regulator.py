@@ -12,7 +12,9 @@ from pamrs.control.linear import linearise
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
+from tests.diagnosis.noisy import noisy
 
+NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
 TEXT = """
 schema = "pamrs.rig/1"
 name = "regulated"
@@ -44,10 +46,8 @@ def recorded(rig: Rig, role: str, seed: int) -> Recording:
     command = levels[(time / 0.5).astype(int)]
     run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
     channels = {"supply_command": command}
-    for name in ("supply_pressure", "muscle_pressure"):
-        channels[name] = run[name] + 400.0 * rng.standard_normal(time.size)
-    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
-    return Recording(f"r{seed}", role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    channels |= {name: run[name] for name in NOISE}
+    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [1, seed])
 
 
 def diagnosed(**true: float) -> pamrs.Diagnosis:

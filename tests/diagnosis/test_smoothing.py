@@ -11,6 +11,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 PREPARE = DiagnosisSettings().prepare
 DT = 0.005
 TIME = DT * np.arange(4000)
+FULL = np.full(TIME.size, filter_length(DT, PREPARE), dtype=np.intp)
 
 
 def noisy(values: np.ndarray, size: float, seed: int = 0) -> np.ndarray:
@@ -30,8 +31,8 @@ def test_a_corner_is_followed_and_the_rest_is_smoothed() -> None:
     found = noisy(true, 400.0)
     lengths = lengths_of(found, 400.0, DT, PREPARE)
     near = np.mod(TIME + 0.03, 1.0) < 0.06
-    adapted, _ = smoothed(found, DT, PREPARE, lengths)
-    fixed, _ = smoothed(found, DT, PREPARE)
+    adapted, _ = smoothed(found, DT, lengths)
+    fixed, _ = smoothed(found, DT, FULL)
     off = np.abs(adapted - true)
     assert off[near].max() < 0.02 * np.abs(fixed - true)[near].max()
     far = np.mod(TIME - 0.1, 1.0) < 0.8
@@ -47,10 +48,10 @@ def test_hum_is_not_a_corner() -> None:
 
 def test_each_sample_is_that_of_its_filter() -> None:
     found = noisy(np.cumsum(np.sin(TIME)), 1.0)
-    lengths = np.full(found.size, filter_length(DT, PREPARE), dtype=np.intp)
+    lengths = FULL.copy()
     lengths[100:110], lengths[200] = 7, 1
-    value, slope = smoothed(found, DT, PREPARE, lengths)
-    whole = smoothed(found, DT, PREPARE)
+    value, slope = smoothed(found, DT, lengths)
+    whole = smoothed(found, DT, FULL)
     kept = lengths > 7
     np.testing.assert_array_equal(value[kept], whole[0][kept])
     np.testing.assert_array_equal(slope[kept], whole[1][kept])

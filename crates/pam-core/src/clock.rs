@@ -22,54 +22,49 @@ pub fn late(past: impl Fn(usize) -> Option<f64>, present: f64, shift: f64) -> f6
 /// How near to an edge a time lies on it [samples]: rounding.
 const ON_EDGE: f64 = 1e-9;
 
-/// Mean over a step [s] that begins at a time of values that are held over each sample, seen later
-/// by a shift.
-pub fn held_mean<S: Scalar>(
-    value: impl Fn(i64) -> S,
-    time: f64,
-    step: f64,
-    sample_time: f64,
-    shift: S,
-) -> S {
-    // In samples; what lies nearer to an edge than rounding lies on it.
-    let from = -shift / sample_time + time / sample_time;
-    let to = from + step / sample_time;
-    let cell = |x: f64| (x + ON_EDGE).floor();
-    let (first, last) = (cell(from.re()), cell(to.re() - 2.0 * ON_EDGE).max(cell(from.re())));
-    if first == last {
-        let (now, edge) = (value(first as i64), -from + first);
-        if edge.re().abs() > ON_EDGE {
-            return now;
-        }
-        // an edge on the step's beginning moves into it when the shift grows
-        let edge = edge - edge.re(); // its slope, without what rounding leaves
-        return now + edge * (value(first as i64 - 1) - now) / (step / sample_time);
-    }
-    let mut sum = (-from + (first + 1.0)) * value(first as i64);
-    let mut k = first + 1.0;
-    while k < last {
-        sum += value(k as i64);
-        k += 1.0;
-    }
-    (sum + (to - last) * value(last as i64)) / (step / sample_time)
+/// Samples whose values a step sees that are held over each sample: one, and then another.
+#[derive(Debug, Clone, Copy)]
+pub struct Held<S> {
+    /// The sample at the beginning of the step.
+    pub before: i64,
+    /// The sample at its end.
+    pub now: i64,
+    /// Share of the step until it changes [1].
+    pub share_before: S,
 }
 
-/// Which values that are held over each sample a step [s], no longer than a sample, begins and ends
-/// with, seen later by a shift, and the share of the step until it changes.
-pub fn held_edge<S: Scalar>(time: f64, step: f64, sample_time: f64, shift: S) -> (i64, i64, S) {
-    let from = -shift / sample_time + time / sample_time;
-    let to = from + step / sample_time;
-    let cell = |x: f64| (x + ON_EDGE).floor();
-    let (first, last) = (cell(from.re()), cell(to.re() - 2.0 * ON_EDGE).max(cell(from.re())));
-    if first == last {
-        let edge = -from + first;
-        if edge.re().abs() > ON_EDGE {
-            return (first as i64, last as i64, constant(0.0));
+impl<S: Scalar> Held<S> {
+    /// Over a step [s], no longer than a sample, that begins at a time [s], seen later by a shift
+    /// [s].
+    pub fn over(time: f64, step: f64, sample_time: f64, shift: S) -> Self {
+        // In samples; what lies nearer to an edge than rounding lies on it.
+        let from = -shift / sample_time + time / sample_time;
+        let to = from.re() + step / sample_time;
+        let cell = |x: f64| (x + ON_EDGE).floor();
+        let first = cell(from.re());
+        let last = cell(to - 2.0 * ON_EDGE).max(first);
+        let edge = -from + last;
+        let of_step = |edge: S| edge / (step / sample_time);
+        let (first, last) = (first as i64, last as i64);
+        if first < last {
+            Self { before: first, now: last, share_before: of_step(edge) }
+        } else if edge.re().abs() > ON_EDGE {
+            Self { before: first, now: first, share_before: constant(0.0) }
+        } else {
+            // an edge on the step's beginning moves into it when the shift grows: its slope, without
+            // what rounding leaves
+            Self { before: first - 1, now: first, share_before: of_step(edge - edge.re()) }
         }
-        let edge = edge - edge.re();
-        return (first as i64 - 1, last as i64, edge / (step / sample_time));
     }
-    (first as i64, last as i64, (-from + last) / (step / sample_time))
+
+    /// Mean of a value over the step.
+    pub fn mean(&self, value: impl Fn(i64) -> S) -> S {
+        let now = value(self.now);
+        if self.before == self.now {
+            return now;
+        }
+        now + self.share_before * (value(self.before) - now)
+    }
 }
 
 #[cfg(test)]
@@ -80,11 +75,12 @@ mod tests {
     #[test]
     fn an_edge_moves_through_a_step() {
         let value = |k: i64| if k < 3 { 1.0 } else { 5.0 };
-        let mean = |time: f64, shift: f64| held_mean(value, time, 1e-3, 5e-3, shift);
+        let mean = |time: f64, shift: f64| Held::over(time, 1e-3, 5e-3, shift).mean(value);
         assert_eq!((mean(0.014, 0.0), mean(0.015, 0.0), mean(0.015, 2e-3)), (1.0, 5.0, 1.0));
         assert!((mean(0.017, 2.25e-3) - (0.25 * 1.0 + 0.75 * 5.0)).abs() < 1e-9);
-        let slope =
-            held_mean(|k| Dual64::from(value(k)), 0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0)).eps;
+        let slope = Held::over(0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0))
+            .mean(|k| Dual64::from(value(k)))
+            .eps;
         assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
     }
 
@@ -92,14 +88,15 @@ mod tests {
     fn an_edge_on_the_beginning_of_a_step_has_a_slope() {
         let value = |k: i64| Dual64::from(if k < 3 { 1.0 } else { 5.0 });
         let shift = |by: f64| Dual64::new(by, 1.0);
-        let mean = held_mean(value, 0.015, 1e-3, 5e-3, shift(0.0));
+        let ends = |held: Held<Dual64>| (held.before, held.now, held.share_before);
+        let mean = Held::over(0.015, 1e-3, 5e-3, shift(0.0)).mean(value);
         assert!((mean.re - 5.0).abs() < 1e-9 && (mean.eps + 4.0 / 1e-3).abs() < 1e-6);
-        let (first, last, share) = held_edge(0.02, 1e-3, 5e-3, shift(5e-3));
+        let (first, last, share) = ends(Held::over(0.02, 1e-3, 5e-3, shift(5e-3)));
         assert_eq!((first, last), (2, 3));
         assert!(share.re.abs() < 1e-9 && (share.eps - 1.0 / 1e-3).abs() < 1e-6);
-        let (first, last, share) = held_edge(0.022, 1e-3, 5e-3, shift(5e-3));
+        let (first, last, share) = ends(Held::over(0.022, 1e-3, 5e-3, shift(5e-3)));
         assert_eq!((first, last, share.eps), (3, 3, 0.0));
-        let (first, last, share) = held_edge(0.017, 1e-3, 5e-3, shift(2.25e-3));
+        let (first, last, share) = ends(Held::over(0.017, 1e-3, 5e-3, shift(2.25e-3)));
         assert_eq!((first, last), (2, 3));
         assert!((share.re - 0.25).abs() < 1e-9);
     }

@@ -6,7 +6,7 @@ use super::rates::{Controls, Plant};
 use super::units::SupplyUnit;
 use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::valve::spool_position;
-use crate::clock::{held_edge, held_mean};
+use crate::clock::Held;
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
@@ -104,18 +104,17 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         let wiring = &self.wiring;
         self.command(|_| 0.0, controls);
+        let held = Held::over(time, step, sample_time, shift);
         for (k, spool) in controls.spool.iter_mut().enumerate() {
-            let position = |sample| self.commanded(k, command(k, sample));
-            let mean = held_mean(position, time, step, sample_time, shift);
-            *spool = self.opened(k, mean);
+            *spool = self.opened(k, held.mean(|sample| self.commanded(k, command(k, sample))));
         }
         let mut input = wiring.valves.len();
         for (supply, set) in self.supplies.iter().zip(&mut controls.set_pressure) {
             if matches!(supply, Supply::Regulator { .. }) {
                 let late = shift + supply.dead_time();
-                let (first, last, share_before) = held_edge(time, step, sample_time, late);
+                let Held { before, now, share_before } = Held::over(time, step, sample_time, late);
                 let pressure = |sample| self.absolute(command(input, sample));
-                *set = SetPressure { now: pressure(last), before: pressure(first), share_before };
+                *set = SetPressure { now: pressure(now), before: pressure(before), share_before };
                 input += 1;
             }
         }

@@ -307,7 +307,8 @@ impl Progress {
             flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
         flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
-        let kept = if plant.delayed() { rig.names.inputs.len() + gauges(rig).count() } else { 0 };
+        let readings = if plant.skewed() { gauges(rig).count() } else { 0 };
+        let kept = if plant.delayed() { rig.names.inputs.len() + readings } else { 0 };
         Self { state, memory, flags, samples: 0, past: Vec::new(), kept }
     }
 
@@ -446,7 +447,7 @@ impl Progress {
         out: &mut Trajectory,
     ) {
         plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
-        if self.kept > 0 {
+        if self.keeps_readings(plant) {
             let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
             let later = (pressures.max(0.0) - angles.max(0.0)) / timing.sample_time;
             let first = plant.rig().names.inputs.len();
@@ -461,7 +462,13 @@ impl Progress {
         }
     }
 
-    /// Note the commands and the pressures of a sample, and forget what nobody asks for any more.
+    /// Whether pressures of past samples are kept beside the commands.
+    fn keeps_readings(&self, plant: &Plant<'_, f64>) -> bool {
+        self.kept > plant.rig().names.inputs.len()
+    }
+
+    /// Note the commands of a sample, and its pressures where another clock records them; forget
+    /// what nobody asks for any more.
     fn remember(
         &mut self,
         plant: &Plant<'_, f64>,
@@ -470,10 +477,13 @@ impl Progress {
         sample: usize,
         timing: Timing,
     ) {
-        let mut readings = vec![Vec::new(); plant.rig().names.channels.len()];
-        plant.observe(&self.state, &self.memory, scratch, &mut readings);
         self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
-        self.past.extend(gauges(plant.rig()).flat_map(|channel| readings[channel].last().copied()));
+        if self.keeps_readings(plant) {
+            let mut readings = vec![Vec::new(); plant.rig().names.channels.len()];
+            plant.observe(&self.state, &self.memory, scratch, &mut readings);
+            let gauges = gauges(plant.rig());
+            self.past.extend(gauges.flat_map(|channel| readings[channel].last().copied()));
+        }
         let (skew, _) = plant.skew(self.samples as f64 * timing.sample_time);
         let latest = skew.max(0.0) + plant.dead_time();
         let most = self.kept * (2 + (latest / timing.sample_time).ceil() as usize);

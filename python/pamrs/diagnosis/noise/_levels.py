@@ -240,9 +240,7 @@ def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) 
     for name in names:
         raw = rng.normal(0.0, prepared.noise[name], prepared.n)
         value, slope = prepared.signals[name]
-        more, steeper = smoothed(
-            raw, prepared.dt, prepared.settings.prepare, prepared.lengths[name]
-        )
+        more, steeper = smoothed(raw, prepared.dt, prepared.lengths[name])
         signals[name] = (value + more, slope + steeper)
     return prepared.shaken(signals)
 

@@ -177,7 +177,11 @@ def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
 
 def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
     """Sizes of pressures, by themselves and beside the rig file or a regulator's command."""
-    rated = _rated(recording, rig)
+    rated = {
+        dotted("supply_pressure", supply): told
+        for supply in rig.tables("supply")
+        if (told := _set_to(recording, rig, supply)) is not None
+    }
     largest = max(
         [
             *(size for size, _ in rated.values()),
@@ -210,7 +214,8 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
                 "values in Pa, kPa or psi under a heading in bar?"
             )
         elif name in rated:
-            size, source = rated[name]
+            size, command = rated[name]
+            source = f"the largest {command} is" if command else "the rig file has"
             if size > 0.0 and not least <= high / size <= most:
                 yield (
                     f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
@@ -218,20 +223,18 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
                 )
 
 
-def _rated(recording: Recording, rig: Rig) -> dict[str, tuple[float, str]]:
-    """About the highest pressure [Pa gauge] that each supply's gauge should show, and who says so.
+def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
+    """About the highest pressure [Pa gauge] that a supply should have, and the command that says
+    so; no command where the rig file does.
 
-    A regulator may be set to anything: its largest command tells, where it was recorded.
+    A regulator may be set to anything: its largest command tells; None where it was not recorded.
     """
-    found = {}
-    for name, table in rig.tables("supply").items():
-        size, source = float(table["initial_pressure"]), "the rig file has"
-        if table["kind"] == "regulator":
-            command = dotted("supply_command", name)
-            known = _values(recording, command)
-            size, source = float(known.max(initial=0.0)), f"the largest {command} is"
-        found[dotted("supply_pressure", name)] = (size, source)
-    return found
+    table = rig.tables("supply")[supply]
+    if table["kind"] != "regulator":
+        return float(table["initial_pressure"]), ""
+    command = dotted("supply_command", supply)
+    known = _values(recording, command)
+    return (float(known.max()), command) if known.size else None
 
 
 def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
@@ -308,18 +311,15 @@ def _highest(
     That is its gauge; of a regulator without one the largest set pressure, since what it feeds
     follows a falling one late; else the pressure of the rig file. None where nothing tells it.
     """
-    full, table = dotted("supply_pressure", supply), rig.tables("supply")[supply]
+    full = dotted("supply_pressure", supply)
     if full in recording.channels:
         return full, recording.mask[full], recording.channels[full]
-    everywhere = np.ones(len(recording), dtype=np.bool_)
-    if table["kind"] != "regulator":
-        rated = np.full(everywhere.size, float(table["initial_pressure"]))
-        return f"{full} of the rig file", everywhere, rated
-    command = dotted("supply_command", supply)
-    known = _values(recording, command)
-    if known.size == 0:
+    told = _set_to(recording, rig, supply)
+    if told is None:
         return None
-    return f"the largest {command}", everywhere, np.full(everywhere.size, float(known.max()))
+    size, command = told
+    source = f"the largest {command}" if command else f"{full} of the rig file"
+    return source, np.ones(len(recording), dtype=np.bool_), np.full(len(recording), size)
 
 
 @dataclass(frozen=True)

@@ -202,24 +202,19 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     -------
     (n,) array of int
     """
-    length = filter_length(dt, settings)
+    shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
     found = np.ones(values.size, dtype=np.intp)
-    tried = sorted({7, *(max(7, round(length * share) | 1) for share in (0.5, 1.0))})
-    for count in tried:
+    for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
         basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
         frames = np.lib.stride_tricks.sliding_window_view(values - values.mean(), count)
         missed = np.sum((frames - (frames @ basis) @ basis.T) ** 2, axis=1) / (count - 4)
         usual = max(noise**2, float(np.median(missed)))
         fits = missed <= usual * chi2.isf(settings.smoothing_odds, count - 4) / (count - 4)
-        half = count // 2
-        inside = np.concatenate([np.full(half, fits[0]), fits, np.full(half, fits[-1])])
-        found[inside] = count
+        found[np.pad(fits, count // 2, mode="edge")] = count
     return found
 
 
-def smoothed(
-    values: Array, dt: float, settings: PrepareSettings, lengths: Lengths | None = None
-) -> tuple[Array, Array]:
+def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
     """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative.
 
     Parameters
@@ -228,26 +223,19 @@ def smoothed(
         The channel, holes bridged.
     dt : float
         Sample time [s].
-    settings : PrepareSettings
-        Length of the filter.
-    lengths : (n,) array of int, optional
+    lengths : (n,) array of int
         Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is.
 
     Returns
     -------
     value, slope : (n,) arrays
     """
-    length = filter_length(dt, settings)
-    value = savgol_filter(values, length, 3)
-    slope = savgol_filter(values, length, 3, deriv=1, delta=dt)
-    for count in np.unique(lengths) if lengths is not None else ():
+    value, slope = values.copy(), np.gradient(values, dt)
+    for count in np.unique(lengths[lengths > 1]):
         rows = lengths == count
-        if count == 1:
-            value[rows], slope[rows] = values[rows], np.gradient(values, dt)[rows]
-        elif count != length:
-            value[rows] = savgol_filter(values, int(count), 3)[rows]
-            slope[rows] = savgol_filter(values, int(count), 3, deriv=1, delta=dt)[rows]
-    return np.ascontiguousarray(value), np.ascontiguousarray(slope)
+        value[rows] = savgol_filter(values, int(count), 3)[rows]
+        slope[rows] = savgol_filter(values, int(count), 3, deriv=1, delta=dt)[rows]
+    return value, slope
 
 
 def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
@@ -356,7 +344,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
         lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
-        signals[name] = smoothed(filled, recording.sample_time, own, lengths[name])
+        signals[name] = smoothed(filled, recording.sample_time, lengths[name])
     commands = {name: _command(recording, rig, name) for name in core.inputs}
     return Prepared(recording, commands, signals, raw, noise, lengths, settings)
 
