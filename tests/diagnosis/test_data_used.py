@@ -11,9 +11,16 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import available_blocks, averaged, averaged_to_need
+from pamrs.diagnosis.prepare import (
+    available_blocks,
+    averaged,
+    averaged_to_need,
+    prepare,
+    residual,
+)
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
 from tests.diagnosis.test_overlap import of, run
 
 SETTINGS = DiagnosisSettings()
@@ -38,6 +45,8 @@ def test_means_are_of_their_time_and_free_of_aliases() -> None:
     assert step[399] == 5.0
     assert step[400] == 6.0
     assert averaged(fast, 1) is fast
+    # the commands of the log are kept: five from each sample to the next
+    np.testing.assert_array_equal(slow.commands["valve_command"], volts[2 : 2 + 5 * 999])
 
 
 def test_holes_stay_holes() -> None:
@@ -48,6 +57,28 @@ def test_holes_stay_holes() -> None:
     assert slow.mask["muscle_pressure"].tolist() == [True, True, False] + [True] * 6
     assert np.isnan(slow.channels["muscle_pressure"][2])
     assert slow.channels["muscle_pressure"][4] == pytest.approx(23.0)
+
+
+def test_a_valve_lets_through_what_its_openings_do_and_not_their_mean() -> None:
+    # a controller moves the spool every 4 ms, mostly about its null, where a mean is shut
+    rig, dt = pamrs.rigs.shoulder(), 0.002
+    rng = np.random.default_rng(5)
+    moves = 5.0 + 0.25 * np.sin(0.02 * np.arange(1000)) + rng.normal(0.0, 0.15, 1000)
+    command = np.repeat(moves, 2)
+    made = pamrs.simulate(rig, valve_command=command, sample_time=dt, step=0.001)
+    fast = of("a", "fit", dt, {"valve_command": command} | {n: made[n] for n in NAMES[1:]})
+    blocks = available_blocks(rig, NAMES, SETTINGS.prepare)
+    chamber = next(b for b in blocks if b.name == "chamber")
+    core = core_rig(rig)
+    logged = averaged(fast, 5)
+
+    def missed(recording: Recording) -> float:
+        prepared = prepare(recording, rig, SETTINGS)
+        return float(np.std(residual(chamber, core, prepared, []).value))
+
+    assert missed(fast) < 1.0
+    assert missed(logged) < 100.0  # a mean is not quite the instant in its middle
+    assert missed(replace(logged, commands={})) > 3000.0
 
 
 def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:

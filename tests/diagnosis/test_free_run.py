@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
+import numpy as np
 import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain import _free_run
 from pamrs.diagnosis.fit import Events, Problem, residuals
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.prepare import available_blocks, averaged, prepare
 from pamrs.diagnosis.prove import valid_result
 from pamrs.diagnosis.result import schema
 from pamrs.errors import SimulationError
@@ -69,6 +71,26 @@ def test_without_a_command_there_is_no_free_run_and_it_is_said_why() -> None:
     runs, note = _free_run.free_run(both, found, rig, rig, None)
     assert [r.recording for r in runs or []] == ["whole"]
     assert "silent" in note
+
+
+def test_means_run_freely_under_the_commands_of_their_log() -> None:
+    rig = pamrs.rigs.shoulder()
+    whole = recorded(rig, "whole", "held_out")
+    jumping = whole.channels["valve_command"] + np.resize([0.1, 0.1, -0.1, -0.1], len(whole))
+    made = pamrs.simulate(rig, valve_command=jumping, sample_time=whole.sample_time)
+    fast = replace(
+        whole, channels={"valve_command": jumping} | {name: made[name] for name in NAMES[1:]}
+    )
+    means = averaged(fast, 5)
+    problem = problem_of(rig, [means])
+    found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
+    runs, _ = _free_run.free_run(problem, found, rig, rig, None)
+    assert runs is not None
+    assert runs[0].channels["muscle_pressure"].before < 300.0
+    problem = problem_of(rig, [replace(means, commands={})])
+    runs, _ = _free_run.free_run(problem, found, rig, rig, None)
+    assert runs is not None
+    assert runs[0].channels["muscle_pressure"].before > 1000.0
 
 
 def test_a_model_that_leaves_its_range_has_no_number_and_stops_nothing(

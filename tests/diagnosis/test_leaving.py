@@ -11,7 +11,7 @@ import numpy as np
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Fit, Problem, fit, residuals
+from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import left_out
 from pamrs.recordings import Recording
@@ -84,10 +84,29 @@ def test_one_step_is_what_a_fit_to_the_others_predicts() -> None:
         assert abs(rms(away, key) / rms(refitted, key) - 1.0) < 0.05
 
 
-def test_of_one_recording_nothing_is_left_out() -> None:
-    single = problem(hold("one", 2e-11))
+def test_of_one_recording_each_piece_is_predicted_by_the_others() -> None:
+    # a bump that no leak makes pulls at all of them
+    bumpy = hold("one", 2e-11)
+    bumpy.channels["muscle_pressure"][150:200] -= 2000.0
+    single = problem(bumpy)
     found = leaking(single)
-    assert left_out(single, found, {b.name: 1.0 for b in single.blocks}) is found.residuals
+    key = (single.blocks[0].name, "one")
+    own, away = found.residuals[key], left_out(single, found, {key[0]: 1.0})[key]
+    # the last fifth against a linear fit to the first four
+    rows, slope = stacked(single, found.residuals, {key[0]: 1.0})
+    assert slope is not None
+    assert own.jacobian is not None
+    names = list(found.values)
+    scales = np.array([found.scales[n] for n in names])
+    first = slice(0, 4 * rows.size // 5)
+    held = np.diag([1.0 if n in found.held_by_prior else 0.0 for n in names])
+    moved = np.array([found.held_by_prior.get(n, 0.0) for n in names])
+    near = slope[first] * scales
+    step = -np.linalg.solve(near.T @ near + held, near.T @ rows[first] + moved)
+    last = slice(4 * own.value.size // 5 + 1, None)  # a bin may begin one sample later
+    expected = own.value[last] - own.jacobian[last] @ (scales * step)
+    assert np.abs(expected - own.value[last]).max() > 100.0
+    np.testing.assert_allclose(away.value[last], expected, atol=5.0)
 
 
 def test_what_one_recording_alone_tells_is_taken_from_it() -> None:

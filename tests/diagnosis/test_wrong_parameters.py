@@ -216,7 +216,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
             {},
         )
 
-        def freed(self, names: tuple[str, ...], baseline: object) -> None:
+        def freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
             asked.append(names)
 
     assert wrong_parameters.freed(Trial(), None, None, lambda text: None) == []  # type: ignore[arg-type]

@@ -108,7 +108,8 @@ def test_a_diagnosis_names_it_with_its_size(told: dict[str, Any]) -> None:
     assert told["verdict"] == "effects"
     assert told["effects"] == [WORDS.stem]
     assert told["where"] == "arm"
-    assert told["probabilities"][WORDS.stem] > 0.8
+    # whatever else: the trial's own form of it moves parameters to the end of their tolerances
+    assert told["probability"] > 0.9
     assert told["gap_closed"] > 0.8
     truth, values = told["truth"][WORDS.stem], told["parameters"]
     for name, own in (("stiffness", "stiffness"), ("angle", "angle"), ("time_constant", "time")):

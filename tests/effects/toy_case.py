@@ -121,6 +121,7 @@ def main(folder: Path) -> None:
         "probabilities": found.probabilities,
         "parameters": found.effects[0]["parameters"] if found.effects else {},
         "truth": json.loads(case.key)["effect_parameters"],
+        "probability": found.effects[0]["probability"] if found.effects else 0.0,
         "gap_closed": found.fit["gap_closed"],
         "where": found.where.get("block"),
         "named_by_page": pamrs.effects.EFFECTS[EFFECT].name in page.read_text(encoding="utf-8"),

@@ -183,6 +183,38 @@ fn sensitivities_agree_with_differences() {
 }
 
 #[test]
+fn commands_within_a_sample_are_held_one_after_the_other() {
+    let rig = Rig::new(spec()).unwrap();
+    let (n, dt, each) = (60, 0.01, 5);
+    // five commands a sample in the first half, one in the second, where steps may be long again
+    let fine: Vec<f64> = (0..n * each)
+        .map(|k| if k < 150 { 5.0 + 0.08 * (((k * 7) % 11) as f64 - 5.0) } else { 5.2 })
+        .collect();
+    let timing = Timing { sample_time: dt / each as f64, substeps: 2 };
+    let truth =
+        simulate(&rig, n * each, &[("valve_command", &fine)], timing, &start(&rig)).unwrap();
+    let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
+    let columns = names.map(|name| -> Vec<f64> {
+        truth.get(&rig, name).unwrap().iter().step_by(each).copied().collect()
+    });
+    let rates = columns.each_ref().map(|column| slopes(column, dt));
+    let signal = |k: usize| (names[k], Signal { value: &columns[k], slope: &rates[k] });
+    let gap = |commands: &[f64], substeps: usize| {
+        let commands = [("valve_command", commands)];
+        let measured =
+            Measured::new(&rig, n, &commands, &[signal(0), signal(1), signal(2)]).unwrap();
+        let timing = Timing { sample_time: dt, substeps };
+        let found = predict(&rig, Block::Chamber(0), &measured, timing, &[0], &[]).unwrap();
+        columns[1].iter().zip(&found.value).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let means: Vec<f64> = fine.chunks(each).map(|c| c.iter().sum::<f64>() / each as f64).collect();
+    let (logged, averaged) = (gap(&fine, 1), gap(&means, each));
+    assert!(logged < 0.05 * averaged, "{logged} {averaged}");
+    let ragged = Measured::new(&rig, n, &[("valve_command", &fine[1..])], &[signal(0)]);
+    assert!(matches!(ragged, Err(Error::Length { .. })));
+}
+
+#[test]
 fn sensitivities_do_not_depend_on_how_many_are_asked_for() {
     let rig = Rig::new(spec()).unwrap();
     let n = 40;

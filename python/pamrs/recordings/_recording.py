@@ -161,6 +161,9 @@ class Recording:
         Parameters of the rig that had another value in it than in the rig file, by dotted name.
     said : dict of str to str
         Unit in which the file has each channel, as far as it was read from one.
+    commands : dict of str to (n * m,) array
+        Where each sample is a mean of `m` of the log: the commands of the log, from each sample to
+        the next, with holes filled. Empty elsewhere.
     """
 
     name: str
@@ -174,6 +177,7 @@ class Recording:
     source: str = ""
     parameters: dict[str, OwnValue] = field(default_factory=dict)
     said: dict[str, str] = field(default_factory=dict)
+    commands: dict[str, Array] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.time)

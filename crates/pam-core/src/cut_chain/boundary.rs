@@ -75,7 +75,10 @@ impl Signal<'_> {
 #[derive(Debug, Clone)]
 pub struct Measured<'a> {
     pub(crate) samples: usize,
+    /// Commands, `held` values for each sample.
     pub(crate) commands: Vec<&'a [f64]>,
+    /// Commands that follow each other within a sample, each held equally long.
+    pub(crate) held: usize,
     /// Place of the state and its signal.
     pub(crate) signals: Vec<(usize, Signal<'a>)>,
 }
@@ -84,6 +87,10 @@ impl<'a> Measured<'a> {
     /// Commands (one for each input of the rig, held over each sample) and measured channels by
     /// name: `supply_pressure`, `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the
     /// muscle on a linear load, each with the name of its block behind it where it has one.
+    ///
+    /// Where samples are means of several of a log, all commands may have so many values for each
+    /// sample: a valve lets through what its openings do one after the other, not what their mean
+    /// does.
     ///
     /// # Errors
     /// [`Error::Length`] or [`Error::Parameter`] for bad arrays; [`Error::Model`] for a name that
@@ -95,15 +102,17 @@ impl<'a> Measured<'a> {
         signals: &[(&str, Signal<'a>)],
     ) -> Result<Self> {
         let mut own = Vec::new();
+        let longest = commands.iter().map(|(_, values)| values.len()).max().unwrap_or(0);
+        let held = (longest / samples.max(1)).max(1);
         for name in &rig.names().inputs {
             let Some((_, values)) = commands.iter().find(|(n, _)| n == name) else {
                 return Err(Error::Model(format!(
                     "{name} is missing: one value per sample is needed"
                 )));
             };
-            if values.len() != samples {
-                let why = "one per sample".into();
-                let (found, expected) = (values.len(), samples);
+            if values.len() != samples * held {
+                let why = "one per sample, or equally many of each command".into();
+                let (found, expected) = (values.len(), samples * held);
                 return Err(Error::Length { name: name.clone(), found, expected, why });
             }
             if let Some((k, u)) = values.iter().enumerate().find(|(_, u)| !u.is_finite()) {
@@ -130,7 +139,7 @@ impl<'a> Measured<'a> {
             signal.check(name, samples)?;
             places.push((place, *signal));
         }
-        Ok(Self { samples, commands: own, signals: places })
+        Ok(Self { samples, commands: own, held, signals: places })
     }
 
     #[inline]

@@ -120,7 +120,7 @@ impl<'a, S: Number> Cut<'a, S> {
             check_state(&self.stepper.plant, &course.state, k as f64 * dt)?;
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
-            self.command(k, time, &clocks, &mut controls);
+            self.command(k * self.measured.held, time, &clocks, &mut controls);
             let value = self.read(&course);
             sink(k, value, &self.stepper, &course.state, &controls);
             if k + 1 < n {
@@ -230,26 +230,33 @@ impl<'a, S: Number> Cut<'a, S> {
         plant.follow_muscles(state, memory, &from, &to);
     }
 
-    /// Controls of sample `k` from a time [s] on.
-    fn command(&self, k: usize, time: f64, clocks: &Clocks<S>, out: &mut Controls<S>) {
+    /// Controls of the `j`th command of the recording from a time [s] on.
+    fn command(&self, j: usize, time: f64, clocks: &Clocks<S>, out: &mut Controls<S>) {
         let (plant, commands) = (&self.stepper.plant, &self.measured.commands);
         if !plant.delayed() {
             // most commands are held over many samples
-            if k == 0 || commands.iter().any(|command| command[k] != command[k - 1]) {
-                plant.command(|input| commands[input][k], out);
+            if j == 0 || commands.iter().any(|command| command[j] != command[j - 1]) {
+                plant.command(|input| commands[input][j], out);
             }
             return;
         }
-        let last = self.measured.samples as i64 - 1;
+        let held = self.measured.held;
+        let last = (self.measured.samples * held) as i64 - 1;
         let command = |input: usize, sample: i64| commands[input][sample.clamp(0, last) as usize];
-        plant.delayed_controls(
-            clocks.command,
-            time,
-            self.timing.step(),
-            self.timing.sample_time,
-            command,
-            out,
-        );
+        let each = self.timing.sample_time / held as f64;
+        let step = self.timing.sample_time / self.substeps(j / held) as f64;
+        plant.delayed_controls(clocks.command, time, step, each, command, out);
+    }
+
+    /// Steps from sample `k` to the next: no step sees two commands.
+    fn substeps(&self, k: usize) -> usize {
+        let (held, least) = (self.measured.held, self.timing.substeps);
+        let own = k * held..(k + 1) * held;
+        let one = |command: &&[f64]| command[own.clone()].iter().all(|u| *u == command[own.start]);
+        if held == 1 || (!self.stepper.plant.delayed() && self.measured.commands.iter().all(one)) {
+            return least;
+        }
+        least.div_ceil(held) * held
     }
 
     /// The steps from sample `k` to the next.
@@ -260,14 +267,15 @@ impl<'a, S: Number> Cut<'a, S> {
         mut clocks: Clocks<S>,
         controls: &mut Controls<S>,
     ) {
-        let (dt, step) = (self.timing.sample_time, self.timing.step());
-        let h = 1.0 / self.timing.substeps as f64;
+        let (dt, held, substeps) = (self.timing.sample_time, self.measured.held, self.substeps(k));
+        let h = 1.0 / substeps as f64;
+        let step = dt / substeps as f64;
         let Course { state, memory, last } = course;
-        for i in 0..self.timing.substeps {
+        for i in 0..substeps {
             let time = (k as f64 + i as f64 * h) * dt;
-            if i > 0 && self.stepper.plant.delayed() {
+            if i > 0 && (held > 1 || self.stepper.plant.delayed()) {
                 clocks = Clocks::of(&self.stepper.plant, self.block, time);
-                self.command(k, time, &clocks, controls);
+                self.command(k * held + i * held / substeps, time, &clocks, controls);
             }
             let (driving, taps) = (&self.driving, &self.driving_taps);
             let drive =

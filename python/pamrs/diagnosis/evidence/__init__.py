@@ -1,6 +1,6 @@
 """Hypotheses, what speaks for each, and the verdict of each group of blocks.
 
-Public: `Candidate`, `Group`, `Attempts`, `significant`, `autocorrelation_of`,
+Public: `Candidate`, `Group`, `Attempts`, `significant`, `doubted`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
 `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
 `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
@@ -14,6 +14,7 @@ from pamrs.diagnosis.evidence._candidates import (
     Candidate,
     Group,
     autocorrelation_of,
+    doubted,
     parts_of,
     significant,
     start_of,
@@ -56,6 +57,7 @@ __all__ = [
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
+    "doubted",
     "explains",
     "is_parameter",
     "judge",

@@ -17,7 +17,10 @@ from pamrs.diagnosis.fit import (
     fit,
     fit_events,
     form_in,
+    free_baseline,
+    known_parameters,
     look_for_events,
+    predicted_with_doubt,
     residuals,
     with_effects_of,
 )
@@ -29,7 +32,15 @@ from pamrs.effects import EFFECTS, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Attempts", "Candidate", "Group", "significant", "start_of", "without_autocorrelation"]
+__all__ = [
+    "Attempts",
+    "Candidate",
+    "Group",
+    "doubted",
+    "significant",
+    "start_of",
+    "without_autocorrelation",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,6 +176,14 @@ def significant(found: Excess, ratio: float = 1.0) -> bool:
     return found.ratio > max(ratio, found.limit)
 
 
+def doubted(inside: dict[str, Excess], after: dict[str, Excess], *, same: bool) -> bool:
+    """Whether a fit leaves noise in its own recordings and more in held-out ones, which parameters
+    may bring that its own recordings do not tell (docs/decisions/0061).
+    """
+    quiet = not any(significant(e) for e in inside.values())
+    return not same and quiet and any(significant(e) for e in after.values())
+
+
 @dataclass(frozen=True, eq=False)
 class Attempts:
     """What every attempt at an explanation needs: recordings to fit and held out, model, noise
@@ -288,14 +307,18 @@ class Attempts:
         """A fitted set on the held-out recordings, or on each recording as the others predict
         it.
         """
+        blocks = self.inner.blocks
+        inside = {b.name: self.excess(b, self.inner, found.residuals) for b in blocks}
         if outside is None:
             outside = (
                 left_out(self.inner, found, self.autocorrelation(found))
                 if self.same
                 else residuals(self.outer, found.rig)
             )
-        after = {b.name: self.excess(b, self.outer, outside) for b in self.inner.blocks}
-        inside = {b.name: self.excess(b, self.inner, found.residuals) for b in self.inner.blocks}
+        after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
+        if found.events is None and doubted(inside, after, same=self.same):
+            outside = predicted_with_doubt(self.outer, found)
+            after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
         gaps = [
             (self.out[b.name].ratio - 1.0, max(0.0, after[b.name].ratio - 1.0))
             for b in self.suspects
@@ -357,8 +380,51 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
+    def fitted_shortly(self, start: Start, warm: Fit) -> Candidate | None:
+        """An effect fitted in a few steps: enough to see which of many are worth a whole fit; None
+        where it cannot be run.
+        """
+        if start.effect in self.held:
+            return None
+        free, held, forms = parts_of([start])
+        try:
+            found = fit(
+                self.inner,
+                self.nominal,
+                (start.effect,),
+                free,
+                self.white,
+                fixed=held,
+                warm=warm,
+                evaluations=self.settings.search.first_evaluations,
+                forms=forms,
+            )
+            return self.judged((start.effect,), found)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def _moved_alone(self, names: tuple[str, ...]) -> Fit:
+        """Some parameters freed and fitted in a few steps with the others at their nominal values,
+        where they belong if these are the wrong ones.
+
+        From the nominal values a fit of all of them together is soon at the walls of the others.
+        """
+        settings = self.settings
+        known = known_parameters(self.nominal, settings.fit)
+        others = [n for n in free_baseline(self.inner, self.nominal) if n not in names]
+        return fit(
+            self.inner,
+            self.nominal,
+            (),
+            {},
+            self.white,
+            freed=names,
+            settled={n: known[n].value for n in others},
+            evaluations=settings.wrong_parameters.first_evaluations,
+        )
+
     def freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
-        """The baseline with some parameters freed, a few steps from the nominal values: enough to
+        """The baseline with some parameters freed, a few steps from where they go alone: enough to
         see which of many are worth a whole fit.
         """
         try:
@@ -368,6 +434,7 @@ class Attempts:
                 (),
                 {},
                 self.white,
+                warm=self._moved_alone(names),
                 freed=names,
                 evaluations=self.settings.wrong_parameters.first_evaluations,
             )
@@ -375,16 +442,20 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
-    def freed(self, names: tuple[str, ...], baseline: Fit) -> Candidate | None:
+    def freed(
+        self, names: tuple[str, ...], baseline: Fit, share: float | None = None
+    ) -> Candidate | None:
         """The baseline with some parameters freed from their tolerance, fitted to its end; None
         where it cannot be run.
 
-        It begins at the nominal values, where the other parameters belong if these are the wrong
-        ones; and, where that leaves more than noise, at those that the baseline was moved to.
+        It begins where these go alone; and, where that leaves more than noise, at the values that
+        the baseline was moved to.
+        ``share`` is as in :meth:`fitted`.
         """
         settings = self.settings
+        least = settings.fit.final_step_share if share is None else share
 
-        def found(autocorrelation: dict[str, float], begun: Fit | None) -> Fit:
+        def found(autocorrelation: dict[str, float], begun: Fit) -> Fit:
             return fit(
                 self.inner,
                 self.nominal,
@@ -394,13 +465,13 @@ class Attempts:
                 warm=begun,
                 freed=names,
                 evaluations=settings.fit.baseline_evaluations,
-                share=settings.fit.final_step_share,
+                share=least,
             )
 
         best: Candidate | None = None
-        for begin in (None, baseline):
+        for alone in (True, False):
             try:
-                first = found(self.white, begin)
+                first = found(self.white, self._moved_alone(names) if alone else baseline)
                 autocorrelation = self.autocorrelation(first)
                 correlated = max(autocorrelation.values()) > settings.noise.correlated_variance
                 judged = self.judged((), found(autocorrelation, first) if correlated else first)
@@ -420,6 +491,20 @@ class Attempts:
         """
         try:
             return self._gone_on(starts, warm, names, self.settings.fit.effect_evaluations)
+        except SimulationError:
+            return None  # it leaves the range in which the model holds
+
+    def without(self, larger: Candidate, needless: str) -> Candidate | None:
+        """A set of persistent effects and wrong parameters without one of its terms, fitted to its
+        end from where the whole set stands; None where that cannot be run.
+        """
+        starts = [self.start_of(larger.fit, e) for e in larger.effects if e != needless]
+        wrong = tuple(name for name in larger.wrong if name != needless)
+        settings = self.settings.fit
+        try:
+            return self._gone_on(
+                starts, larger.fit, wrong, settings.polish_evaluations, settings.final_step_share
+            )
         except SimulationError:
             return None  # it leaves the range in which the model holds
 

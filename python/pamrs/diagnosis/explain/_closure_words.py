@@ -113,7 +113,7 @@ def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str
         starts = prepared.starts(block.window, block.drives)
         terms = core.closure_terms(
             block.name,
-            {name: prepared.commands[name] for name in core.inputs},
+            prepared.driving(mechanical=block.mechanical),
             prepared.dt,
             default_step(prepared.dt, longest=block.step),
             starts,

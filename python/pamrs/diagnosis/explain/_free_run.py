@@ -5,6 +5,7 @@ measured: what each block's error comes to when nothing measured corrects it.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -98,11 +99,33 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
     )
 
 
+def _as_logged(recording: Recording) -> Recording:
+    """A recording of means at the rate of its log: commands as they were, measurements at the
+    instants that the means belong to.
+    """
+    if not recording.commands:
+        return recording
+    count = max(v.size for v in recording.commands.values()) // len(recording)
+    size = len(recording) * count
+    at = np.arange(size) % count == 0
+    step = recording.sample_time / count
+    channels = {name: np.repeat(v, count) for name, v in recording.channels.items()}
+    masks = {name: np.repeat(v, count) & at for name, v in recording.mask.items()}
+    return replace(
+        recording,
+        time=np.arange(size, dtype=np.float64) * step,
+        sample_time=step,
+        channels=channels | recording.commands,
+        mask=masks | {name: np.ones(size, dtype=bool) for name in recording.commands},
+        commands={},
+    )
+
+
 def _errors(rig: Rig, recording: Recording) -> tuple[dict[str, float], str]:
     """Root mean square error of each measured channel, and why there is none."""
+    logged = _as_logged(recording)
     try:
-        result = replay(rig, recording)
-        return differences(result, recording), ""
+        return differences(replay(rig, logged), logged), ""
     except RecordingError:
         raise
     except (PamrsError, ArithmeticError) as error:

@@ -2,8 +2,9 @@
 from several starts.
 
 Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
-`free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`, `starts_of`, `CHOSEN` (where
-the fit of an effect begins); `form_in`, `with_effects_of` (effects of a rig and their forms);
+`predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`,
+`starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `with_effects_of` (effects of
+a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
 `depends`, `fits` (where effects act); `holdable`, `without_passing`, `named_entries`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
@@ -23,6 +24,7 @@ from pamrs.diagnosis.fit._fitting import (
     changes,
     fit,
     free_baseline,
+    predicted_with_doubt,
     residuals,
     stacked,
     with_priors,
@@ -63,6 +65,7 @@ __all__ = [
     "levenberg_marquardt",
     "look_for_events",
     "named_entries",
+    "predicted_with_doubt",
     "residuals",
     "spread_over_pieces",
     "stacked",

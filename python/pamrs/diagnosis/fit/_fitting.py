@@ -33,6 +33,7 @@ __all__ = [
     "Stopped",
     "changes",
     "fit",
+    "predicted_with_doubt",
     "residuals",
     "stacked",
     "with_priors",
@@ -394,6 +395,49 @@ def stacked(
                 slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, width))
                 slopes.append(-slope * weight[:, None])
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
+
+
+def predicted_with_doubt(problem: Problem, found: Fit) -> dict[Key, Residual]:
+    """Residuals of recordings that were not fitted, as far as what the fit leaves open of its
+    parameters cannot bring them.
+
+    The prediction of a fit is as uncertain as its parameters are. They take the most probable
+    values under both, by the fit's covariance and the sensitivities here, and what that movement
+    costs counts as residual.
+
+    Parameters
+    ----------
+    problem : Problem
+        Recordings that were not fitted.
+    found : Fit
+        A fit that leaves noise in those that were: its covariance then means what it says.
+
+    Returns
+    -------
+    dict of (block, recording) to Residual
+        Without sensitivities.
+    """
+    names = list(found.values)
+    there = residuals(problem, found.rig, names, found.events)
+    rows, slope = stacked(problem, there, found.inflation)
+    if slope is None:
+        return there
+    scales = np.array([found.scales[name] for name in names])
+    scaled = slope * scales
+    doubt = found.covariance
+    moved = -np.linalg.solve(
+        np.eye(len(names)) + doubt @ (scaled.T @ scaled), doubt @ (scaled.T @ rows)
+    )
+    left = rows + scaled @ moved
+    power = float(left @ left)
+    # at the best values the sum of both is what the movement takes off
+    both = float(rows @ rows + rows @ (scaled @ moved))
+    size = math.sqrt(max(both, power) / power) if power > 0.0 else 1.0
+    return {
+        key: replace(r, value=size * (r.value - r.jacobian @ (scales * moved)), jacobian=None)
+        for key, r in there.items()
+        if r.jacobian is not None
+    }
 
 
 def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> float:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis.prepare._blocks import Block
+from pamrs.diagnosis.prepare._signals import COMMANDS, held
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -19,7 +20,7 @@ __all__ = ["averaged", "averaged_to_need"]
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_HELD = ("valve_command", "supply_command", "reference")
+_HELD = (*COMMANDS, "reference")
 """Entry ``k`` holds from sample ``k`` to the next, where a measured one is of its instant."""
 
 
@@ -89,6 +90,8 @@ def averaged(recording: Recording, count: int) -> Recording:
     Returns
     -------
     Recording
+        With the commands of the log beside their means: a valve lets through what its openings do
+        one after the other, not what their mean does.
     """
     if count == 1:
         return recording
@@ -98,10 +101,13 @@ def averaged(recording: Recording, count: int) -> Recording:
         return recording
     channels: dict[str, Array] = {}
     masks: dict[str, Mask] = {}
+    commands: dict[str, Array] = {}
     for name, values in recording.channels.items():
         first = half if channel_of(name) in _HELD else 0
         rows = slice(first, first + size * count)
         good = recording.mask[name][rows].reshape(size, count)
+        if channel_of(name) in COMMANDS and good.any():
+            commands[name] = held(values, recording.mask[name])[rows]
         parts = np.where(good, values[rows].reshape(size, count), 0.0)
         usable = 2 * good.sum(axis=1) > count
         means = parts.sum(axis=1) / np.maximum(good.sum(axis=1), 1)
@@ -113,4 +119,5 @@ def averaged(recording: Recording, count: int) -> Recording:
         sample_time=step,
         channels=channels,
         mask=masks,
+        commands=commands,
     )

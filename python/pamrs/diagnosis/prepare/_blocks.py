@@ -497,7 +497,7 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
     starts = prepared.starts(block.window, block.drives)
     prediction, _ = core.predict(
         block.name,
-        prepared.commands,
+        prepared.driving(mechanical=block.mechanical),
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,
@@ -535,7 +535,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     ]
     prediction, jacobian = core.predict(
         block.name,
-        prepared.commands,
+        prepared.driving(mechanical=block.mechanical),
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,

@@ -17,7 +17,7 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["Prepared", "binned", "noise_level", "prepare", "smoothed"]
+__all__ = ["COMMANDS", "Prepared", "binned", "held", "noise_level", "prepare", "smoothed"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -40,6 +40,8 @@ class Prepared:
         Commands by the names of the core, of valves [V] and regulators [Pa], holes filled with the
         last value; a command that was not recorded stays at rest, and no block that it drives is
         judged.
+    held : dict of str to (n * m,) array
+        The same as the log has them, `m` from each sample to the next.
     signals : dict of str to (value, slope)
         Smoothed channels and their time derivatives, holes bridged, by the names of the core
         (``muscle_pressure.flexor``).
@@ -55,6 +57,7 @@ class Prepared:
 
     recording: Recording
     commands: dict[str, Array]
+    held: dict[str, Array]
     signals: dict[str, tuple[Array, Array]]
     raw: dict[str, Array]
     noise: dict[str, float]
@@ -63,6 +66,12 @@ class Prepared:
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
+
+    def driving(self, *, mechanical: bool) -> dict[str, Array]:
+        """Commands for the prediction of a block: what moves knows them by the pressures alone, so
+        that their means will do; a gas gets them as the log has them.
+        """
+        return self.commands if mechanical else self.held
 
     @property
     def n(self) -> int:
@@ -346,7 +355,12 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
         signals[name] = smoothed(filled, recording.sample_time, lengths[name])
     commands = {name: _command(recording, rig, name) for name in core.inputs}
-    return Prepared(recording, commands, signals, raw, noise, lengths, settings)
+    logged = max((v.size for v in recording.commands.values()), default=0) // len(recording) or 1
+    as_logged = {
+        name: recording.commands.get(name, np.repeat(values, logged))
+        for name, values in commands.items()
+    }
+    return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings)
 
 
 def pulls_of(rig: Rig) -> dict[str, str]:
@@ -393,9 +407,27 @@ def _command(recording: Recording, rig: Rig, name: str) -> Array:
     mask = recording.mask[name]
     if not mask.any():
         raise DiagnosisError(f"recording {recording.name!r}: no usable sample of {name}")
-    held = np.maximum.accumulate(np.where(mask, np.arange(mask.size), 0))
-    held[: int(np.argmax(mask))] = int(np.argmax(mask))
-    return np.ascontiguousarray(recording.channels[name][held])
+    return held(recording.channels[name], mask)
+
+
+def held(values: Array, mask: Mask) -> Array:
+    """A command whose holes are filled with the last usable value, those before the first one with
+    the first.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Samples.
+    mask : (n,) bool array
+        Which may be used; at least one.
+
+    Returns
+    -------
+    (n,) array
+    """
+    first = int(np.argmax(mask))
+    last = np.maximum.accumulate(np.where(mask, np.arange(mask.size), first))
+    return np.ascontiguousarray(values[last])
 
 
 def binned(values: Array, rows: Mask, width: int) -> tuple[Array, Array]:

@@ -1,15 +1,16 @@
-"""Every recording predicted by a fit to the others, where a case does not say which are held
-out.
+"""Every recording predicted by a fit to the others, where a case does not say which are held out;
+every piece of a single one.
 """
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fit import Fit, Key, Problem, stacked
+from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 
 __all__ = ["left_out"]
@@ -20,9 +21,10 @@ _RIDGE = 1e-9
 
 
 def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[Key, Residual]:
-    """Residuals of each recording under the fit that the other recordings would have given.
+    """Residuals of each recording under the fit that the other recordings would have given; of a
+    single recording each piece of its time under the fit that the other pieces would have given.
 
-    One Gauss-Newton step away from the common fit for each recording, with the sensitivities that
+    One Gauss-Newton step away from the common fit for each of them, with the sensitivities that
     the fit ended with (as the leverage of a sample gives its deleted residual: Cook & Weisberg
     1982). What only the recording itself tells of the parameters, such as the size of a leak where
     one recording alone holds the pressure, is taken from it: the others say nothing for or against
@@ -40,41 +42,88 @@ def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[
     Returns
     -------
     dict of (str, str) to Residual
-        By block and recording; the fit's own where there is one recording only, or sensitivities
-        are not known of all parameters.
+        By block and recording; the fit's own where sensitivities are not known of all parameters.
     """
     names = list(found.values)
-    known = all(
-        r.jacobian is not None and r.jacobian.shape[1] == len(names)
-        for r in found.residuals.values()
-    )
-    if len(problem.recordings) < 2 or not known or not names:
+    found = _with_sensitivities(problem, found)
+    if not names or not _knows_all(found):
         return found.residuals
-    scales = np.array([found.scales[name] for name in names])
-    normals, gradients = [], []
-    for prepared in problem.recordings:
-        rows, slope = stacked(replace(problem, recordings=[prepared]), found.residuals, inflation)
-        assert slope is not None
-        scaled = slope * scales
-        normals.append(scaled.T @ scaled)
-        gradients.append(scaled.T @ rows)
-    total = np.sum(normals, axis=0) + np.diag(
+    # what happens at times of its own has its own size as a scale
+    scales = np.array([found.scales.get(n) or abs(found.values[n]) or 1.0 for n in names])
+    parts = _parts(problem, found)
+    sums = [_sums(problem, found, inflation, scales, part) for part in parts]
+    total = np.sum([normal for normal, _ in sums], axis=0) + np.diag(
         [1.0 if name in found.held_by_prior else 0.0 for name in names]
     )
     total += _RIDGE * np.diag(np.maximum(np.diag(total), _RIDGE))
     root = np.linalg.inv(np.linalg.cholesky(total))
     out = dict(found.residuals)
     alone = problem.settings.fit.sole_source
-    for prepared, normal, gradient in zip(problem.recordings, normals, gradients, strict=True):
-        # in these coordinates all recordings together tell one unit of every direction, and
-        # `shares` of it come from this one
+    for part, (normal, gradient) in zip(parts, sums, strict=True):
+        # in these coordinates all parts together tell one unit of every direction, and `shares` of
+        # it come from this one
         shares, turn = np.linalg.eigh(root @ normal @ root.T)
         step = turn.T @ (root @ gradient)
         moved = np.where(shares < alone, step / np.maximum(1.0 - shares, 1.0 - alone), 0.0)
         change = root.T @ (turn @ moved) * scales
-        for block in problem.blocks:
-            key = (block.name, prepared.recording.name)
+        for key, there in part.items():
             own = found.residuals[key]
             assert own.jacobian is not None
-            out[key] = replace(own, value=own.value - own.jacobian @ change)
+            value = out[key].value.copy()
+            value[there] = own.value[there] - own.jacobian[there] @ change
+            out[key] = replace(own, value=value)
     return out
+
+
+def _knows_all(found: Fit) -> bool:
+    """Whether a fit has the sensitivities to all of its parameters."""
+    return all(
+        r.jacobian is not None and r.jacobian.shape[1] == len(found.values)
+        for r in found.residuals.values()
+    )
+
+
+def _with_sensitivities(problem: Problem, found: Fit) -> Fit:
+    """A fit with the sensitivities of a single recording, where what happens in it at times of its
+    own was fitted without them; of several recordings each has happenings of its own.
+    """
+    if len(problem.recordings) > 1 or _knows_all(found):
+        return found
+    return replace(found, residuals=residuals(problem, found.rig, list(found.values), found.events))
+
+
+def _parts(problem: Problem, found: Fit) -> list[dict[Key, slice]]:
+    """Samples that are left out together, by block and recording."""
+    sizes = {key: r.value.size for key, r in found.residuals.items()}
+    if len(problem.recordings) > 1:
+        return [
+            {key: slice(0, size) for key, size in sizes.items() if key[1] == p.recording.name}
+            for p in problem.recordings
+        ]
+    (only,) = problem.recordings
+    width = bin_width(only, problem.settings.noise.fit_bin_time)
+    count = problem.settings.fit.pieces_left_out
+    ends = [width * round(k / count * (only.n // width)) for k in range(count)] + [only.n]
+    return [
+        {key: slice(first, last) for key in sizes}
+        for first, last in itertools.pairwise(ends)
+        if last > first
+    ]
+
+
+def _sums(
+    problem: Problem, found: Fit, inflation: dict[str, float], scales: Array, part: dict[Key, slice]
+) -> tuple[Array, Array]:
+    """Normal matrix and gradient of what a part tells."""
+    within = {}
+    for key, there in part.items():
+        own = found.residuals[key]
+        assert own.jacobian is not None
+        kept = np.zeros_like(own.rows)
+        kept[there] = own.rows[there]
+        within[key] = replace(own, rows=kept)
+    recordings = [p for p in problem.recordings if any(p.recording.name == r for _, r in part)]
+    rows, slope = stacked(replace(problem, recordings=recordings), within, inflation)
+    assert slope is not None
+    scaled = slope * scales
+    return scaled.T @ scaled, scaled.T @ rows

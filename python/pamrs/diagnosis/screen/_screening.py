@@ -108,11 +108,15 @@ class Screen:
         Each effect's, from each of its starts.
     settings : ScreenSettings
         Sizes that are relied on.
+    strong : bool
+        Whether so much is left that signatures, linear in what a strong effect is not, rank effects
+        and no more.
     """
 
     stand: Stand
     signatures: list[Signature]
     settings: ScreenSettings
+    strong: bool = False
 
     def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
         """Every start of every effect, the most telling first.
@@ -224,7 +228,7 @@ def screen(
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
             looking.at([start for start in starts if start.form == form])
-    return Screen(looking.stand, looking.signatures, looking.settings)
+    return Screen(looking.stand, looking.signatures, looking.settings, strong)
 
 
 @dataclass(frozen=True, eq=False)

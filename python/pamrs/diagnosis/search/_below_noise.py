@@ -84,7 +84,7 @@ def below_noise(
     if trial.same:
         return None
     start, settings = quiet.candidates[0], trial.settings.below_noise
-    autocorrelation = trial.autocorrelation(start.fit)
+    autocorrelation = _with_stated(trial, trial.autocorrelation(start.fit))
     screened = screen(
         trial.inner, start.fit, acting, autocorrelation, sealed=trial.nominal.model["valve"] is None
     )
@@ -117,6 +117,17 @@ def below_noise(
         return None
     often = inclusion(screened, settings.least_gain, 1.0, trial.settings) if found.shown else {}
     return replace(_group(found, quiet, starts, trial), inclusion=often)
+
+
+def _with_stated(trial: Attempts, autocorrelation: dict[str, float]) -> dict[str, float]:
+    """Weights of the noise's autocorrelation, and of the error that the rig file states: what lies
+    inside it is no signature of anything.
+    """
+    stated = {
+        name: max(level.stated for (block, _), level in trial.noise_level.items() if block == name)
+        for name in autocorrelation
+    }
+    return {name: weight / (1.0 - stated[name]) for name, weight in autocorrelation.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from pamrs.diagnosis.evidence import (
     Candidate,
     Group,
     Ranges,
+    doubted,
     explains,
     probability_cap,
     same_recordings,
@@ -21,14 +22,31 @@ from pamrs.diagnosis.evidence import (
     weigh,
     without_autocorrelation,
 )
-from pamrs.diagnosis.fit import Fit, Key, Problem, Start, acts_in, depends, fits, form_in, residuals
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    depends,
+    fits,
+    form_in,
+    predicted_with_doubt,
+    residuals,
+)
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._sets import beside_wrong, left_everywhere, settles, several
+from pamrs.diagnosis.search._sets import (
+    beside_wrong,
+    left_everywhere,
+    settles,
+    several,
+    without_needless,
+)
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
 from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
@@ -147,12 +165,19 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
     least, hint = settings.search.held_out_ratio, settings.search.fitted_hint
-    apart = [
-        b
-        for b in blocks
-        if significant(out[b.name], least) and now[b.name].ratio > hint and not same
-    ]
-    suspects = [b for b in blocks if significant(now[b.name]) or b in apart]
+
+    def held_out_alone(found: dict[str, Excess]) -> list[Block]:
+        return [
+            b
+            for b in blocks
+            if significant(found[b.name], least) and now[b.name].ratio > hint and not same
+        ]
+
+    apart = held_out_alone(out)
+    if doubted(now, out, same=same):
+        out = kept(outer, predicted_with_doubt(outer, baseline))
+    there = held_out_alone(out)
+    suspects = [b for b in blocks if significant(now[b.name]) or b in there]
     trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
     return _Refit(trial, first, autocorrelation, was, Candidate((), baseline, out, now, 0.0), apart)
 
@@ -318,6 +343,12 @@ def _weighed(
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in ended if c.is_wrong(settings.fit.most_tolerances)]
         found = weights(candidates)
+        sets = [c for c in candidates if _odds(found, c) > settings.search.polish_from]
+        parts = without_needless(trial, candidates, sets, tell)
+        if parts:
+            kept = {frozenset(c.names) for c in parts}
+            candidates = [*(c for c in candidates if frozenset(c.names) not in kept), *parts]
+            found = weights(candidates)
     return candidates, found
 
 
@@ -465,7 +496,7 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     least = max(settings.least_gain, settings.least_gain_share * most)
-    chosen = [e for e, gain in gains.items() if gain > least][: settings.most_singles]
+    worth = [e for e, gain in gains.items() if gain > least]
     tell(
         "screened: "
         + (
@@ -473,17 +504,48 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
             or "no effect acts here"
         )
     )
-    white = trial.white
+    near = {
+        effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
+        if screened.strong or place < settings.effects_with_starts
+        else [s.start.scaled(s.size) for s in ranked[effect][:1]]
+        for place, effect in enumerate(worth)
+    }
+    chosen = worth[: settings.most_singles]
+    if screened.strong:
+        chosen, near = _shortlisted(trial, near, baseline)
+    alike = trial.settings.evidence.form_share_alike
     found = []
-    for place, effect in enumerate(chosen):
-        several = place < settings.effects_with_starts
-        near = _near(ranked[effect], settings) if several else ranked[effect][:1]
-        tried = [trial.fitted([s.start.scaled(s.size)], baseline, white) for s in near]
+    for effect in chosen:
+        tried = [trial.fitted([start], baseline, trial.white) for start in near[effect]]
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            alike = trial.settings.evidence.form_share_alike
             found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
     return found
+
+
+def _shortlisted(
+    trial: Attempts, near: dict[str, list[Start]], baseline: Fit
+) -> tuple[list[str], dict[str, list[Start]]]:
+    """Of many effects those that leave least after a few steps from each of their starts, and where
+    the best of these steps led.
+
+    Signatures rank strong effects and rule none out: they are linear in what a strong effect is
+    not.
+    """
+    settings = trial.settings.search
+    short: dict[str, list[Candidate]] = {}
+    for effect in list(near)[: settings.most_strong_singles]:
+        tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
+        short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
+    best = sorted((e for e in short if short[e]), key=lambda e: short[e][0].misfit)
+    starts = {}
+    for place, effect in enumerate(best):
+        # of the leading effects every form may yet be the one that leaves least
+        forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
+        kept = sorted(forms.values(), key=lambda c: c.misfit)
+        count = settings.most_forms if place < settings.effects_with_starts else 1
+        starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
+    return best[: settings.most_singles], starts
 
 
 def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:

@@ -16,7 +16,7 @@ from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
 
-__all__ = ["beside_wrong", "left_everywhere", "settles", "several"]
+__all__ = ["beside_wrong", "left_everywhere", "settles", "several", "without_needless"]
 
 Say = Callable[[str], None]
 
@@ -214,6 +214,46 @@ def _beside(
         if partner is not None and (single.effects[0], partner) not in found:
             found.append((single.effects[0], partner))
     return found
+
+
+def without_needless(
+    trial: Attempts, candidates: list[Candidate], sets: list[Candidate], tell: Say
+) -> list[Candidate]:
+    """Sets with one term fewer that leave nearly as little, fitted from where the larger one is.
+
+    A fit of the smaller set from elsewhere may have ended in a hollow of its own, so that the
+    larger one seems to be asked for.
+
+    Parameters
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels.
+    candidates : list of Candidate
+        Every hypothesis that was fitted.
+    sets : list of Candidate
+        Those whose terms are taken out, one at a time.
+    tell : callable
+        Receives progress.
+
+    Returns
+    -------
+    list of Candidate
+        Those that leave less than the fits of the same names before, at most one for each.
+    """
+    share = trial.settings.search.further_share
+    known = {frozenset(c.names): c.misfit for c in candidates}
+    found: dict[frozenset[str], Candidate] = {}
+    for larger in (c for c in sets if len(c.names) > 1 and c.fit.events is None):
+        for needless in larger.names:
+            names = frozenset(larger.names) - {needless}
+            if (1.0 - share) * known.get(names, math.inf) < larger.misfit:
+                continue
+            tell(f"trying {' + '.join(sorted(names))} from {' + '.join(sorted(larger.names))}")
+            smaller = trial.without(larger, needless)
+            if smaller is not None and smaller.misfit < known.get(names, math.inf):
+                found[names], known[names] = smaller, smaller.misfit
+    walls = trial.settings.fit.most_tolerances
+    return [c for c in found.values() if c.is_wrong(walls)]
 
 
 def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -86,7 +86,11 @@ def _kind(name: str) -> str:
 
 
 def freed(
-    trial: Attempts, baseline: Fit, first: Fit, say: Callable[[str], None]
+    trial: Attempts,
+    baseline: Fit,
+    first: Fit,
+    say: Callable[[str], None],
+    share: float | None = None,
 ) -> list[Candidate]:
     """The suspected parameters, each freed and fitted, and the pairs of the largest gain predicted
     by the linear model.
@@ -105,6 +109,9 @@ def freed(
         The same with white noise.
     say : callable
         Receives progress.
+    share : float, optional
+        Of the sum of squares, below which a step is not worth it; 0 where the last few units of
+        chi-square count.
     """
     settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
     suspects = [
@@ -121,7 +128,7 @@ def freed(
     ]
     found = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
-    for names, candidate in _tried(trial, sets, baseline, say).items():
+    for names, candidate in _tried(trial, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
             found.append(replace(candidate, gain=gains[names]))
     return found
@@ -158,18 +165,36 @@ def _promising(
 
 
 def _tried(
-    trial: Attempts, sets: list[tuple[str, ...]], baseline: Fit, say: Callable[[str], None]
+    trial: Attempts,
+    sets: list[tuple[str, ...]],
+    baseline: Fit,
+    say: Callable[[str], None],
+    share: float | None,
 ) -> dict[tuple[str, ...], Candidate | None]:
     """Each set of parameters freed: those that leave least after a few steps are fitted to their
     end, the others come as they are.
     """
     most = trial.settings.wrong_parameters.most_finished
     if len(sets) <= most:
-        return {names: trial.freed(names, baseline) for names in sets}
+        return {names: trial.freed(names, baseline, share) for names in sets}
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
     short = {names: c for names in sets if (c := trial.freed_shortly(names)) is not None}
-    best = sorted(short, key=lambda names: short[names].misfit)[:most]
-    return {n: trial.freed(n, baseline) if n in best else c for n, c in short.items()}
+    worth = [names for names in short if not _needless(names, short, trial)]
+    best = sorted(worth, key=lambda names: short[names].misfit)[:most]
+    if best and not any(significant(e) for e in short[best[0]].fitted.values()):
+        # what leaves much more than one that leaves noise does not get there
+        near = trial.settings.wrong_parameters.near_misfit * short[best[0]].misfit
+        best = [names for names in best if short[names].misfit <= near]
+    return {n: trial.freed(n, baseline, share) if n in best else c for n, c in short.items()}
+
+
+def _needless(
+    names: tuple[str, ...], short: Mapping[tuple[str, ...], Candidate], trial: Attempts
+) -> bool:
+    """Whether one of several parameters, freed by itself, leaves nearly as little."""
+    alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
+    share = trial.settings.search.further_share
+    return any((1.0 - share) * own < short[names].misfit for own in alone)
 
 
 def _predicted_gain(
@@ -233,7 +258,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     group found, by what they lose.
     """
     start = quiet.candidates[0]
-    found = freed(trial, start.fit, start.fit, say)
+    found = freed(trial, start.fit, start.fit, say, share=0.0)
     shown = [
         c
         for c in found

@@ -176,6 +176,13 @@ class FitSettings(SettingsGroup):
         "only source, so that the others cannot predict it",
         origin="judgement; leverage as in Cook & Weisberg (1982)",
     )
+    pieces_left_out: int = setting(
+        5,
+        unit="count",
+        least=2,
+        reason="pieces of a single recording, each predicted by the others",
+        origin="docs/decisions/0062",
+    )
 
 
 @dataclass(frozen=True)

@@ -92,6 +92,21 @@ class SearchSettings(SettingsGroup):
         reason="single effects that are fitted",
         origin="docs/decisions/0013",
     )
+    most_strong_singles: int = setting(
+        12,
+        unit="count",
+        least=1,
+        reason="single effects that are fitted in a few steps where a mismatch is strong, so that "
+        "signatures rank them and rule none out",
+        origin="docs/decisions/0058",
+    )
+    first_evaluations: int = setting(
+        5,
+        unit="count",
+        least=2,
+        reason="evaluations of such a fit",
+        origin="docs/decisions/0058",
+    )
     near_start: float = setting(
         0.6,
         unit="1",
@@ -350,6 +365,14 @@ class WrongParameterSettings(SettingsGroup):
         least=1,
         reason="freed parameters, and pairs of them, that are fitted to their end",
         origin="judgement; docs/decisions/0031",
+    )
+    near_misfit: float = setting(
+        2.0,
+        unit="1",
+        least=1.0,
+        reason="times the sum of squares of a freed parameter that leaves noise up to which others "
+        "are fitted to their end beside it",
+        origin="judgement",
     )
     far_tolerances: float = setting(
         2.0,

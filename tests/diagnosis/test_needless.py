@@ -1,0 +1,92 @@
+"""Terms that are not needed are taken out again; a file that states its error has no faint
+signatures inside it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts, Candidate
+from pamrs.diagnosis.fit import Problem, fit, starts_of
+from pamrs.diagnosis.noise import NoiseLevel, noise_levels
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.search._below_noise import _with_stated
+from pamrs.diagnosis.search._sets import without_needless
+from pamrs.diagnosis.search._wrong_parameters import _needless
+from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
+
+SETTINGS = DiagnosisSettings()
+RIG = pamrs.rigs.sealed_chamber()
+
+
+def attempts() -> Attempts:
+    """Two holds of a chamber that leaks, the second one held out."""
+    leaky = RIG.with_effect("leak_muscle", {"conductance": 3e-11})
+    kept = []
+    for seed, pressure in enumerate((7e5, 5e5)):
+        made = pamrs.simulate(
+            leaky, duration=60.0, sample_time=0.1, initial={"muscle_pressure": pressure}
+        )
+        channels = {"muscle_pressure": made["muscle_pressure"]}
+        recording = noisy("hold", "fit", 0.1, channels, {"muscle_pressure": 150.0}, [7, seed])
+        kept.append(prepare(recording, RIG, SETTINGS))
+    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
+    core = core_rig(RIG)
+    inner, outer = (Problem(blocks, [one], core, SETTINGS) for one in kept)
+    levels = noise_levels(inner, core_rig(leaky, core)) | noise_levels(outer, core_rig(leaky, core))
+    out = {
+        block.name: SimpleNamespace(ratio=9.0) for block in blocks
+    }  # what the baseline leaves: it only scales the gap that is closed
+    return Attempts(inner, outer, RIG, levels, cast("Any", out), blocks)
+
+
+def test_an_effect_that_does_nothing_is_taken_out_from_where_the_set_stands() -> None:
+    trial = attempts()
+    starts = [starts_of(effect, sealed=True)[0] for effect in ("leak_muscle", "heat_transfer")]
+    start = fit(trial.inner, RIG, (), {}, trial.white)
+    both = trial.fitted(starts, start, trial.white)
+    assert both is not None
+    alone = trial.fitted(starts[:1], start, trial.white)
+    assert alone is not None
+    told: list[str] = []
+    # a fit of the leak that ended in a hollow is replaced; that of heat, which leaves much, is not
+    hollow = replace(alone, fit=start, effects=("leak_muscle",))
+    found = without_needless(trial, [hollow, both], [both], told.append)
+    (leak,) = (c for c in found if c.names == ("leak_muscle",))
+    assert leak.misfit < 1.2 * both.misfit < 0.2 * hollow.misfit
+    assert leak.fit.values["leak_muscle.conductance"] == pytest.approx(3e-11, rel=0.05)
+    assert told[-1] == "trying leak_muscle from heat_transfer + leak_muscle"
+    # where the smaller set is known to leave as little nothing is tried
+    told.clear()
+    without_needless(trial, [leak, both], [both], told.append)
+    assert not any(text.startswith("trying leak_muscle from") for text in told)
+
+
+def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
+    def left(misfit: float) -> Candidate:
+        return cast("Candidate", SimpleNamespace(misfit=misfit))
+
+    trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
+    share = SETTINGS.search.further_share
+    short = {("a",): left(100.0), ("b",): left(300.0), ("a", "b"): left(101.0 * (1.0 - share))}
+    assert _needless(("a", "b"), short, trial)
+    assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, trial)
+    assert not _needless(("a",), short, trial)
+    assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, trial)
+
+
+def test_what_lies_inside_the_stated_error_counts_less() -> None:
+    levels = {
+        ("supply", "one"): NoiseLevel(1.0, 1.0, 0.0, 0.75),
+        ("supply", "two"): NoiseLevel(1.0, 1.0, 0.0, 0.5),
+        ("chamber", "one"): NoiseLevel(1.0, 1.0),
+    }
+    trial = cast("Attempts", SimpleNamespace(noise_level=levels))
+    assert _with_stated(trial, {"supply": 2.0, "chamber": 3.0}) == {"supply": 8.0, "chamber": 3.0}
