@@ -12,10 +12,10 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, weigh
-from pamrs.diagnosis.fit import Fit
+from pamrs.diagnosis.evidence import Candidate, share_left, weigh
+from pamrs.diagnosis.fit import Events, Fit
 from pamrs.diagnosis.noise import Excess
-from pamrs.diagnosis.prepare import available_blocks
+from pamrs.diagnosis.prepare import Block, available_blocks
 from pamrs.recordings import Recording
 
 SETTINGS = DiagnosisSettings()
@@ -137,19 +137,20 @@ def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candida
     return Candidate(effects, fit, ratio, ratio, 0.0)
 
 
+def chamber() -> list[Block]:
+    """The chamber of a shoulder."""
+    names = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
+    blocks = available_blocks(pamrs.rigs.shoulder(), names, SETTINGS.prepare)
+    return [block for block in blocks if block.name == "chamber"]
+
+
 def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float]:
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of
     recordings of 30 s.
     """
-    rig = pamrs.rigs.shoulder()
-    blocks = available_blocks(
-        rig,
-        ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"),
-        SETTINGS.prepare,
-    )
     return weigh(
         [start or candidate((), 10.0), *sets],
-        [b for b in blocks if b.name == "chamber"],
+        chamber(),
         0.985,
         30.0,
         SETTINGS,
@@ -239,6 +240,26 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
     assert named(0.0, 0.65) > 0.9  # scatter of a noise level
     assert named(0.0, 20.0) < 0.1  # a mismatch of its own making
     assert named(13.0, 0.1) < 0.1  # it explains nothing
+
+
+def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
+    # their times and sizes were found in both, so that neither is a prediction
+    event = {"torque": 4.0, "time": 3.0, "duration": 1.0}
+    events = Events("external_torque", {"run": event})
+
+    def left(fitted: float, held: float, happened: Events | None) -> Candidate:
+        found = candidate(("external_torque",), fitted)
+        ratio = {"chamber": Excess(1.0 + held, 0.0, 0.0, 1.0, 1.0, LIMIT)}
+        return replace(found, held_out=ratio, fit=replace(found.fit, events=happened))
+
+    start = left(60.0, 20000.0, None)
+
+    def share(fitted: float, happened: Events | None) -> float:
+        return share_left(left(fitted, 120.0, happened), start, chamber(), SETTINGS.evidence)
+
+    assert share(16.0, None) == share(0.3, None) == pytest.approx(0.006)
+    assert share(0.3, events) == pytest.approx(0.006)
+    assert share(16.0, events) == pytest.approx(16.0 / 60.0)
 
 
 @pytest.mark.slow
