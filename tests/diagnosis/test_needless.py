@@ -16,7 +16,8 @@ from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Problem, fit, starts_of
 from pamrs.diagnosis.noise import NoiseLevel, noise_levels
 from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.diagnosis.search._below_noise import _with_stated
+from pamrs.diagnosis.screen import Stand
+from pamrs.diagnosis.search._below_noise import _by_chance
 from pamrs.diagnosis.search._sets import without_needless
 from pamrs.diagnosis.search._wrong_parameters import _needless
 from pamrs.simulation import core_rig
@@ -82,11 +83,14 @@ def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
     assert not _needless(("b", "c"), short | {("b", "c"): left(100.0)}, trial)
 
 
-def test_what_lies_inside_the_stated_error_counts_less() -> None:
+def test_a_signature_has_a_share_of_the_stated_error_by_chance() -> None:
     levels = {
         ("supply", "one"): NoiseLevel(1.0, 1.0, 0.0, 0.75),
-        ("supply", "two"): NoiseLevel(1.0, 1.0, 0.0, 0.5),
         ("chamber", "one"): NoiseLevel(1.0, 1.0),
     }
-    trial = cast("Attempts", SimpleNamespace(noise_level=levels))
-    assert _with_stated(trial, {"supply": 2.0, "chamber": 3.0}) == {"supply": 8.0, "chamber": 3.0}
+    trial = cast("Attempts", SimpleNamespace(noise_level=levels, settings=SETTINGS))
+    stand = cast("Stand", SimpleNamespace(power_left=400.0))
+    share = SETTINGS.below_noise.stated_share
+    assert _by_chance(trial, stand) == pytest.approx(share * 0.75 * 400.0)
+    quiet = cast("Attempts", SimpleNamespace(noise_level={}, settings=SETTINGS))
+    assert _by_chance(quiet, stand) == 0.0

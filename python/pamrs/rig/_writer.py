@@ -192,7 +192,8 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
             for effect in model["effects"]
         ],
     }
-    return json.dumps(document)
+    bears = model.get("limits", {}).get("max_pressure")
+    return json.dumps(document if bears is None else {**document, "max_pressure": bears})
 
 
 def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:

@@ -36,10 +36,13 @@ class Event(NamedTuple):
     time : float
         When [s], by a straight line through the step in which it happened.
     kind : str
-        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``, ``choked``
-        or ``unchoked``.
+        ``min_stop_reached``, ``min_stop_left``, ``max_stop_reached``, ``max_stop_left``;
+        ``choked``, ``unchoked``; ``vacuum_reached`` and ``vacuum_left`` (a chamber falls 50 mbar
+        below the ambient pressure, and no longer is there); ``max_pressure_passed`` and
+        ``max_pressure_kept`` (it rises above ``limits.max_pressure`` of the rig file, and is below
+        it again).
     block : str
-        Where: ``joint.elbow``, ``load``, ``valve.flexor``, ``line``.
+        Where: ``joint.elbow``, ``load``, ``chamber``, ``valve.flexor``, ``line``.
     """
 
     time: float
@@ -235,7 +238,21 @@ class Simulation(Mapping[str, Array]):
             ]
             often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
             said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
-        return "\n".join([*said, *self._fallen(), str(self.balance)])
+        return "\n".join([*said, *self._beyond(), *self._fallen(), str(self.balance)])
+
+    def _beyond(self) -> list[str]:
+        """Joints that were pressed far into a stop."""
+        said = []
+        for name, joint in self.rig.tables("joint").items():
+            angle = self._channels[dotted("joint_angle", name)]
+            ends = (("lower", joint["min_angle"] - angle), ("upper", angle - joint["max_angle"]))
+            for end, beyond in ends:
+                most = math.degrees(float(beyond.max()))
+                if most > _TELLING_DEGREES:
+                    said.append(
+                        f"{dotted('joint', name)}: up to {most:.3g} deg beyond its {end} stop"
+                    )
+        return said
 
     def _fallen(self) -> list[str]:
         """Joints that end on their lower stop although their muscles are under pressure."""
@@ -547,6 +564,7 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 #: Numbers that one run may keep: 2 GB.
 MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
+_TELLING_DEGREES = 1.0
 #: Channels of the core that are sums since the start.
 _BALANCES = (
     "mass_supplied",

@@ -319,6 +319,9 @@ pub struct RigSpec {
     pub sensors: Vec<SensorSpec>,
     #[serde(default)]
     pub effects: Vec<EffectSpec>,
+    /// What chambers and muscles bear [Pa, gauge], where it is known.
+    #[serde(default)]
+    pub max_pressure: Option<f64>,
 }
 
 impl RigSpec {

@@ -363,6 +363,10 @@ impl Rig {
             add(name, StateRole::Flag);
             add(name, StateRole::Flag);
         }
+        for chamber in self.spec.chambers.iter().map(|c| dotted("chamber", &c.name)) {
+            add(&chamber, StateRole::Flag);
+            add(&chamber, StateRole::Flag);
+        }
         let valves = self.spec.valves.iter().map(|v| dotted("valve", &v.name));
         for name in valves.chain(self.spec.lines.iter().map(|l| dotted("line", &l.name))) {
             add(&name, StateRole::Flag);

@@ -1,4 +1,5 @@
-//! What happens in an instant: a stop is reached or left, a flow becomes choked or no longer is.
+//! What happens in an instant: a stop is reached or left, a flow becomes choked or no longer is, a
+//! chamber falls below the ambient pressure or rises above what it bears.
 
 use crate::description::dotted;
 use crate::plant::Rig;
@@ -11,6 +12,11 @@ pub enum Kind {
     StopReached(bool),
     /// The lower (false) or upper (true) stop is left.
     StopLeft(bool),
+    /// A chamber falls clearly below the ambient pressure (false) or rises above the largest one
+    /// that the stand allows (true).
+    PressurePassed(bool),
+    /// It no longer is there.
+    PressureBack(bool),
     /// A flow becomes choked.
     Choked,
     /// A flow is no longer choked.
@@ -25,6 +31,10 @@ impl Kind {
             Self::StopReached(true) => "max_stop_reached",
             Self::StopLeft(false) => "min_stop_left",
             Self::StopLeft(true) => "max_stop_left",
+            Self::PressurePassed(false) => "vacuum_reached",
+            Self::PressurePassed(true) => "max_pressure_passed",
+            Self::PressureBack(false) => "vacuum_left",
+            Self::PressureBack(true) => "max_pressure_kept",
             Self::Choked => "choked",
             Self::Unchoked => "unchoked",
         }
@@ -38,18 +48,22 @@ pub struct Event {
     pub time: f64,
     /// What happened.
     pub kind: Kind,
-    /// Where: `joint.elbow`, `load`, `valve.flexor`, `line`.
+    /// Where: `joint.elbow`, `load`, `chamber`, `valve.flexor`, `line`.
     pub block: String,
 }
+
+/// How far below the ambient pressure a chamber has a vacuum [Pa]: a muscle that is stretched while
+/// it is vented dips a little.
+const VACUUM: f64 = 5e3;
 
 /// What an event's condition is found from.
 #[derive(Debug, Clone, Copy)]
 enum Condition {
     /// Nothing that changes.
     Still(f64),
-    /// How far a coordinate is below its lower stop: place among the states and limit.
+    /// How far a state is below a limit: its place and the limit.
     Below(usize, f64),
-    /// The same above its upper stop.
+    /// The same above one.
     Above(usize, f64),
     /// Critical less actual ratio of two pressures: positive when choked.
     Flow(Pressure, Pressure, f64),
@@ -75,12 +89,15 @@ impl Condition {
     }
 }
 
-/// The conditions of events under some controls: both stops of each coordinate, then each flow.
+/// The conditions of events under some controls: both stops of each coordinate, both limits of each
+/// chamber's pressure, then each flow.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Conditions {
     each: Vec<Condition>,
     /// How many of them are of stops.
     stops: usize,
+    /// How many of them are of stops and of pressures.
+    limits: usize,
 }
 
 impl Conditions {
@@ -99,6 +116,16 @@ impl Conditions {
             }
         }
         self.stops = self.each.len();
+        let ambient = rig.gas.ambient_pressure;
+        for chamber in 0..rig.wiring.chambers {
+            let place = rig.layout.pressure(chamber);
+            self.each.push(Condition::Below(place, ambient - VACUUM));
+            self.each.push(match rig.spec().max_pressure {
+                Some(most) => Condition::Above(place, ambient + most),
+                None => Condition::Still(f64::NEG_INFINITY),
+            });
+        }
+        self.limits = self.each.len();
         self.each.extend(plant.passages(controls).map(|(ends, critical)| match ends {
             Some((one, other)) => Condition::Flow(one, other, critical),
             None => Condition::Still(critical - 1.0),
@@ -110,15 +137,16 @@ impl Conditions {
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Watch {
     margins: Vec<f64>,
-    /// How many of them are of stops.
+    /// How many of them are of stops, and of stops and pressures.
     stops: usize,
+    limits: usize,
 }
 
 impl Watch {
     /// Look at a state, place by place.
     #[inline]
     pub fn look(&mut self, conditions: &Conditions, at: impl Fn(usize) -> f64) {
-        self.stops = conditions.stops;
+        (self.stops, self.limits) = (conditions.stops, conditions.limits);
         self.margins.clear();
         self.margins.extend(conditions.each.iter().map(|condition| condition.margin(&at)));
     }
@@ -160,25 +188,30 @@ impl Watch {
 
     fn kind(&self, k: usize, now: bool) -> Kind {
         let upper = k % 2 == 1;
-        match (k < self.stops, now) {
-            (true, true) => Kind::StopReached(upper),
-            (true, false) => Kind::StopLeft(upper),
-            (false, true) => Kind::Choked,
-            (false, false) => Kind::Unchoked,
+        match (k < self.stops, k < self.limits, now) {
+            (true, _, true) => Kind::StopReached(upper),
+            (true, _, false) => Kind::StopLeft(upper),
+            (_, true, true) => Kind::PressurePassed(upper),
+            (_, true, false) => Kind::PressureBack(upper),
+            (_, _, true) => Kind::Choked,
+            (_, _, false) => Kind::Unchoked,
         }
     }
 
     fn block(&self, rig: &Rig, k: usize) -> String {
-        let stops = self.stops;
+        let (stops, limits, spec) = (self.stops, self.limits, rig.spec());
         if k < stops {
             return rig.names.coordinates.get(k / 2).cloned().unwrap_or_default();
         }
-        let spec = rig.spec();
-        match spec.valves.get(k - stops) {
+        if k < limits {
+            let chamber = spec.chambers.get((k - stops) / 2);
+            return chamber.map_or_else(String::new, |c| dotted("chamber", &c.name));
+        }
+        match spec.valves.get(k - limits) {
             Some(valve) => dotted("valve", &valve.name),
             None => spec
                 .lines
-                .get(k - stops - spec.valves.len())
+                .get(k - limits - spec.valves.len())
                 .map_or_else(String::new, |l| dotted("line", &l.name)),
         }
     }

@@ -306,7 +306,9 @@ impl Progress {
             flags.push(coordinate.stops.is_some_and(|s| x < s.min_angle));
             flags.push(coordinate.stops.is_some_and(|s| x > s.max_angle));
         }
-        flags.extend(std::iter::repeat_n(false, rig.wiring.valves.len() + rig.wiring.lines.len()));
+        // what a run begins with does not happen in it; a pressure that is out of bounds does
+        let others = 2 * rig.wiring.chambers + rig.wiring.valves.len() + rig.wiring.lines.len();
+        flags.extend(std::iter::repeat_n(false, others));
         let readings = if plant.skewed() { gauges(rig).count() } else { 0 };
         let kept = if plant.delayed() { rig.names.inputs.len() + readings } else { 0 };
         Self { state, memory, flags, samples: 0, past: Vec::new(), kept }

@@ -33,7 +33,7 @@ from pamrs.diagnosis.fit import (
     stacked,
 )
 from pamrs.diagnosis.prepare import Residual
-from pamrs.diagnosis.screen import Screen, by_effect, inclusion, screen
+from pamrs.diagnosis.screen import Screen, Stand, by_effect, inclusion, screen
 from pamrs.errors import SimulationError
 
 __all__ = ["below_noise"]
@@ -84,13 +84,14 @@ def below_noise(
     if trial.same:
         return None
     start, settings = quiet.candidates[0], trial.settings.below_noise
-    autocorrelation = _with_stated(trial, trial.autocorrelation(start.fit))
+    autocorrelation = trial.autocorrelation(start.fit)
     screened = screen(
         trial.inner, start.fit, acting, autocorrelation, sealed=trial.nominal.model["valve"] is None
     )
     best = {effect: scores[0] for effect, scores in by_effect(screened.scores()).items()}
     gains = {effect: score.gain for effect, score in best.items()}
-    least = max(settings.least_gain, settings.rival_share * max(gains.values(), default=0.0))
+    needed = settings.least_gain + _by_chance(trial, screened.stand)
+    least = max(needed, settings.rival_share * max(gains.values(), default=0.0))
     chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][
         : settings.most_fitted
     ]
@@ -112,22 +113,20 @@ def below_noise(
             [begun.start], replace(against.fit, values=values), autocorrelation, share=0.0
         )
         if tried is not None:
-            _weigh(found, replace(tried, gain=gains.get(effect, 0.0)), begun, against, trial)
+            tried = replace(tried, gain=gains.get(effect, 0.0))
+            _weigh(found, tried, begun, against, trial, needed)
     if not found.shown and not found.eased:
         return None
     often = inclusion(screened, settings.least_gain, 1.0, trial.settings) if found.shown else {}
     return replace(_group(found, quiet, starts, trial), inclusion=often)
 
 
-def _with_stated(trial: Attempts, autocorrelation: dict[str, float]) -> dict[str, float]:
-    """Weights of the noise's autocorrelation, and of the error that the rig file states: what lies
-    inside it is no signature of anything.
+def _by_chance(trial: Attempts, stand: Stand) -> float:
+    """Gain in chi-square that a signature has by chance where the rig file states an error of the
+    model: a smooth error has a share of any shape.
     """
-    stated = {
-        name: max(level.stated for (block, _), level in trial.noise_level.items() if block == name)
-        for name in autocorrelation
-    }
-    return {name: weight / (1.0 - stated[name]) for name, weight in autocorrelation.items()}
+    stated = max((level.stated for level in trial.noise_level.values()), default=0.0)
+    return trial.settings.below_noise.stated_share * stated * stand.power_left
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,10 +187,15 @@ def _finest(
 
 
 def _weigh(
-    found: _Found, tried: Candidate, begun: Begun, against: _Finest, trial: Attempts
+    found: _Found,
+    tried: Candidate,
+    begun: Begun,
+    against: _Finest,
+    trial: Attempts,
+    needed: float,
 ) -> None:
-    """Put a fitted effect among those that are found, if chi-square or priors and held-out
-    recordings speak for it.
+    """Put a fitted effect among those that are found, if chi-square (a gain of more than `needed`)
+    or priors and held-out recordings speak for it.
     """
     settings, autocorrelation = trial.settings.below_noise, against.autocorrelation
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
@@ -208,7 +212,7 @@ def _weigh(
     if odd > settings.log_odds:
         return  # it would have to have values that its physics hardly has
     cost = price(tried, trial.settings)
-    if gain > settings.least_gain and over > settings.held_out_share * gain:
+    if gain > needed and over > settings.held_out_share * gain:
         found.shown[tried] = (
             0.5 * settings.gain_weight * (gain + over) - settings.gain_weight * cost - odd
         )
