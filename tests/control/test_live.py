@@ -324,7 +324,11 @@ run_live(Device(), PID(2.0, period=0.01), step(0.3, 1.0, duration=30.0), safe=0.
 def test_a_signal_that_ends_the_program_leaves_the_safe_command(name):
     number = getattr(signal, name)
     with subprocess.Popen(
-        [sys.executable, "-c", TERMINATED], stdout=subprocess.PIPE, text=True
+        [sys.executable, "-c", TERMINATED],
+        stdout=subprocess.PIPE,
+        text=True,
+        # whoever runs the tests may ignore it (nohup), and a child would go on ignoring it
+        preexec_fn=lambda: signal.signal(number, signal.SIG_DFL),
     ) as child:
         first = [child.stdout.readline() for _ in range(5)]
         child.send_signal(number)

@@ -241,7 +241,9 @@ def without_needless(
         Those that leave less than the fits of the same names before, at most one for each.
     """
     share = trial.settings.search.further_share
-    known = {frozenset(c.names): c.misfit for c in candidates}
+    known: dict[frozenset[str], float] = {}
+    for c in candidates:
+        known[frozenset(c.names)] = min(c.misfit, known.get(frozenset(c.names), math.inf))
     found: dict[frozenset[str], Candidate] = {}
     for larger in (c for c in sets if len(c.names) > 1 and c.fit.events is None):
         for needless in larger.names:
