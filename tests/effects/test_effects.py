@@ -9,6 +9,7 @@ import pytest
 
 import pamrs
 from pamrs import _core
+from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import ACTS, starts_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
@@ -268,3 +269,37 @@ def test_a_transducer_at_the_valve_reads_what_the_air_leaves_in_the_tube() -> No
     assert np.abs(lead).max() > 1e3
     with pytest.raises(ParameterError, match=r"tap = 2"):
         pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"tap": 2.0})
+
+
+def test_a_dead_time_of_whole_samples_is_the_command_that_much_later() -> None:
+    plain = pamrs.rigs.shoulder()
+    late = plain.with_effect("input_path_lag", {"delay": 0.03}, form="dead_time")
+    shifted = np.concatenate([np.full(3, COMMAND[0]), COMMAND[:-3]])
+    one, two = (
+        pamrs.simulate(rig, command, sample_time=0.01, initial=START)
+        for rig, command in ((late, COMMAND), (plain, shifted))
+    )
+    for channel in ("muscle_pressure", "supply_pressure", "joint_angle"):
+        scale = float(np.ptp(two[channel]))
+        np.testing.assert_allclose(one[channel], two[channel], atol=1e-9 * scale)
+
+
+def test_a_dead_time_within_a_sample_lies_between_its_neighbours() -> None:
+    """The step in which the command changes sees the mean of both: second order in the step."""
+    plain = pamrs.rigs.shoulder()
+
+    def pressure(seconds: float) -> np.ndarray:
+        rig = plain.with_effect("input_path_lag", {"delay": seconds}, form="dead_time")
+        return pamrs.simulate(rig, COMMAND, sample_time=0.01, initial=START)["muscle_pressure"]
+
+    none, half, whole = pressure(0.0), pressure(0.005), pressure(0.01)
+    moved = np.abs(whole - none) > 0.2 * np.abs(whole - none).max()
+    share = (half - none)[moved] / (whole - none)[moved]
+    assert moved.sum() > 10
+    assert np.all((share > 0.2) & (share < 0.8))
+
+
+def test_a_linear_model_refuses_a_dead_time_of_the_valve() -> None:
+    rig = pamrs.rigs.shoulder().with_effect("input_path_lag", {"delay": 0.03}, form="dead_time")
+    with pytest.raises(ParameterError, match=r"delay = 0\.03 is not allowed"):
+        linearise(rig, 0.7)

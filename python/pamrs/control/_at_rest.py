@@ -38,7 +38,15 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
                 "of a linear model; set it to 0, and give it as the delay of the loop"
             )
     for effect in rig.effects:
-        kink = EFFECTS[effect["id"]].kink
+        info = EFFECTS[effect["id"]]
+        kink = info.kink
+        if "late" in info.form(effect.get("form", "")).ports:
+            kink = (
+                ("delay",),
+                "since its delay is no state of it; take it out, and give it as the delay of the "
+                "loop",
+                False,
+            )
         if kink is None:
             continue
         names, why, of_supplies = kink

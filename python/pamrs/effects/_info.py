@@ -103,8 +103,8 @@ class SameData:
 
     Attributes
     ----------
-    effect, parameter : str
-        The other effect, and its parameter that is then as large as ``size``.
+    effect, form, parameter : str
+        The other effect, its form, and its parameter that is then as large as ``size``.
     size : str
         The own parameter that is the effect's size; the two are the same where it is positive.
     without : str
@@ -116,6 +116,7 @@ class SameData:
     """
 
     effect: str
+    form: str
     parameter: str
     size: str
     without: str

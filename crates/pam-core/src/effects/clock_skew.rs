@@ -27,6 +27,7 @@ pub const INFO: EffectInfo = EffectInfo {
     }),
     same_data: Some(SameData {
         effect: "input_path_lag",
+        form: "dead_time",
         parameter: "delay",
         size: "offset",
         without: "rate",

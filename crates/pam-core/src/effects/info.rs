@@ -312,6 +312,8 @@ pub struct Form {
 pub struct SameData {
     /// The other effect.
     pub effect: &'static str,
+    /// Its form.
+    pub form: &'static str,
     /// Its parameter that is then as large as `size`.
     pub parameter: &'static str,
     /// The own parameter that is the effect's size; the two are the same where it is positive.

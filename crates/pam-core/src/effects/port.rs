@@ -53,6 +53,8 @@ pub enum Port {
     Encoder,
     /// The clock of what is recorded.
     Clock,
+    /// Valve: how late it sees its command.
+    Late,
 }
 
 impl Port {
@@ -374,6 +376,11 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// [`Port::Clock`]: how late pressures and angles are recorded at a time [s].
     fn clock(&self, _time: f64) -> (S, S) {
         (constant(0.0), constant(0.0))
+    }
+
+    /// [`Port::Late`]: how late a valve sees its command [s].
+    fn late(&self) -> S {
+        constant(0.0)
     }
 
     /// Write the rates of states that [`Self::follow`] or [`Self::read`] moves in closed form,

@@ -67,7 +67,9 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// Whether some command acts later than it is recorded.
     pub fn delayed(&self) -> bool {
-        self.skewed() || self.dead_time() > 0.0
+        // a dead time of zero has a slope too
+        let late = self.wiring.ports.late.iter().any(|acting| !acting.is_empty());
+        self.skewed() || late || self.dead_time() > 0.0
     }
 
     /// Whether regulators follow their commands at once, and as fast as their lag lets them.
@@ -75,9 +77,17 @@ impl<S: Scalar> Plant<'_, S> {
         self.supplies.iter().all(Supply::first_order)
     }
 
-    /// The longest dead time of a regulator [s].
+    /// The longest dead time of a regulator or of a valve [s].
     pub fn dead_time(&self) -> f64 {
-        self.supplies.iter().map(|supply| supply.dead_time().re()).fold(0.0, f64::max)
+        let regulators = self.supplies.iter().map(|supply| supply.dead_time().re());
+        let valves = (0..self.wiring.valves.len()).map(|k| self.late(k).re());
+        regulators.chain(valves).fold(0.0, f64::max)
+    }
+
+    /// How late a valve sees its command [s].
+    fn late(&self, valve: usize) -> S {
+        let acting = self.wiring.ports.late[valve].iter();
+        acting.fold(constant(0.0), |sum, acting| sum + self.effect(acting).late())
     }
 
     /// How late pressures and angles are recorded at a time [s]; negative where their clock is
@@ -90,8 +100,8 @@ impl<S: Scalar> Plant<'_, S> {
         })
     }
 
-    /// Commands over a step that begins at a time [s], later by a shift [s] and by the regulators'
-    /// dead times; `command` gives those of a sample.
+    /// Commands over a step that begins at a time [s], later by a shift [s] and by the dead times of
+    /// valves and regulators; `command` gives those of a sample.
     #[allow(clippy::too_many_arguments)]
     pub fn delayed_controls(
         &self,
@@ -104,8 +114,8 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         let wiring = &self.wiring;
         self.command(|_| 0.0, controls);
-        let held = Held::over(time, step, sample_time, shift);
         for (k, spool) in controls.spool.iter_mut().enumerate() {
+            let held = Held::over(time, step, sample_time, shift + self.late(k));
             *spool = self.opened(k, held.mean(|sample| self.commanded(k, command(k, sample))));
         }
         let mut input = wiring.valves.len();

@@ -66,6 +66,7 @@ pub(crate) struct Ports {
     pub all: Vec<(Place, Acting)>,
     /// Of each valve.
     pub command: Vec<Vec<Acting>>,
+    pub late: Vec<Vec<Acting>>,
     pub area: Vec<Option<Acting>>,
     pub passage: Vec<Option<Acting>>,
     pub flows: Vec<(Flow, Acting)>,
@@ -191,6 +192,7 @@ pub(super) fn switch_on(
 ) -> Result<()> {
     let mut ports = Ports {
         command: vec![Vec::new(); wiring.valves.len()],
+        late: vec![Vec::new(); wiring.valves.len()],
         area: vec![None; wiring.valves.len()],
         passage: vec![None; wiring.valves.len()],
         feed: vec![Vec::new(); wiring.supplies.len()],
@@ -424,6 +426,7 @@ impl Ports {
         self.needs_states(port, acting)?;
         let taken = match (port, place) {
             (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
+            (Port::Late, Place::Valve(k)) => push(&mut self.late[k], acting),
             (Port::Area, Place::Valve(k)) => self.area[k].replace(acting),
             (Port::Passage, Place::Valve(k)) => {
                 let gas = wiring.valves[k].to;

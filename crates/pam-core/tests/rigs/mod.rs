@@ -291,6 +291,7 @@ pub const FORMS: &[Typical] = &[
         &[("time_constant", 0.012), ("time_constant_down", 0.025)],
         &[("time_constant", 0.0), ("time_constant_down", 0.0)],
     ),
+    formed("input_path_lag", "dead_time", &[("delay", 7.3e-3)], &[("delay", 0.0)]),
     formed(
         "muscle_hysteresis",
         "pressure_stops",

@@ -231,9 +231,11 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     persistent = [e for e in acting if EFFECTS[e].lasting]
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
+    # by the noise of the sensors, whatever error of the model the rig file states
     strong = any(
-        max(kept[b.name].ratio for kept in (now, trial.out)) > settings.search.strong_ratio
+        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > settings.search.strong_ratio
         for b in suspects
+        for kept in (now, trial.out)
     )
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed, strong=strong)
     terms = _Terms(
@@ -583,7 +585,20 @@ def _with_same_data(
     """The singles, and beside each that may be the same data as another effect (a late clock and a
     dead time) that other one.
     """
-    there = {c.effects for c in singles}
+    evidence = trial.settings.evidence
+
+    def left_by(candidate: Candidate) -> float:
+        return share_left(candidate, start, trial.suspects, evidence)
+
+    there = {c.effects: c for c in singles}
+
+    def wanted(effect: str, own: Candidate) -> bool:
+        """Whether an effect was not fitted, or only in a form that leaves more than its equal."""
+        fitted = there.get((effect,))
+        return fits(trial.nominal, effect) and (
+            fitted is None or left_by(fitted) > left_by(own) + evidence.form_share_alike
+        )
+
     found: list[Candidate] = []
     others: list[Candidate | None] = []
     for single in singles:
@@ -591,19 +606,13 @@ def _with_same_data(
         same = EFFECTS[effect].same_data
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
-        alike = same_recordings(own, effect, seconds, trial.settings.evidence)
-        possible = same is not None and fits(trial.nominal, same.effect)
-        if same is not None and possible and alike and (same.effect,) not in there:
-            others.append(_as_other(trial, start, own, same))
-        twins = [
-            i
-            for i in EFFECTS.values()
-            if i.same_data is not None
-            and i.same_data.effect == effect
-            and fits(trial.nominal, i.id)
-        ]
-        others += [_as_twin(trial, start, own, twin) for twin in twins if (twin.id,) not in there]
-    return [*found, *(c for c in others if c is not None)]
+        if same is not None and same_recordings(own, effect, seconds, evidence):
+            others += [_as_other(trial, start, own, same)] if wanted(same.effect, own) else []
+        twins = (
+            i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect
+        )
+        others += [_as_twin(trial, start, own, twin) for twin in twins if wanted(twin.id, own)]
+    return _one_of_each([*found, *(c for c in others if c is not None)])
 
 
 def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate:
@@ -626,9 +635,12 @@ def _as_other(
     trial: Attempts, start: Candidate, single: Candidate, same: SameData
 ) -> Candidate | None:
     """The other effect, as large as this one, where the two leave the same recordings."""
-    usual = {f"{same.effect}.{p.name}": p.default for p in EFFECTS[same.effect].parameters}
+    own = EFFECTS[same.effect].form(same.form).parameters
+    usual = {f"{same.effect}.{p.name}": p.default for p in own}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
-    return trial.fitted([Start(same.effect, usual, {}, (), False)], start.fit, trial.white)
+    return trial.fitted(
+        [Start(same.effect, usual, {}, (), False, same.form)], start.fit, trial.white
+    )
 
 
 def _as_twin(

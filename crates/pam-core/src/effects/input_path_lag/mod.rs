@@ -8,8 +8,9 @@
 //! 19, 2010), and no step is too long for it. The form is as commonly used for valves and their
 //! drivers.
 //!
-//! The forms `second_order`, `slew_limit` and `up_and_down` stand in files of their own.
+//! The forms `second_order`, `slew_limit`, `up_and_down` and `dead_time` stand in files of their own.
 
+mod dead_time;
 mod second_order;
 mod slew_limit;
 mod up_and_down;
@@ -21,16 +22,17 @@ use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
-/// Lag of a slow command, in every form.
+/// Lag of a slow command.
 const TIME_CONSTANT: EffectParameter =
     EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005).starts(&[0.003, 0.015]).off(0.0);
 
+/// How late the command comes.
+const DELAY: EffectParameter =
+    EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0);
+
 const LAG_AND_DELAY: Form = Form {
     name: "lag_and_delay",
-    parameters: &[
-        TIME_CONSTANT,
-        EffectParameter::new("delay", "s", 0.0, 100.0, 0.0).starts(&[0.005]).off(0.0),
-    ],
+    parameters: &[TIME_CONSTANT, DELAY],
     states: &[BEGINNING, opens("lag"), opens("delay_1"), opens("delay_2"), opens("delay_3")],
     integrates: false,
     ports: &[Port::Command],
@@ -49,7 +51,13 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "lags, delay and limits in the forms as commonly used; Richer & Hurmuzlu (2000) for a \
         spool of second order; Hochbruck & Ostermann (2010) for the closed form; Hildebrandt, \
         Sawodny, Neumann & Hartmann (2005) for valves of muscles",
-    forms: &[LAG_AND_DELAY, second_order::FORM, slew_limit::FORM, up_and_down::FORM],
+    forms: &[
+        LAG_AND_DELAY,
+        second_order::FORM,
+        slew_limit::FORM,
+        up_and_down::FORM,
+        dead_time::FORM,
+    ],
     ..EffectInfo::USUAL
 };
 
