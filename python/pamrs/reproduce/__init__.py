@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["check", "names", "section"]
 
 #: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
-_CHAPTERS: Final = {"ch3": "_chapter3", "ch4": "_chapter4", "ch5": "_chapter5"}
+_CHAPTERS: Final = {f"ch{number}": f"_chapter{number}" for number in range(2, 7)}
 
 
 def names() -> list[str]:
