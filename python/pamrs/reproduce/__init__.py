@@ -103,4 +103,5 @@ def section(
         chosen=chapter.chosen(),
         pictures=drawn.pictures() if pictures else [],
         symbols=symbols(name),
+        tables=chapter.tables() if hasattr(chapter, "tables") else {},
     )
