@@ -59,15 +59,15 @@ def pictures() -> list[Picture]:
             "free",
             "free",
             _free,
-            f"Figs. 2.3 and 2.10: {one}; lines: order 4 with moduli free at each pressure, constant "
-            "thickness and elliptic ends.",
+            f"Figs. 2.3 and 2.10: {one}; lines: order 4 with moduli free at each pressure, "
+            "constant thickness and elliptic ends.",
         ),
         (
             "moduli",
             "free",
             _moduli,
-            "Figs. 2.4 and 2.14: moduli of one stand-in, free at each pressure (dots) and linear in "
-            "it (lines).",
+            "Figs. 2.4 and 2.14: moduli of one stand-in, free at each pressure (dots) and linear "
+            "in it (lines).",
         ),
         ("orders", "linear", _orders, f"Fig. 2.12: {one}; lines: moduli linear in pressure."),
         (
@@ -119,14 +119,14 @@ def _shape() -> Figure:
     figure, (left, right) = _axes(1, 2, 3.3)
     muscle = ch2_075in()
     e = np.linspace(EXTENSION, 0.25, 400)
-    for name, label, style in (
-        ("cylinder", "cylinder", {"color": COLOURS["before"]}),
-        ("elliptic", "elliptic ends", {"color": COLOURS["after"]}),
-        ("elliptic_published", "elliptic ends as printed", {"color": "#9ca3af", "ls": "--"}),
+    for name, label, colour, style in (
+        ("cylinder", "cylinder", COLOURS["before"], "-"),
+        ("elliptic", "elliptic ends", COLOURS["after"], "-"),
+        ("elliptic_published", "elliptic ends as printed", "#9ca3af", "--"),
     ):
         one = muscle.replace(geometry=name)
-        left.plot(100.0 * e, _MM * one.radius(e), label=label, **style)
-        right.plot(100.0 * e, _MM * one.thickness(e), **style)
+        left.plot(100.0 * e, _MM * one.radius(e), style, color=colour, label=label)
+        right.plot(100.0 * e, _MM * one.thickness(e), style, color=colour)
     left.axhline(7.62, color="#1f1f1f", lw=0.8, ls=":", label="0.3 in")
     left.set_ylabel("radius [mm]")
     right.set_ylabel("wall [mm]")

@@ -211,7 +211,10 @@ def _readings() -> Figure:
         ):
             values = 100.0 * np.array([found.of(*case) for case in MATRIX[90.0]])
             cell.plot(
-                [values.min(), values.max()], [place + shift] * 2, color=colour, lw=3.0,
+                [values.min(), values.max()],
+                [place + shift] * 2,
+                color=colour,
+                lw=3.0,
                 solid_capstyle="butt",
             )
             cell.plot(values, [place + shift] * values.size, "|", ms=7, color="#1f1f1f", mew=0.8)
@@ -227,7 +230,10 @@ def _time() -> Figure:
     row = found.row(18.0, 2)
     angle, torque = np.degrees(found.angle[row]), found.torque[row]
     rising = np.concatenate([[False], np.diff(found.angle[row]) > 5e-5])
-    for cell, values, label in ((cells[0], angle, "angle [deg]"), (cells[1], torque, "torque [N m]")):
+    for cell, values, label in (
+        (cells[0], angle, "angle [deg]"),
+        (cells[1], torque, "torque [N m]"),
+    ):
         cell.plot(found.time, values, color="#1f1f1f", lw=1.0)
         cell.plot(found.time, np.where(rising, values, np.nan), color="#d62728", lw=1.8)
         cell.set_ylabel(label)
@@ -288,14 +294,16 @@ def _suspects() -> Figure:
     energy = base.energy[[base.row(*case) for case in MATRIX[90.0]]]
     sets = {name: found.energy / energy for name, found in done.suspects.items()}
     gauge = done.readings["gauge pressures in (6.4)"][0]
-    sets["(6.4) in gauge pressures in the simulation"] = energy / gauge.energy[
-        [gauge.row(*case) for case in MATRIX[90.0]]
-    ]
+    sets["(6.4) in gauge pressures in the simulation"] = (
+        energy / gauge.energy[[gauge.row(*case) for case in MATRIX[90.0]]]
+    )
     names = list(sets)[::-1]
     figure, (cell,) = _axes(1, 1, 0.28 * len(names) + 1.2)
     for place, name in enumerate(names):
         for (_, n), value in zip(MATRIX[90.0], sets[name], strict=True):
-            cell.plot(100.0 * (value - 1.0), place + 0.18 * (n - 4) / 2, "o", ms=4, color=_COLOUR[n])
+            cell.plot(
+                100.0 * (value - 1.0), place + 0.18 * (n - 4) / 2, "o", ms=4, color=_COLOUR[n]
+            )
     for n in MUSCLES:
         cell.plot([], [], "o", ms=4, color=_COLOUR[n], label=f"{n} muscles")
     cell.axvline(0.0, color="#9ca3af", lw=1.0)

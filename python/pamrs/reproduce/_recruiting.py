@@ -1,5 +1,5 @@
-"""The lifting cycles of chapter 6 on the shoulder rig: payload, number of muscles, angle, and what is
-read otherwise, are arguments.
+"""The lifting cycles of chapter 6 on the shoulder rig: payload, number of muscles, angle, and what
+is read otherwise, are arguments.
 
 The muscles that are not recruited are taken off (the text changes its tubing between tests);
 :func:`beside_idle` keeps them. All cycles of one angle run in one batch.
@@ -65,7 +65,7 @@ PERIOD: Final = 0.005
 GAINS: Final[Mapping[str, float]] = {"kp": 4e5, "ki": 6e5, "kd": 5e4}
 #: The same without the rate, as slow as the arm with 27 kg needs to rise smoothly.
 SLOW: Final[Mapping[str, float]] = {"kp": 1e5, "ki": 1e5, "kd": 0.0}
-_LOOP: Final[Mapping[str, float]] = {"kp": 4e-4, "ki": 2e-4, "pressure_filter": 0.0025}
+_LOOP: Final[Mapping[str, Any]] = {"kp": 4e-4, "ki": 2e-4, "pressure_filter": 0.0025}
 _CHANNELS: Final = ("joint_angle", "joint_torque", "muscle_pressure", "supply_pressure")
 _EVERY: Final = 2
 
@@ -147,7 +147,7 @@ SUSPECTS: Final[Mapping[str, Changed]] = {
         "heat_transfer",
         {"heat_transfer_coefficient": 50.0, "initial_temperature_rise": 0.0, "share": 1.0},
     ),
-    "hysteresis of the muscles (2.36)": lambda rig: with_muscle(rig, **HYSTERESIS),
+    "hysteresis of the muscles (2.36)": lambda rig: with_muscle(rig, None, **HYSTERESIS),
 }
 
 
@@ -305,13 +305,10 @@ def lifting(
         record_every=_EVERY,
     )
     run = done.run
+    angle, torque, pressure, source = (np.asarray(run[name]) for name in _CHANNELS)
+    volume = rigs[0].parameter("supply.volume").value
     return Cycles(
-        tuple(cases),
-        high,
-        rigs[0].parameter("supply.volume").value,
-        run.time,
-        *(np.asarray(run[name]) for name in _CHANNELS),
-        done.failed,
+        tuple(cases), high, volume, run.time, angle, torque, pressure, source, done.failed
     )
 
 

@@ -3,9 +3,9 @@
 The force of a muscle with stress ``s(eps, P)`` is gas and wall (2.16) on the elliptic shape, as the
 core has it; what a stand-in adds is its rubber, put together from what the chapter says in words:
 linear by itself (2.3), bonded to the braid by pressure, so that it is stiffer at small strains, and
-softening where the hoop strain is about 2. This is no polynomial in the strain and not linear in the
-pressure, so that the fits of 2.2 and 2.3 have something to leave over. Shape, braid angle and wall
-are off from the nominal ones by what a person measures, and forces have noise.
+softening where the hoop strain is about 2. This is no polynomial in the strain and not linear in
+the pressure, so that the fits of 2.2 and 2.3 have something to leave over. Shape, braid angle and
+wall are off from the nominal ones by what a person measures, and forces have noise.
 """
 
 from __future__ import annotations
@@ -192,9 +192,7 @@ def stand_in(number: int) -> StandIn:
         "k0": given["k0"] * rng.uniform(0.97, 1.03),
         "neck_floor": given["neck_floor"] + rng.uniform(-0.01, 0.01),
     }
-    muscle = own.replace(
-        **shape, modulus_slope=[0.0] * _ORDER, modulus_offset=[0.0] * _ORDER
-    )
+    muscle = own.replace(**shape, modulus_slope=[0.0] * _ORDER, modulus_offset=[0.0] * _ORDER)
     return StandIn(
         muscle,
         rubber=1e6 * rng.uniform(0.9, 1.15),
