@@ -275,6 +275,22 @@ def test_command_writes_pages_tables_and_pictures(capsys, tmp_path, monkeypatch)
     assert err.count("nothing changed") == 5
 
 
+def test_command_that_is_stopped_says_that_it_goes_on(capsys, tmp_path, monkeypatch):
+    def section(name, **_):
+        if name == "ch3":
+            raise KeyboardInterrupt
+        return SECTION
+
+    monkeypatch.setattr(reproduce, "section", section)
+    words = ("all", "--output", tmp_path / "out", "--cache", tmp_path / "cache", "--no-search")
+    code, out, err = run(capsys, *words)
+    assert code != 0
+    assert out == ""
+    assert "stopped: what was finished is kept, the same command goes on" in err
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert list((tmp_path / "out").iterdir()) == []
+
+
 def test_command_refuses_what_does_not_go_with_all(capsys, tmp_path):
     for words, said in (
         (("all", "ch3", "--output", tmp_path / "x"), "all goes alone"),

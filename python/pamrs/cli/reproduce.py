@@ -137,10 +137,14 @@ def _every(output: Path, search: bool, cache: Path | None) -> None:
         check_writable(cache / "section.json")
     words = ["pamrs", "reproduce", "all", "--output", str(output)]
     words += [] if search else ["--no-search"]
-    with progress("reproducing all chapters"):
-        sections = reproduce.every(
-            search=search, cache=cache, progress=lambda text: typer.echo(f"  {text}", err=True)
-        )
+    try:
+        with progress("reproducing all chapters"):
+            sections = reproduce.every(
+                search=search, cache=cache, progress=lambda text: typer.echo(f"  {text}", err=True)
+            )
+    except KeyboardInterrupt:
+        typer.echo("stopped: what was finished is kept, the same command goes on", err=True)
+        raise
     contents: dict[Path, str | bytes | Callable[[Path], object]] = {
         output / "README.md": summary(sections, shlex.join(words))
     }
