@@ -31,7 +31,7 @@ def few():
     """Three stand-ins instead of all."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(chapter2, "COUNT", 3)
-        yield chapter2.facts(search=False)
+        return chapter2.facts(search=False)
 
 
 # ------------------------------------------------------------------------------ shape
