@@ -240,8 +240,8 @@ def _time() -> Figure:
     cells[2].plot(found.time, found.source[row] / BAR, color=COLOURS["after"], label="tank")
     cells[2].plot(found.time, found.pressure[row] / BAR, color="#1f1f1f", lw=1.0, label="muscles")
     cells[2].set_ylabel("pressure [bar]")
-    cells[2].set_ylim(bottom=0.0)
-    cells[2].legend(fontsize=7.5, frameon=False, ncols=2, loc="center right")
+    cells[2].set_ylim(0.0, 20.0)
+    cells[2].legend(fontsize=7.5, frameon=False, ncols=2, loc="upper right")
     cells[2].set_xlabel("time [s]")
     return figure
 
