@@ -20,6 +20,7 @@ __all__ = [
     "Told",
     "judge",
     "markdown",
+    "shown",
     "table",
     "to_csv",
     "verdicts",
@@ -340,6 +341,21 @@ def verdicts(rows: Sequence[Comparison]) -> str:
         f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot "
         f"tell{apart}"
     )
+
+
+def shown(row: Comparison) -> tuple[str, str]:
+    """The published number, with the sign of its relation, and ours, as tables show them.
+
+    Parameters
+    ----------
+    row : Comparison
+
+    Returns
+    -------
+    published, ours : str
+        "none" where there is none.
+    """
+    return _published(row), _number(row.ours)
 
 
 def _published(row: Comparison) -> str:

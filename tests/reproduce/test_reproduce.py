@@ -185,7 +185,7 @@ def test_page_in_the_documentation_explains_the_symbols_that_it_uses(name):
 
 def test_symbols_of_no_chapter_are_refused():
     with pytest.raises(
-        ParameterError, match="chapter = 'ch9' is not allowed: one of ch3, ch4, ch5"
+        ParameterError, match="chapter = 'ch9' is not allowed: one of ch2, ch3, ch4, ch5, ch6"
     ):
         symbols("ch9")
 
@@ -555,13 +555,13 @@ def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
         code, out, err = run(capsys, *words, "--output", folder)
         assert (code, out) == (2, "")
         assert f"chapter = {words[-1]!r} is not reproduced" in err
-        assert "There are: ch3" in err
+        assert "There are: ch2, ch3" in err
     assert not folder.exists()
     code, _, err = run(capsys, "ch3", "--output", folder, "--page", tmp_path / "no" / "page.md")
     assert code == 2
     assert "the folder" in err
     assert not folder.exists()
-    assert reproduce.names() == ["ch3", "ch4", "ch5"]
+    assert reproduce.names() == ["ch2", "ch3", "ch4", "ch5", "ch6"]
 
 
 def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):

@@ -17,14 +17,17 @@ __all__ = ["reproduce_command"]
 
 def reproduce_command(
     chapter: Annotated[
-        list[str], typer.Argument(help="Chapters of the 2014 dissertation: ch3, ch4, ch5.")
+        list[str],
+        typer.Argument(
+            help="Chapters of the 2014 dissertation: ch2, ch3, ch4, ch5, ch6; or all of them: all."
+        ),
     ],
     output: Annotated[
         Path,
         typer.Option(
             help=(
                 "Folder for facts.csv, facts.md and one PNG for each figure; made if it is not "
-                "there."
+                "there. With all: for README.md, a page, a folder and facts.csv for each chapter."
             )
         ),
     ],
@@ -37,19 +40,44 @@ def reproduce_command(
         typer.Option(
             help=(
                 "Also run what takes minutes: joint searches (ch3, extra search), fine gain maps, "
-                "diagnoses."
+                "diagnoses, eight lifting cycles instead of two (ch6)."
             )
         ),
     ] = True,
+    cache: Annotated[
+        Path | None,
+        typer.Option(
+            help=(
+                "With all: folder in which finished chapters are kept by what they depend on; the "
+                "user's folder for caches by default."
+            )
+        ),
+    ] = None,
 ) -> None:
     """Set what a chapter of the dissertation states beside what this package gives, with a verdict
     for each statement.
+
+    All chapters: one summary page, and finished chapters are kept. A second call takes seconds
+    where nothing changed, and one that was stopped goes on with the chapter that it was at.
     """
     from pamrs import reproduce
     from pamrs.comparison import table, to_csv, verdicts
+    from pamrs.errors import ParameterError
     from pamrs.reproduce.page import page as to_page
 
     chapters = list(dict.fromkeys(chapter))
+    if "all" in chapters:
+        if chapters != ["all"]:
+            raise ParameterError(f"chapter = {', '.join(chapters)}: all goes alone")
+        if page is not None:
+            raise ParameterError(
+                f"--page = {str(page)!r} is not allowed with all: its pages are README.md and one "
+                "for each chapter in the folder of --output"
+            )
+        _every(output, search, cache)
+        return
+    if cache is not None:
+        raise ParameterError(f"--cache = {str(cache)!r} is allowed with all only")
     for name in chapters:
         reproduce.check(name)
     check_packages("plot", "matplotlib", "PIL")
@@ -89,4 +117,48 @@ def reproduce_command(
         for sentence in section.in_short:
             typer.echo(sentence)
     typer.echo(f"\n{verdicts(rows)}")
+    write(contents)
+
+
+def _every(output: Path, search: bool, cache: Path | None) -> None:
+    """Every chapter: its page, pictures and table in the folder, and the summary."""
+    from pamrs import reproduce
+    from pamrs.comparison import to_csv, verdicts
+    from pamrs.reproduce.page import page as to_page
+    from pamrs.reproduce.summary import summary
+
+    check_packages("plot", "matplotlib", "PIL")
+    if search:
+        check_packages("search", "deap", "cma")
+    output.mkdir(parents=True, exist_ok=True)
+    check_writable(output / "README.md")
+    if cache is not None:
+        cache.mkdir(parents=True, exist_ok=True)
+        check_writable(cache / "section.json")
+    words = ["pamrs", "reproduce", "all", "--output", str(output)]
+    words += [] if search else ["--no-search"]
+    try:
+        with progress("reproducing all chapters"):
+            sections = reproduce.every(
+                search=search, cache=cache, progress=lambda text: typer.echo(f"  {text}", err=True)
+            )
+    except KeyboardInterrupt:
+        typer.echo("stopped: what was finished is kept, the same command goes on", err=True)
+        raise
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {
+        output / "README.md": summary(sections, shlex.join(words))
+    }
+    for name, section in sections.items():
+        chapter = name.replace("ch", "chapter")
+        folder = output / chapter
+        folder.mkdir(exist_ok=True)
+        target = output / f"{chapter}.md"
+        alone = ["pamrs", "reproduce", name, "--output", str(folder), "--page", str(target)]
+        alone += [] if search else ["--no-search"]
+        contents[target] = to_page([section], shlex.join(alone), chapter)
+        contents[folder / "facts.csv"] = to_csv(section.rows)
+        for picture in section.pictures:
+            contents[folder / f"{picture.name}.png"] = picture.png
+    for section in sections.values():
+        typer.echo(f"{section.title}: {verdicts(list(section.rows))}")
     write(contents)

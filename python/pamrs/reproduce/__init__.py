@@ -2,6 +2,8 @@
 
 ``pamrs.reproduce.section("ch3")`` runs the experiments of a chapter and has its statements, each
 with a verdict, and its pictures; ``pamrs reproduce ch3 --output DIR`` writes them.
+``pamrs.reproduce.every()`` does so for all chapters and keeps each one by what it depends on
+(``pamrs reproduce all``).
 """
 
 from __future__ import annotations
@@ -14,12 +16,14 @@ from typing import TYPE_CHECKING, Final
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from pamrs.reproduce.page import Section
 
-__all__ = ["check", "names", "section"]
+__all__ = ["check", "every", "names", "section"]
 
 #: Chapter -> its module; the one of its pictures has the same name and ``_figures``.
-_CHAPTERS: Final = {"ch3": "_chapter3", "ch4": "_chapter4", "ch5": "_chapter5"}
+_CHAPTERS: Final = {f"ch{number}": f"_chapter{number}" for number in range(2, 7)}
 
 
 def names() -> list[str]:
@@ -62,8 +66,8 @@ def section(
     name : str
         One of :func:`names`.
     search : bool
-        Whether searches that take minutes run too: in chapter 3 those of joints (extra ``search``),
-        in chapter 4 finer maps of gains and the diagnoses.
+        Whether what takes minutes runs too: in chapter 3 searches of joints (extra ``search``), in
+        chapter 4 finer maps of gains and the diagnoses, in chapter 6 eight cycles instead of two.
     pictures : bool
         Whether its pictures are drawn (extra ``plot``).
     progress : callable, optional
@@ -103,4 +107,58 @@ def section(
         chosen=chapter.chosen(),
         pictures=drawn.pictures() if pictures else [],
         symbols=symbols(name),
+        tables=chapter.tables() if hasattr(chapter, "tables") else {},
     )
+
+
+def every(
+    *,
+    search: bool = True,
+    cache: Path | None = None,
+    progress: Callable[[str], None] | None = None,
+) -> dict[str, Section]:
+    """Every chapter with its pictures; a chapter that was made before from the same code, core,
+    inputs and packages is taken from where it is kept.
+
+    A chapter is kept as soon as it is done: what is stopped goes on where it was.
+
+    Parameters
+    ----------
+    search : bool
+        As for :func:`section`.
+    cache : Path, optional
+        Folder of the kept chapters; the user's folder for caches by default.
+    progress : callable, optional
+        Called with what is done next.
+
+    Returns
+    -------
+    dict of str to Section
+        By chapter, in their order.
+
+    Raises
+    ------
+    MissingPackageError
+        If an extra is missing; the message names it.
+    OSError
+        If a chapter cannot be kept.
+    """
+    from pamrs.reproduce import _store
+
+    root = _store.folder() if cache is None else cache
+    tell = progress or (lambda _: None)
+    found: dict[str, Section] = {}
+    for name, module in _CHAPTERS.items():
+        key = _store.digest(name, module, search=search)
+        known = _store.kept(root, key)
+        if known is None:
+            tell(f"{name}: reproducing")
+            known = section(name, search=search, progress=progress)
+            if _store.digest(name, module, search=search) == key:
+                _store.keep(root, key, known)
+            else:
+                tell(f"{name}: not kept, the code changed while it ran")
+        else:
+            tell(f"{name}: nothing changed, taken from {root}")
+        found[name] = known
+    return found

@@ -22,6 +22,7 @@ from pamrs.reproduce._chapter5_statements import GROUPS, Group, listed
 from pamrs.reproduce._score import OTHER, OWN, SAME, TRIAL, Apart, scored
 from pamrs.reproduce._tracking import KINDS, PAYLOADS, SETTLED, Track
 from pamrs.reproduce._tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
+from pamrs.rigs import shoulder
 
 __all__ = ["GROUPS", "TITLE", "chosen", "facts", "headings", "in_short", "share_by_angle"]
 
@@ -47,6 +48,8 @@ APART: Final[tuple[Apart, ...]] = (
 TITLE: Final = "Chapter 5: advanced control of manipulators"
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
+#: Pressure at which Gaylord's force is compared [Pa].
+_BLOWN: Final = 8e5
 _SWITCHING: Final = (2e5, 4e5, 8e5, 1.6e6, 3.2e6)
 
 Progress = Callable[[str], None]
@@ -604,6 +607,23 @@ def _from_gaylord(group: Group, zero: Track, later: Track) -> None:
                 "turns, r_eff of 0.7 in"
             ),
         )
+
+    muscle, e = shoulder().muscle, np.array([0.0, 0.25])
+    assert muscle is not None
+    force = muscle.replace(model="gaylord").force(_BLOWN, e) / muscle.force(_BLOWN, e)
+    fine = np.linspace(0.0, 0.25, 101)
+    least = (muscle.replace(model="gaylord").force(_BLOWN, fine) / muscle.force(_BLOWN, fine)).min()
+    group.say(
+        "Gaylord's force over the muscle's, least up to 25 % contraction, 8 bar",
+        (
+            "5.5: 'the Gaylord model typically overestimates force (especially at large "
+            "contractions)'"
+        ),
+        1.0,
+        float(least),
+        relation="above",
+        note=f"{force[0]:.2f} at rest, {force[1]:.2f} at 25 %",
+    )
 
 
 def _visited(run: Track, row: int, nodes: int) -> NDArray[np.bool_]:

@@ -104,6 +104,18 @@ def compound(plan: Plan) -> list[Comparison]:
                 "for that move"
             ),
         )
+    mean = {kind: float(runs[kind].rms()[k]) for kind in ("neural", "adaptive sliding")}
+    group.say(
+        f"neural over adaptive sliding, {MIDDLE:g} lb",
+        "5.5: 'nearly as accurate as the adaptive sliding mode controller'",
+        1.0,
+        mean["neural"] / mean["adaptive sliding"],
+        tolerance=0.25,
+        note=(
+            f"rms {mean['neural']:.2f} and {mean['adaptive sliding']:.2f} deg; 'nearly' read as a "
+            "quarter"
+        ),
+    )
     ripple = {kind: float(run.ripple()[k]) for kind, run in runs.items()}
     for kind in ("sliding", "adaptive sliding"):
         group.say(

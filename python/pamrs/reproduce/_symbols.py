@@ -22,7 +22,7 @@ class Symbol(NamedTuple):
     """As in :func:`pamrs.reproduce.names`."""
 
 
-_ALL: Final = ("ch3", "ch4", "ch5")
+_ALL: Final = ("ch2", "ch3", "ch4", "ch5", "ch6")
 _CONTROL: Final = ("ch4", "ch5")
 
 SYMBOLS: Final = (
@@ -67,7 +67,7 @@ SYMBOLS: Final = (
             "lengthens (2.36)"
         ),
         "1",
-        ("ch3",),
+        ("ch2", "ch3"),
     ),
     Symbol(
         "rotation",
@@ -160,13 +160,49 @@ SYMBOLS: Final = (
         "",
         ("ch4",),
     ),
+    Symbol("k", "axis ratio of the ellipse of a muscle's end (2.35)", "1", ("ch2",)),
+    Symbol(
+        "E1",
+        "first modulus of the stress polynomial (2.9); linear in pressure: E = m P + b",
+        "Pa",
+        ("ch2",),
+    ),
+    Symbol("order", "M, that of the stress polynomial", "", ("ch2",)),
+    Symbol(
+        "error",
+        "of a pressure: rms force error over that pressure's largest measured force (2.37)",
+        "1 or %",
+        ("ch2",),
+    ),
+    Symbol(
+        "stand-in",
+        "a simulated muscle in place of the measured one; what is known of it stands below",
+        "",
+        ("ch2",),
+    ),
+    Symbol("E_in", "(6.8): fall of the tank's pressure times its volume", "J", ("ch6",)),
+    Symbol("W_out", "(6.7): torque times rise of the angle, while it rises", "J", ("ch6",)),
+    Symbol("efficiency", "(6.9): W_out over E_in", "%", ("ch6",)),
+    Symbol(
+        "first moment",
+        "mass of the arm times the distance of its centre from the joint; weight torque over g",
+        "kg m",
+        ("ch6",),
+    ),
+    Symbol("PAM", "pneumatic artificial muscle", "", ("ch6",)),
+    Symbol(
+        "effects such as `leak_muscle`",
+        "physics that a plant has and a model has not; `pamrs effects` explains each",
+        "",
+        ("ch6",),
+    ),
     Symbol("lb", "pound: of mass", "0.4536 kg", ("ch3", "ch5")),
     Symbol("lbf, ft lbf", "pound of force, and foot times it", "4.448 N, 1.356 N m", ("ch3",)),
     Symbol(
         "psi",
         "pound of force on a square inch; every pressure is above the ambient one",
         "6.895 kPa",
-        _ALL,
+        ("ch2", "ch3", "ch4", "ch5"),
     ),
 )
 

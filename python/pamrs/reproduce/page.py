@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from pamrs.comparison import Comparison, markdown, verdicts
@@ -54,6 +54,8 @@ class Section:
         Its pictures.
     symbols : sequence of (str, str, str)
         Name, meaning and unit of the symbols and abbreviations that it uses.
+    tables : mapping of str to str
+        Tables of numbers that stand below a group, as Markdown.
     """
 
     title: str
@@ -63,6 +65,7 @@ class Section:
     chosen: Sequence[tuple[str, str, str]]
     pictures: Sequence[Picture]
     symbols: Sequence[tuple[str, str, str]] = ()
+    tables: Mapping[str, str] = field(default_factory=dict)
 
 
 def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[str] = ".") -> str:
@@ -123,7 +126,7 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
             lines += [
                 f"| `{name}` | {value} | {reason} |" for name, value, reason in section.chosen
             ] + [""]
-        below: dict[str, str] = {}
+        below = {group: f"{text}\n\n" for group, text in section.tables.items()}
         for picture in section.pictures:
             file = (Path(folder) / f"{picture.name}.png").as_posix()
             below[picture.group] = (
