@@ -27,6 +27,7 @@ from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, Lo
 from pamrs.control._pid import PID, PIDLaw
 from pamrs.control._planar import JointTorques, PlanarArmModel
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
+from pamrs.control._recruiting import Recruitment
 from pamrs.control._rig_controller import RigController
 from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import SampledController
@@ -77,6 +78,7 @@ __all__ = [
     "Share",
     "SetPoint",
     "RigModel",
+    "Recruitment",
     "RigController",
     "PlanarArmModel",
     "OpposedTorque",

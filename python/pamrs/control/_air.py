@@ -5,6 +5,7 @@ it (4.13), (4.14).
 from __future__ import annotations
 
 import bisect
+import functools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -136,7 +137,7 @@ class AirModel:
             )
             volume = volume + int(muscle.parameters["count"]) * muscle.air_volume(contraction)
         self.volume = Spline(low, high, volume)
-        self.orifice = OrificeInverse(
+        self.orifice = _orifice(
             self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
         )
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
@@ -225,6 +226,12 @@ class AirModel:
         return self.half_range * np.where(
             demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting
         )
+
+
+@functools.lru_cache(maxsize=16)
+def _orifice(*gas: float) -> OrificeInverse:
+    """The same for every chamber of a gas: a bundle has hundreds."""
+    return OrificeInverse(*gas)
 
 
 def _group(rig: Rig, chamber: str | None) -> Group:

@@ -29,6 +29,7 @@ from pamrs.control._protocol import (
 from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._sharing import CoContraction, Demand, Share, Together
+from pamrs.control._values import where as chosen
 from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.errors import ParameterError
 
@@ -176,7 +177,8 @@ class RigController(SampledController):
         self._gain_batch = sizes.pop() if sizes else None
         self._number = {name: k for k, name in enumerate(model.joints)}
         self._channels = self._named_channels()
-        self._vented = [(group, self._closed(group)) for group in model.vented]
+        self._vented = [(group, self._opened(group)) for group in model.vented]
+        self._open = [self._opened(group) for group in model.groups]
         self._before = Restorer(self)
         self.reset()
 
@@ -315,13 +317,14 @@ class RigController(SampledController):
     ) -> dict[str, Any]:
         """From the drive of the joints to the commands of their air."""
         arm = self.model.arm
-        where = aim.angle if self._commanded else sample["joint_angle"]
-        c1, c2 = arm.torque.at(self._full(where))
+        at = aim.angle if self._commanded else sample["joint_angle"]
+        c1, c2 = arm.torque.at(self._full(at))
         torque = c1 * drive + c2
-        each = [self._of_each(value) for value in (drive, torque, where)]
+        each = [self._of_each(value) for value in (drive, torque, at)]
         turning = aim.rate if self._commanded else sample.get("joint_rate", 0.0)
         turned = self._of_each(self._full(turning))
         wanted: dict[str, Value] = {}
+        idle: dict[str, Any] = {}
         for k, (name, share) in enumerate(zip(self.joints, self._shares, strict=True)):
             which = [i for i, g in enumerate(self.model.groups) if g.joint == name]
             demand = Demand(
@@ -334,6 +337,8 @@ class RigController(SampledController):
             )
             for i, value in zip(which, share.pressures(demand), strict=True):
                 wanted[self.model.groups[i].chamber] = value
+            for i, vented in zip(which, share.vented, strict=True):
+                idle[self.model.groups[i].chamber] = vented
         answers: dict[str, Any] = {}
         for i, (group, way) in enumerate(zip(self.model.groups, self._ways, strict=True)):
             k = self._number[group.joint]
@@ -344,13 +349,16 @@ class RigController(SampledController):
                 "joint_rate": turned[k],
             }
             command = self._sized_for_batch(way.track(time, seen, wanted[group.chamber]))
+            vented = idle[group.chamber]
+            if vented is not False:
+                command = chosen(vented, self._open[i], command)
             self._answer(answers, group, command)
         for group, command in self._vented:
             self._answer(answers, group, self._sized_for_batch(command))
         return answers
 
-    def _closed(self, group: Group) -> float:
-        """The command that lets the air out of a group that is not used."""
+    def _opened(self, group: Group) -> float:
+        """The command that opens a group that is not used to the ambient."""
         if group.feed.input != "valve_command":
             return 0.0
         valve = self.model.rig.tables("valve")[group.feed.name]

@@ -18,7 +18,7 @@ from pamrs.control._neural import Neural
 from pamrs.control._planar import PlanarArmModel
 from pamrs.control._protocol import Controller
 from pamrs.control._sliding import Sliding
-from pamrs.control._torque import GroupTorque, TorqueModel, active_groups
+from pamrs.control._torque import GroupTorque, TorqueModel, active_groups, group_torques
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -81,7 +81,7 @@ class RigModel:
         self.arm: JointModel = _arm(rig, torque, pressure_limit, active)
         self.pressure_limit = self.arm.pressure_limit
         self.vented = tuple(g for g in active_groups(rig, None) if g not in self.groups)
-        self._torques = {group.chamber: GroupTorque(rig, group.muscles) for group in self.groups}
+        self._torques = group_torques(rig, self.groups)
 
     def of_joint(self, joint: str) -> tuple[Group, ...]:
         """The groups of a joint."""

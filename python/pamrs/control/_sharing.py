@@ -70,6 +70,13 @@ class Share(Stateful):
         """
         raise NotImplementedError
 
+    @property
+    def vented(self) -> tuple[Any, ...]:
+        """Of each group, whether it is left open to the ambient since it is not used: a pressure
+        loop would feed it from the supply wherever it is drawn out below the ambient pressure.
+        """
+        return (False,) * len(self.groups)
+
 
 class Together(Share):
     """Every group of one side has the same pressure: the drive itself."""

@@ -33,6 +33,7 @@ __all__ = [
     "SimplifiedTorque",
     "TorqueModel",
     "active_groups",
+    "group_torques",
     "joint_torque",
     "torque_line",
 ]
@@ -459,6 +460,36 @@ def active_groups(rig: Rig, active: Sequence[str] | None) -> tuple[Group, ...]:
     return tuple(group for group in groups if group.chamber in active)
 
 
+def group_torques(rig: Rig, groups: Sequence[Group]) -> dict[str, GroupTorque]:
+    """The torque of each group; those that are alike, of a bundle of hundreds, are one.
+
+    Parameters
+    ----------
+    rig : Rig
+    groups : sequence of Group
+
+    Returns
+    -------
+    dict of str to GroupTorque
+        Chamber -> torque.
+
+    Raises
+    ------
+    ParameterError
+        As :class:`GroupTorque`.
+    """
+    muscles, ways, joints = (rig.tables(b) for b in ("muscle", "transmission", "joint"))
+    made: dict[str, GroupTorque] = {}
+    found = {}
+    for group in groups:
+        what = [(muscles[name], ways.get(name), joints[group.joint]) for name in group.muscles]
+        key = repr(what)
+        if key not in made:
+            made[key] = GroupTorque(rig, group.muscles)
+        found[group.chamber] = made[key]
+    return found
+
+
 def joint_torque(
     rig: Rig,
     joint: str,
@@ -507,7 +538,7 @@ def joint_torque(
             f"torque = {torque!r} is not allowed for rig {rig.name!r}, which has several muscles: "
             "'full' is needed"
         )
-    each = tuple(GroupTorque(rig, g.muscles) for g in groups if g.joint == joint)
+    each = tuple(group_torques(rig, [g for g in groups if g.joint == joint]).values())
     if all(group.sign < 0 for group in each):
         where = named("joint", joint)
         raise ParameterError(
