@@ -194,7 +194,7 @@ def bundle(muscles: int) -> Rig:
         "count": 1,
         "rest_diameter": one["muscle"]["rest_diameter"] * thinner,
         "wall_thickness": one["muscle"]["wall_thickness"] * thinner,
-        "buckling_load": one["muscle"]["buckling_load"] * thinner**4,
+        "buckling_load": max(0.01, one["muscle"]["buckling_load"] * thinner**4),
     }
     one["valve"]["discharge_area_max"] *= 3.0 / muscles
     one["chamber"]["dead_volume"] *= 3.0 / muscles

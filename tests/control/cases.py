@@ -20,6 +20,7 @@ from pamrs.control import (
     Neural,
     Parallel,
     PressureLoop,
+    Recruitment,
     Reference,
     RigController,
     RigModel,
@@ -41,6 +42,7 @@ PERIOD = 0.005
 PAIR = RigModel(pamrs.rigs.named("antagonistic_joint"))
 ARM = RigModel(pamrs.rigs.named("two_joint_arm"))
 REGULATED = RigModel(pamrs.rigs.named("regulated_joint"), pressure_limit=1e6)
+WHOLE = RigModel(pamrs.rigs.named("recruitment"))
 BUNDLE = RigModel(pamrs.rigs.named("recruitment"), active=("pair_1", "pair_3"))
 
 
@@ -144,6 +146,18 @@ CONTROLLERS = {
     "rig bundle sliding": lambda x: RigController(
         BUNDLE, BUNDLE.law("sliding", switching=2e4 * x, period=PERIOD)
     ),
+    "rig whole recruited": lambda x: RigController(
+        WHOLE,
+        WHOLE.law("sliding", switching=2e4 * x, period=PERIOD),
+        shares=Recruitment(
+            WHOLE.torques_of("shoulder"),
+            WHOLE.pressure_limit,
+            period=PERIOD,
+            dwell=0.1,
+            add_at=0.3,
+            drop_at=0.2,
+        ),
+    ),
     "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
 }
 
@@ -220,6 +234,13 @@ CHANNELS = {
         "supply_pressure",
     ],
     "regulated": ["joint_angle", "muscle_pressure", "supply_pressure"],
+    "whole": [
+        "joint_angle.shoulder",
+        "muscle_pressure.pair_1",
+        "muscle_pressure.pair_2",
+        "muscle_pressure.pair_3",
+        "supply_pressure",
+    ],
     "bundle": [
         "joint_angle.shoulder",
         "muscle_pressure.pair_1",
