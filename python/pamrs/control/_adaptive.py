@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Mapping, Sequence
-from typing import Any, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 
@@ -82,6 +82,9 @@ class AdaptiveSliding(SlidingController):
         If a number is not finite or not allowed, or a start is outside its bounds; the message
         names it.
     """
+
+    #: Of one joint; of several, the parameters of the arm.
+    _STATE: ClassVar[Mapping[str, Any]] = {"inertia": 0.0, "viscous": 0.0, "weight": 0.0}
 
     gains, deadband, bounds = Fixed(), Fixed(), Fixed()
 

@@ -125,25 +125,26 @@ def groups_of(rig: Rig) -> tuple[Group, ...]:
 
 def highest_pressure(rig: Rig) -> float:
     """The largest gauge pressure that a controller may ask for by default [Pa]: what the supplies
-    hold at first, or ``max_pressure`` of ``[limits]`` where that is less or a regulator's own
-    pressure says nothing.
+    hold at first, or ``max_pressure`` of ``[limits]`` where that is less, or a regulator is set by
+    the controller itself.
 
     Raises
     ------
     ParameterError
         If the rig says neither.
     """
-    supplies = rig.tables("supply").values()
+    supplies = rig.tables("supply")
+    through_valves = {_short(ports["from"]) for ports in rig.ports("valve").values()}
     held = [
         float(supply["initial_pressure"])
-        for supply in supplies
-        if supply.get("kind") != "regulator"
+        for name, supply in supplies.items()
+        if supply.get("kind") != "regulator" or name in through_valves
     ]
     stated = rig.limits.get("max_pressure")
     if stated is not None:
         held = [min([float(stated), *held])] if held else [float(stated)]
     if not held:
-        what = "regulators only" if supplies else "no [supply]"
+        what = "regulators without valves" if supplies else "no [supply]"
         raise ParameterError(
             f"rig {rig.name!r} has {what}: the pressure limit cannot be taken from it; give "
             "pressure_limit, or [limits] max_pressure in the rig"
