@@ -327,8 +327,8 @@ _HEAD = (
 _WORDS = [
     "`changes` counts how often the number of active pairs changed. What the tables show:",
     "",
-    "- As few pairs as possible is best, where they can lift at all; of what follows in every "
-    "cycle, the scheduler loses least air.",
+    "- As few pairs as possible take the least air, where they can lift at all. Of all that follow "
+    "in every cycle, those in real time take the least.",
     "- When pairs come and go matters as much as how many there are. One that comes in the middle "
     "of a lift is filled to several bar while the others\n  give air away; one that goes on the "
     "way down leaves the others to be filled. Told how far it lifts (`reach`), the scheduler adds "
@@ -343,8 +343,9 @@ _SCALING = (
     "The six muscles as N thinner ones of the same length, braid and sum of cross-sections, valves "
     "and dead volumes as parts of the same sum, of which\nat least a sixth stays active. One lift "
     "of 27 kg, recruited in real time. Processor time on a machine shared with other work; a valve "
-    "for each muscle\ncosts in proportion to their number, and what finer steps save is little: "
-    "three of six or nine of 24 are the same share."
+    "for each muscle\ncosts in proportion to their number. Finer steps use fewer of them (nine "
+    "of 24 in the place of three of six) at a higher pressure, and save a point of efficiency at "
+    "most."
 )
 
 

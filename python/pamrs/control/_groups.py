@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -110,6 +111,7 @@ def groups_of(rig: Rig) -> tuple[Group, ...]:
         for name, ports in rig.ports("muscle").items()
     }
     found = []
+    ways = (rig.ports("valve"), rig.ports("line"), rig.tables("supply"))
     for chamber in rig.tables("chamber"):
         here = tuple(name for name, (place, _) in muscles.items() if place == chamber)
         turned = {muscles[name][1] for name in here}
@@ -119,7 +121,7 @@ def groups_of(rig: Rig) -> tuple[Group, ...]:
                 f"{', '.join(sorted(turned))}; a controller's model needs a chamber for each"
             )
         if here:
-            found.append(Group(chamber, turned.pop(), here, _feed(rig, chamber)))
+            found.append(Group(chamber, turned.pop(), here, _feed(rig.name, chamber, *ways)))
     return tuple(found)
 
 
@@ -157,41 +159,40 @@ def _short(block: str) -> str:
     return block.partition(".")[2]
 
 
-def _feed(rig: Rig, chamber: str) -> Feed:
-    """What lies up the way of the air, through lines, from a chamber."""
+def _feed(
+    rig: str,
+    chamber: str,
+    valves: Mapping[str, Mapping[str, str]],
+    lines: Mapping[str, Mapping[str, str]],
+    supplies: Mapping[str, Mapping[str, Any]],
+) -> Feed:
+    """What lies up the way of the air, through lines, from a chamber of a rig."""
     here, passed = named("chamber", chamber), set()
-    lines = rig.ports("line")
-    valves = rig.ports("valve")
     while here not in passed:
         passed.add(here)
         fed = [(name, ports) for name, ports in valves.items() if ports["to"] == here]
         if len(fed) > 1:
             raise ParameterError(
-                f"rig {rig.name!r}: the valves {', '.join(n for n, _ in fed)} feed {here}; a "
+                f"rig {rig!r}: the valves {', '.join(n for n, _ in fed)} feed {here}; a "
                 "controller's model needs one"
             )
         if fed:
-            return Feed("valve_command", fed[0][0], _supply(rig, fed[0][1]["from"]))
+            place = fed[0][1]["from"]
+            supply = _short(place) if place.partition(".")[0] == "supply" else None
+            return Feed("valve_command", fed[0][0], supply)
         before = [ports["from"] for ports in lines.values() if ports["to"] == here]
         before += [named("line", name) for name, ports in lines.items() if ports["to"] == here]
         places = [place for place in before if place and place not in passed]
         supplied = [place for place in places if place.partition(".")[0] == "supply"]
         if supplied:
             name = _short(supplied[0])
-            if rig.tables("supply")[name].get("kind") != "regulator":
+            if supplies[name].get("kind") != "regulator":
                 break
             return Feed("supply_command", name, name)
         if not places:
             return Feed("pressure", chamber, None)
         here = places[-1]
     raise ParameterError(
-        f"rig {rig.name!r}: nothing that can be commanded feeds {named('chamber', chamber)}; a "
-        "valve or a regulator is needed"
+        f"rig {rig!r}: nothing that can be commanded feeds {named('chamber', chamber)}; a valve or "
+        "a regulator is needed"
     )
-
-
-def _supply(rig: Rig, place: str) -> str | None:
-    """The supply behind a valve, None behind a manifold."""
-    tables: dict[str, Any] = rig.tables("supply")
-    name = _short(place)
-    return name if place.partition(".")[0] == "supply" and name in tables else None
