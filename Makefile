@@ -42,7 +42,7 @@ export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
-        test-python-all snapshots deny format bench convergence effects golden lock clean
+        test-python-all snapshots deny format bench convergence recruitment effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -137,6 +137,9 @@ bench: build $(VENV)/.bench  ## this package beside Numba, JAX, SciPy and its re
 
 convergence: build  ## order, stability and error of every packaged rig
 	$(BIN)/python -m benchmarks.convergence docs
+
+recruitment: build  ## recruitment in real time against fixed recruitment, and bundles of small muscles
+	$(BIN)/python -m benchmarks.recruitment docs
 
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator
 	$(BIN)/python -m fingerprints docs/effects

@@ -13,13 +13,17 @@ from pamrs.control import (
     Cascade,
     DeadZoneCompensation,
     Feedforward,
+    FeedforwardPressure,
     FullTorque,
     Fuzzy,
     HysteresisCompensation,
     Neural,
     Parallel,
     PressureLoop,
+    Recruitment,
     Reference,
+    RigController,
+    RigModel,
     Sliding,
     cascaded_pid,
 )
@@ -35,6 +39,22 @@ DIAGNOSED = SHOULDER.with_effect(
     "muscle_hysteresis", {"friction_constant": 15.0, "friction_pressure": 8e-5, "presliding": 1e-3}
 ).with_effect("valve_dead_zone", {"half_width": 0.04})
 PERIOD = 0.005
+PAIR = RigModel(pamrs.rigs.named("antagonistic_joint"))
+ARM = RigModel(pamrs.rigs.named("two_joint_arm"))
+REGULATED = RigModel(pamrs.rigs.named("regulated_joint"), pressure_limit=1e6)
+WHOLE = RigModel(pamrs.rigs.named("recruitment"))
+BUNDLE = RigModel(pamrs.rigs.named("recruitment"), active=("pair_1", "pair_3"))
+
+
+def stiffer(time):
+    """A stiffness [N m/rad] that rises."""
+    return 15.0 + time
+
+
+def rows(x):
+    """A gain of a batch of plants for both joints of the arm."""
+    return np.tile(x, 2) if isinstance(x, np.ndarray) else x
+
 
 # name -> a function of a factor on its gains (a float or an array)
 CONTROLLERS = {
@@ -62,6 +82,9 @@ CONTROLLERS = {
     ),
     "feedforward + cascade": lambda x: Parallel(
         Feedforward(FULL, AIR, 0.5, period=PERIOD), cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD)
+    ),
+    "feedforward pressure": lambda x: Cascade(
+        FeedforwardPressure(FULL.scaled(x), friction=True, period=PERIOD)
     ),
     "cascaded pid": lambda x: cascaded_pid(1.38e6, kp=6e5 * x, period=PERIOD),
     "cascaded pi": lambda x: cascaded_pid(1.38e6, kp=1e5 * x, ki=1e5, kd=0.0, period=PERIOD),
@@ -92,6 +115,48 @@ CONTROLLERS = {
     ),
     "hysteresis feedforward": lambda x: HysteresisCompensation(
         Feedforward(FULL, AIR, 5.0 * x, period=PERIOD), DIAGNOSED, source="measured"
+    ),
+    "rig pair sliding": lambda x: RigController(
+        PAIR, PAIR.law("sliding", slope=8.0 * x, period=PERIOD), stiffness=15.0
+    ),
+    "rig pair feedforward": lambda x: RigController(
+        PAIR, PAIR.law("feedforward", period=PERIOD), stiffness=stiffer, km=20.0 * x
+    ),
+    "rig pair neural": lambda x: RigController(
+        PAIR, PAIR.law("neural", switching=4e4 * x, start="model", period=PERIOD)
+    ),
+    "rig arm feedforward": lambda x: RigController(
+        ARM, ARM.law("feedforward", period=PERIOD), km=20.0 * x
+    ),
+    "rig arm sliding": lambda x: RigController(
+        ARM, ARM.law("sliding", slope=rows(5.0 * x), period=PERIOD)
+    ),
+    "rig arm adaptive": lambda x: RigController(
+        ARM, ARM.law("adaptive", slope=rows(5.0 * x), period=PERIOD)
+    ),
+    "rig arm neural": lambda x: RigController(
+        ARM, ARM.law("neural", start="model", slope=rows(3.0 * x), period=PERIOD)
+    ),
+    "rig arm neural zero": lambda x: RigController(
+        ARM, ARM.law("neural", slope=rows(3.0 * x), period=PERIOD)
+    ),
+    "rig regulated adaptive": lambda x: RigController(
+        REGULATED, REGULATED.law("adaptive", slope=5.0 * x, period=PERIOD)
+    ),
+    "rig bundle sliding": lambda x: RigController(
+        BUNDLE, BUNDLE.law("sliding", switching=2e4 * x, period=PERIOD)
+    ),
+    "rig whole recruited": lambda x: RigController(
+        WHOLE,
+        WHOLE.law("sliding", switching=2e4 * x, period=PERIOD),
+        shares=Recruitment(
+            WHOLE.torques_of("shoulder"),
+            WHOLE.pressure_limit,
+            period=PERIOD,
+            dwell=0.1,
+            add_at=0.3,
+            drop_at=0.2,
+        ),
     ),
     "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
 }
@@ -128,6 +193,61 @@ def samples(count, seed=0, shape=()):
             "muscle_pressure": 4e5 * (1.0 + 0.5 * np.sin(1.1 * t + offset)),
             "supply_pressure": 1.3e6 + 0.0 * offset,
         }
+
+
+def told(name, sample):
+    """A sample with the channels' names of the rig that a controller is for."""
+    if not name.startswith("rig "):
+        return sample
+    renamed = {}
+    for channel in CHANNELS[name.split()[1]]:
+        word, _, block = channel.partition(".")
+        # no two blocks see the same
+        renamed[channel] = sample[word] * (1.0 + 0.01 * len(block)) if block else sample[word]
+    return renamed
+
+
+def commands(answer):
+    """The commands of an answer by name: one, or those of a rig."""
+    if not isinstance(answer, dict):
+        return {"": answer}
+    found = {}
+    for word, value in answer.items():
+        parts = value.items() if isinstance(value, dict) else [("", value)]
+        found |= {f"{word}.{name}": command for name, command in parts}
+    return found
+
+
+#: What the controllers of each rig read.
+CHANNELS = {
+    "pair": [
+        "joint_angle.elbow",
+        "muscle_pressure.flexor",
+        "muscle_pressure.extensor",
+        "supply_pressure",
+    ],
+    "arm": [
+        "joint_angle.elbow",
+        "joint_angle.wrist",
+        "muscle_pressure.elbow",
+        "muscle_pressure.wrist",
+        "supply_pressure",
+    ],
+    "regulated": ["joint_angle", "muscle_pressure", "supply_pressure"],
+    "whole": [
+        "joint_angle.shoulder",
+        "muscle_pressure.pair_1",
+        "muscle_pressure.pair_2",
+        "muscle_pressure.pair_3",
+        "supply_pressure",
+    ],
+    "bundle": [
+        "joint_angle.shoulder",
+        "muscle_pressure.pair_1",
+        "muscle_pressure.pair_3",
+        "supply_pressure",
+    ],
+}
 
 
 def singles(measurement, row=None):

@@ -234,11 +234,17 @@ def test_gaylord_estimate():
     assert guess.at(math.radians(110.0))[0] > FullTorque(SHOULDER).at(math.radians(110.0))[0]
 
 
-@pytest.mark.parametrize("name", ["bench", "two_joint_arm", "antagonistic_joint"])
-def test_rigs_that_a_controller_cannot_model_are_named(name):
+@pytest.mark.parametrize("name", ["bench", "two_joint_arm", "tube"])
+def test_rigs_that_an_arm_model_cannot_be_of_are_named(name):
     rig = pamrs.rigs.named(name)
     with pytest.raises(ParameterError, match=rig.name):
         ArmModel.from_rig(rig)
+
+
+@pytest.mark.parametrize("name", ["recruitment", "antagonistic_joint", "two_joint_arm"])
+def test_a_torque_of_one_muscle_needs_a_rig_of_one(name):
+    with pytest.raises(ParameterError, match=rf"{name}.*exactly one"):
+        torque_line(pamrs.rigs.named(name), 1.0)
 
 
 def test_wrong_models_are_named():

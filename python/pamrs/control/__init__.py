@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 from pamrs.control._adaptive import AdaptiveSliding
 from pamrs.control._air import AirModel, OrificeInverse
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
-from pamrs.control._feedforward import Feedforward, Parallel
+from pamrs.control._feedforward import Feedforward, FeedforwardPressure, Parallel
 from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
 from pamrs.control._hysteresis import (
     DeadZoneCompensation,
@@ -21,20 +21,29 @@ from pamrs.control._hysteresis import (
     SlipMemory,
 )
 from pamrs.control._joint_sensor import JointSensor
-from pamrs.control._model import (
-    ArmModel,
+from pamrs.control._model import ArmModel, JointModel
+from pamrs.control._neural import NETWORKS, Neural
+from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
+from pamrs.control._pid import PID, PIDLaw
+from pamrs.control._planar import JointTorques, PlanarArmModel
+from pamrs.control._protocol import Controller, Measurement, Reference, Value
+from pamrs.control._recruiting import Recruitment
+from pamrs.control._rig_controller import RigController
+from pamrs.control._rig_model import RigModel
+from pamrs.control._sampled import SampledController
+from pamrs.control._sharing import CoContraction, Demand, Share, Together
+from pamrs.control._sliding import Sliding, SlidingController
+from pamrs.control._torque import (
+    BundleTorque,
     FullTorque,
     GaylordTorque,
+    GroupTorque,
+    OpposedTorque,
     SimplifiedTorque,
     TorqueModel,
     torque_line,
 )
-from pamrs.control._neural import NETWORKS, Neural
-from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
-from pamrs.control._pid import PID, PIDLaw
-from pamrs.control._protocol import Controller, Measurement, Reference, Value
-from pamrs.control._sampled import SampledController
-from pamrs.control._sliding import Sliding, SlidingController
+from pamrs.control._ways import FlowInverse, SetPoint
 
 if TYPE_CHECKING:
     from pamrs.control import (
@@ -65,6 +74,22 @@ __all__ = [
     "AdaptiveSliding",
     "AirModel",
     "ArmModel",
+    "Together",
+    "Share",
+    "SetPoint",
+    "RigModel",
+    "Recruitment",
+    "RigController",
+    "PlanarArmModel",
+    "OpposedTorque",
+    "JointTorques",
+    "JointModel",
+    "GroupTorque",
+    "FlowInverse",
+    "FeedforwardPressure",
+    "Demand",
+    "CoContraction",
+    "BundleTorque",
     "Cascade",
     "ClosedLoop",
     "Controller",

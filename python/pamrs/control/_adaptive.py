@@ -11,20 +11,24 @@ Nonlinear Control, 1991, ch. 9).
 With the simplified plant ``V = I s^2/2 + (a - a*)^T Gamma^-1 (a - a*)/2`` has
 ``V' = -b s^2 - C1 KD |s|`` outside the deadband and does not grow; the projection onto the bounds
 does not change that as long as they hold the true values.
+
+Of several joints ``Y`` has a column for each parameter of the arm
+(:meth:`pamrs.control.JointModel.regressor`), and ``Y^T s_D`` is a sum over the joints.
 """
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs.control._model import ArmModel
+from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
-from pamrs.control._values import as_value, clip, sin
+from pamrs.control._values import as_value, clip
 from pamrs.errors import ParameterError
 
 __all__ = ["AdaptiveSliding", "dead"]
@@ -56,11 +60,12 @@ class AdaptiveSliding(SlidingController):
 
     Parameters
     ----------
-    arm : ArmModel
+    arm : JointModel
         Torque model, and the estimates to start with.
     gains : sequence of three float or ndarray, shape (n,)
         Diagonal of Gamma for I, b and m g r, SI with radians [kg m2, N m s/rad, N m, each per rad/s
-        of s, its factor in Y, and second].
+        of s, its factor in Y, and second]; of several joints one for all inertias, frictions and
+        weights.
     deadband : float or ndarray, shape (n,)
         Of s [rad/s]; 0.02 as printed.
     bounds : sequence of three pairs, or None
@@ -78,13 +83,14 @@ class AdaptiveSliding(SlidingController):
         names it.
     """
 
+    #: Of one joint; of several, the parameters of the arm.
     _STATE: ClassVar[Mapping[str, Any]] = {"inertia": 0.0, "viscous": 0.0, "weight": 0.0}
 
     gains, deadband, bounds = Fixed(), Fixed(), Fixed()
 
     def __init__(
         self,
-        arm: ArmModel,
+        arm: JointModel,
         gains: Sequence[Value] = (1.0, 5.0, 300.0),
         *,
         deadband: Value = 0.02,
@@ -102,13 +108,18 @@ class AdaptiveSliding(SlidingController):
         )
         self._deadband = as_value("deadband", deadband, lower=0.0)
         self.hold_at_limit = bool(hold_at_limit)
+        self._parameters = arm.parameters
+        self._names = tuple(f"_{parameter.name}" for parameter in self._parameters)
+        self._look = operator.attrgetter(*self._names)
+        self._others = range(1, len(self._names))
+        self._STATE = {p.name: p.value for p in self._parameters}  # type: ignore[misc]
         self._bounds = _bounds(arm, bounds)
         super().__init__(arm, gains=(*self._gains, self._deadband), **others)
-        self._rates = tuple(gain * self.period for gain in self._gains)
+        self._rates = tuple(self._gains[p.kind] * self.period for p in self._parameters)
         self.reset()
 
     @classmethod
-    def published(cls, arm: ArmModel, trial: int, **others: Any) -> AdaptiveSliding:
+    def published(cls, arm: JointModel, trial: int, **others: Any) -> AdaptiveSliding:
         """With the gains of Table 5.2, deadband 0.02 and without projection, as printed.
 
         The unit of the printed gains is not stated. Taken as SI with radians the estimates of I and
@@ -117,7 +128,7 @@ class AdaptiveSliding(SlidingController):
 
         Parameters
         ----------
-        arm : ArmModel
+        arm : JointModel
             As for the class.
         trial : {1, 2, 3}
             Row of the table.
@@ -139,47 +150,57 @@ class AdaptiveSliding(SlidingController):
 
     @property
     def estimates(self) -> dict[str, Value]:
-        """Present estimates of I [kg m2], b [N m s/rad] and m g r [N m]."""
-        return {"inertia": self._inertia, "viscous": self._viscous, "weight": self._weight}
-
-    _inertia: Value
-    _viscous: Value
-    _weight: Value
+        """Present estimates of I [kg m2], b [N m s/rad] and m g r [N m], ``inertia``, ``viscous``
+        and ``weight``; of several joints those of :attr:`pamrs.control.JointModel.parameters`.
+        """
+        joints, found = self.arm.joints, {}
+        for parameter, name in zip(self._parameters, self._names, strict=True):
+            value = getattr(self, name)
+            rows = joints if isinstance(value, np.ndarray) else 1
+            found[parameter.name] = value if rows == 1 else value[: value.size // rows]
+        return found
 
     def _start(self) -> dict[str, Any]:
-        return {"inertia": self.arm.inertia, "viscous": self.arm.viscous, "weight": self.arm.weight}
+        return {parameter.name: parameter.value for parameter in self._parameters}
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        """Desired gauge pressure [Pa] for a sample, within the arm's limits; see
         :meth:`pamrs.control.Controller.update`.
         """
-        angle, rate, acceleration, s, switching = self._surface(time, measurement, reference)
-        inertia, viscous, weight = self._inertia, self._viscous, self._weight
-        sine = sin(angle)
-        wanted = (
-            self.arm.pressure(inertia * acceleration + viscous * rate + weight * sine, angle)
-            - switching
+        arm = self.arm
+        angle, motion, rate, acceleration, s, switching = self._surface(
+            time, measurement, reference
         )
-        pressure = clip(wanted, 0.0, self._limit)
-        error = dead(s, self._deadband)
+        columns = arm.regressor(angle, motion, rate, acceleration)
+        estimates = self._look(self)
+        torque = estimates[0] * columns[0]
+        for k in self._others:
+            torque = torque + estimates[k] * columns[k]
+        wanted = arm.pressure(torque, angle) - switching
+        low, high = arm.limits(angle)
+        pressure = clip(wanted, low, high)
+        error = dead(s, self._rows(self._deadband, s))
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         if error.__class__ is not float or error != 0.0:
-            g = self._rates
-            inertia, viscous, weight = (
-                inertia - g[0] * acceleration * error,
-                viscous - g[1] * rate * error,
-                weight - g[2] * sine * error,
-            )
-            if self._bounds is not None:
-                (a, b), (c, d), (e, f) = self._bounds
-                inertia, viscous, weight = (
-                    clip(inertia, a, b),
-                    clip(viscous, c, d),
-                    clip(weight, e, f),
-                )
-            self._inertia, self._viscous, self._weight = inertia, viscous, weight
+            self._adapt(estimates, columns, error)
         return pressure
+
+    def _adapt(
+        self, estimates: tuple[Value, ...], columns: tuple[Value, ...], error: Value
+    ) -> None:
+        """``a' = -Gamma Y^T s_D``, kept within the bounds."""
+        bounds = self._bounds
+        for k, name in enumerate(self._names):
+            if self._several:
+                rate = self._rows(self._rates[k], error)
+                value = estimates[k] - self.arm.over_joints(rate * columns[k] * error)
+            else:
+                value = estimates[k] - self._rates[k] * columns[k] * error
+            if bounds is not None:
+                low, high = bounds[k]
+                value = clip(value, low, high)
+            setattr(self, name, value)
 
 
 def held(error: Value, excess: Value) -> Value:
@@ -193,36 +214,40 @@ def held(error: Value, excess: Value) -> Value:
 
 
 def _bounds(
-    arm: ArmModel, bounds: Sequence[tuple[float, float]] | str | None
+    arm: JointModel, bounds: Sequence[tuple[float, float]] | str | None
 ) -> tuple[tuple[float, float], ...] | None:
-    """Checked bounds of the three estimates."""
+    """Checked bounds of every estimate."""
     if bounds is None:
         return None
-    starts = [np.asarray(value) for value in arm.gains]
+    parameters = arm.parameters
     if isinstance(bounds, str):
         if bounds != "default":
             raise ParameterError(
                 f"bounds = {bounds!r} is not allowed: 'default', three pairs or None"
             )
-        tops = [10.0 * float(start.max()) for start in starts]
         # an arm of which nothing is known: what its muscles could move at all
-        torque = (
-            float(np.max(arm.torque.at(np.linspace(*arm.angle_range, 33))[0])) * arm.pressure_limit
-        )
+        lowest, highest = arm.angle_range
+        places = np.linspace(lowest, highest, 33)  # of each joint, along the first axis
+        c1 = arm.torque.at(places.T.ravel())[0]
+        torque = float(np.max(c1)) * arm.pressure_limit
         scale = (torque / 10.0, torque / 10.0, torque)
-        bounds = [
-            (0.0, top if top > 0.0 else other) for top, other in zip(tops, scale, strict=True)
+        tops = [10.0 * float(np.max(p.value)) for p in parameters]
+        pairs = [
+            (0.0, top if top > 0.0 else scale[p.kind])
+            for top, p in zip(tops, parameters, strict=True)
         ]
-    if len(bounds) != 3:
-        raise ParameterError(
-            f"bounds has {len(bounds)} entries: three pairs are needed, for I, b and m g r"
-        )
+    else:
+        if len(bounds) != 3:
+            raise ParameterError(
+                f"bounds has {len(bounds)} entries: three pairs are needed, for I, b and m g r"
+            )
+        pairs = [bounds[parameter.kind] for parameter in parameters]
     checked = []
-    for name, start, pair in zip(_NAMES, starts, bounds, strict=True):
-        low, high = float(pair[0]), float(pair[1])
+    for parameter, pair in zip(parameters, pairs, strict=True):
+        low, high, start = float(pair[0]), float(pair[1]), np.asarray(parameter.value)
         if not (low < high and np.all(start >= low) and np.all(start <= high)):
             raise ParameterError(
-                f"bounds[{name}] = {(low, high)} is not allowed: rising, with the start "
+                f"bounds[{parameter.name}] = {(low, high)} is not allowed: rising, with the start "
                 f"{start.tolist()} within"
             )
         checked.append((low, high))

@@ -5,6 +5,7 @@ it (4.13), (4.14).
 from __future__ import annotations
 
 import bisect
+import functools
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,8 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs.control._groups import Group, groups_of
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
+from pamrs.control._torque import _parts
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -92,34 +95,26 @@ class OrificeInverse:
 
 
 class AirModel:
-    """Chamber and valve of a rig as a controller knows them.
+    """A chamber, its muscles and its valve as a controller knows them.
 
     Parameters
     ----------
     rig : Rig
-        With one muscle, joint, valve and chamber, and a supply.
+    chamber : str, optional
+        Name of a chamber that a valve feeds; the only one by default.
 
     Raises
     ------
     ParameterError
-        If it has not, its valve has conductances in the place of an area, or its area table is
-        level somewhere but at its ends, so that it has no inverse.
+        If there is no such chamber, no valve feeds it or no supply the valve, the valve has
+        conductances in the place of an area, or its area table is level somewhere but at its ends,
+        so that it has no inverse.
     """
 
-    def __init__(self, rig: Rig) -> None:
-        from pamrs.control._model import _parts, _supply_pressure
-
-        muscle, joint, table = _parts(rig)
-        for block in ("valve", "chamber"):
-            if len(rig.tables(block)) != 1:
-                raise ParameterError(
-                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
-                    "model needs exactly one"
-                )
-        valve, chamber = (
-            next(iter(rig.tables("valve").values())),
-            next(iter(rig.tables("chamber").values())),
-        )
+    def __init__(self, rig: Rig, chamber: str | None = None) -> None:
+        group = _group(rig, chamber)
+        valve = rig.tables("valve")[group.feed.name]
+        table = rig.tables("chamber")[group.chamber]
         if valve["flow"] != "orifice":
             raise ParameterError(
                 f"valve.flow = {valve['flow']!r} is not allowed: a controller's model inverts a "
@@ -127,25 +122,35 @@ class AirModel:
             )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
-        self.supply_pressure = _supply_pressure(rig)
+        supply = rig.tables("supply")[group.feed.supply or ""]
+        self.supply_pressure = float(supply["initial_pressure"])
         self.alpha_in, self.alpha_out, self.alpha = (
-            float(chamber[name]) for name in ("alpha_in", "alpha_out", "alpha")
+            float(table[name]) for name in ("alpha_in", "alpha_out", "alpha")
         )
         self._rt = float(gas["gas_constant"]) * float(gas["temperature"])
-        low, high = float(table["min_angle"]), float(table["max_angle"])
-        contraction = joint.shortening(np.linspace(low, high, 1025)) / float(
-            muscle.parameters["rest_length"]
-        )
-        volume = int(muscle.parameters["count"]) * muscle.air_volume(contraction) + float(
-            chamber["dead_volume"]
-        )
+        volume = np.full(1025, float(table["dead_volume"]))
+        for name in group.muscles:
+            muscle, joint, turned = _parts(rig, name)
+            low, high = float(turned["min_angle"]), float(turned["max_angle"])
+            contraction = joint.shortening(np.linspace(low, high, 1025)) / float(
+                muscle.parameters["rest_length"]
+            )
+            volume = volume + int(muscle.parameters["count"]) * muscle.air_volume(contraction)
         self.volume = Spline(low, high, volume)
-        self.orifice = OrificeInverse(
+        self.orifice = _orifice(
             self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
         )
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
         self.largest_area = float(valve["discharge_area_max"])
         self._fraction, self._opening = _inverse(valve)
+
+    def rate_per_volt(self) -> float:
+        """How fast a volt changes the pressure near the null [Pa/(s V)]: filling from the supply at
+        half its pressure, in the middle of the joint's range.
+        """
+        slow, middle = 1e4, 0.5 * (self.volume.low + self.volume.high)
+        volts = self.command(slow, 0.5 * self.supply_pressure, self.supply_pressure, middle, 0.0)
+        return slow / float(volts)
 
     def opening(self, area: Value) -> Value:
         """Opening ``|x|`` [1] of an effective area [m2] >= 0: the area table backwards, 1 where it
@@ -221,6 +226,37 @@ class AirModel:
         return self.half_range * np.where(
             demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting
         )
+
+
+@functools.lru_cache(maxsize=16)
+def _orifice(*gas: float) -> OrificeInverse:
+    """The same for every chamber of a gas: a bundle has hundreds."""
+    return OrificeInverse(*gas)
+
+
+def _group(rig: Rig, chamber: str | None) -> Group:
+    """The muscles of a chamber that a valve feeds from a supply."""
+    groups = groups_of(rig)
+    if chamber is None:
+        for block in ("valve", "chamber", "supply"):
+            if len(rig.tables(block)) != 1:
+                raise ParameterError(
+                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
+                    "model needs exactly one, or the name of a chamber"
+                )
+    found = [group for group in groups if chamber in (None, group.chamber)]
+    if not found:
+        there = ", ".join(repr(group.chamber) for group in groups) or "none"
+        raise ParameterError(
+            f"chamber = {chamber!r}: rig {rig.name!r} has no such chamber with muscles; it has: "
+            f"{there}"
+        )
+    if found[0].feed.input != "valve_command" or found[0].feed.supply is None:
+        raise ParameterError(
+            f"rig {rig.name!r}: no valve with a supply feeds chamber {found[0].chamber!r}, so that "
+            "there is no flow to ask for"
+        )
+    return found[0]
 
 
 def _inverse(valve: dict[str, Any]) -> tuple[list[float], list[float]]:

@@ -6,19 +6,74 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar
 
+import numpy as np
+
 from pamrs.control._air import AirModel
 from pamrs.control._joint_sensor import JointSensor
-from pamrs.control._model import ArmModel, TorqueModel
+from pamrs.control._model import ArmModel, JointModel
 from pamrs.control._parts import LowPass
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Fixed, Restorer, SampledController
-from pamrs.control._values import as_value, clip, sin, where
+from pamrs.control._torque import TorqueModel
+from pamrs.control._values import as_value, clip, where
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Feedforward", "Parallel"]
+__all__ = ["Feedforward", "FeedforwardPressure", "Parallel"]
+
+
+def _torque(arm: JointModel, aim: Reference, friction: bool) -> Value:
+    """``tau_d`` [N m] of (4.11), with or without viscous friction."""
+    wanted = aim.rate if friction else 0.0
+    return arm.inverse_dynamics(aim.angle, aim.rate, wanted, aim.acceleration)
+
+
+class FeedforwardPressure(SampledController):
+    """The feedforward as far as the pressure: answers the drive [Pa] that the model wants for a
+    reference, for a :class:`pamrs.control.Cascade` or a :class:`pamrs.control.RigController`.
+
+    ``tau_d = M(q_d) q_d'' + C(q_d, q_d') q_d' + g(q_d)``, of one joint ``I theta_d'' + m g r
+    sin(theta_d)``, and the drive that gives it at ``q_d`` (4.11), (4.12). Nothing is measured.
+
+    Parameters
+    ----------
+    arm : JointModel
+        The controller's model.
+    period : float
+        Time between two updates [s].
+    friction : bool
+        Whether viscous friction at the commanded rate is added.
+
+    Raises
+    ------
+    ParameterError
+        If the period is not above zero.
+    """
+
+    answers = "pressure"
+    motion = "commanded"
+
+    def __init__(self, arm: JointModel, *, period: float = 1e-3, friction: bool = False) -> None:
+        self.arm, self._friction = arm, bool(friction)
+        super().__init__(period, arm.gains)
+        self.reset()
+
+    def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
+        """Drive [Pa] for a sample, within the arm's limits; see
+        :meth:`pamrs.control.Controller.update`.
+        """
+        aim = self._aim(reference)
+        if "joint_angle" in measurement:
+            self._read(measurement, "joint_angle")  # a batch of another length is refused
+        self._tick(time)
+        angle = aim.angle
+        if self._batch is not None and angle.__class__ is float:
+            angle = np.full(self._batch, angle)
+        low, high = self.arm.limits(angle)
+        torque = _torque(self.arm, aim._replace(angle=angle), self._friction)
+        return clip(self.arm.pressure(torque, angle), low, high)
 
 
 class Feedforward(SampledController):
@@ -134,9 +189,7 @@ class Feedforward(SampledController):
     def desired_pressure(self, reference: Reference) -> Value:
         """Gauge pressure that the model wants for a reference [Pa], from 0 to the limit."""
         arm = self.arm
-        torque = arm.inertia * reference.acceleration + arm.weight * sin(reference.angle)
-        if self._friction:
-            torque = torque + arm.viscous * reference.rate
+        torque = _torque(arm, reference, self._friction)
         pressure = arm.pressure(torque, reference.angle)
         if self.lengthening is not None:
             c1, c2 = self.lengthening.at(reference.angle)

@@ -22,10 +22,10 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs.control._model import TorqueModel, _parts
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._spline import Spline
+from pamrs.control._torque import TorqueModel, _parts
 from pamrs.control._values import clip
 from pamrs.errors import ParameterError
 

@@ -14,7 +14,7 @@ from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control.metrics import Metrics, evaluate
-from pamrs.control.trajectories import Trajectory, check_angles
+from pamrs.control.trajectories import JointTrajectories, Trajectory, check_angles
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_samples
@@ -22,7 +22,7 @@ from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_sam
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "tracked_of"]
+__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "measured_by", "tracked_of"]
 
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
@@ -41,44 +41,54 @@ class ClosedLoop:
     time : ndarray, shape (samples,)
         From the loop's begin [s]; the first row is the state that it began with.
     reference : Reference of ndarrays, shape (samples,)
-        Where the joint should have been.
-    command : ndarray, shape (samples,)
-        What the controller held from each row on.
+        Where the joint should have been; of several joints (joints, samples).
+    command : ndarray, shape (samples,), or mapping of str to ndarray
+        What the controller held from each row on; every input by its name where it answers them
+        all.
     channels : mapping of str to ndarray, shape (samples,)
         What the plant did, SI, without the sensors' errors.
-    trajectory : Trajectory
+    trajectory : Trajectory or JointTrajectories
     rig : Rig
         The plant.
     events : list of Event
         Stops reached and left, flows that became choked.
-    joint : str
-        Name of the channel that is tracked.
+    joints : tuple of str
+        Names of the channels that are tracked.
     """
 
     time: Array
     reference: Reference
-    command: Array
+    command: Any
     channels: Mapping[str, Array] = field(repr=False)
-    trajectory: Trajectory
+    trajectory: Trajectory | JointTrajectories
     rig: Rig = field(repr=False)
     events: list[Event] = field(repr=False, default_factory=list)
-    joint: str = "joint_angle"
+    joints: tuple[str, ...] = ("joint_angle",)
+
+    @property
+    def joint(self) -> str:
+        """Name of the first channel that is tracked."""
+        return self.joints[0]
 
     @property
     def angle(self) -> Array:
-        """The joint's angle [rad]."""
-        return self.channels[self.joint]
+        """The joint's angle [rad], shape (samples,); of several joints (joints, samples)."""
+        if len(self.joints) == 1:
+            return self.channels[self.joints[0]]
+        return np.array([self.channels[name] for name in self.joints])
 
     @property
     def error(self) -> Array:
         """Reference minus angle [rad]."""
         return np.asarray(self.reference.angle - self.angle, dtype=np.float64)
 
-    def metrics(self, *, unit: str = "rad") -> Metrics:
+    def metrics(self, joint: str | None = None, *, unit: str = "rad") -> Metrics:
         """Errors, curvature and phases, see :func:`pamrs.control.metrics.evaluate`.
 
         Parameters
         ----------
+        joint : str, optional
+            Name of the joint, where several are tracked.
         unit : {"rad", "deg"}
             Of the angle in nu and omega.
 
@@ -89,15 +99,25 @@ class ClosedLoop:
         Raises
         ------
         ParameterError
-            If the unit is unknown or the run has less than three rows.
+            If the unit is unknown, the run has less than three rows, or several joints are tracked
+            and none of them is named.
         """
-        rate = self.channels.get(self.joint.replace("joint_angle", "joint_rate", 1))
+        wanted, trajectory, channel = self.reference.angle, self.trajectory, self.joint
+        if isinstance(trajectory, JointTrajectories):
+            names = list(trajectory.of_joint)
+            if joint not in names:
+                raise ParameterError(
+                    f"joint = {joint!r} is not allowed: one of {', '.join(names)} is needed"
+                )
+            k = names.index(joint)
+            channel, wanted = self.joints[k], np.asarray(wanted)[k]
+            trajectory = trajectory.of_joint[joint]
         return evaluate(
             self.time,
-            self.reference.angle,
-            self.angle,
-            rate=rate,
-            parts=self.trajectory.phases,
+            wanted,
+            self.channels[channel],
+            rate=self.channels.get(channel.replace("joint_angle", "joint_rate", 1)),
+            parts=trajectory.phases,
             unit=unit,
         )
 
@@ -120,19 +140,26 @@ class ClosedLoop:
             from pamrs.errors import missing_package
 
             raise missing_package(error, "io") from None
-        columns = {
-            "reference": self.reference.angle,
-            "reference_rate": self.reference.rate,
-            "command": self.command,
-            **self.channels,
-        }
+        commands = self.command if isinstance(self.command, Mapping) else {"command": self.command}
+        columns = {**self._wanted(), **commands, **self.channels}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+
+    def _wanted(self) -> dict[str, Array]:
+        """Reference and its rate as columns."""
+        fields = {"reference": self.reference.angle, "reference_rate": self.reference.rate}
+        if not isinstance(self.trajectory, JointTrajectories):
+            return {name: np.asarray(values) for name, values in fields.items()}
+        return {
+            f"{name}.{joint}": np.asarray(values)[k]
+            for name, values in fields.items()
+            for k, joint in enumerate(self.trajectory.of_joint)
+        }
 
 
 def closed_loop(
     plant: Rig | Simulator,
     controller: Controller,
-    trajectory: Trajectory,
+    trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories,
     duration: float | None = None,
     *,
     sample_time: float | None = None,
@@ -157,8 +184,8 @@ def closed_loop(
         A rig begins at ``initial``; a simulator goes on from where it is, at its own sample time.
     controller : Controller
         For one plant.
-    trajectory : Trajectory
-        Where the joint should be.
+    trajectory : Trajectory, JointTrajectories, or mapping of str to Trajectory
+        Where the joint should be; of several joints one for each name.
     duration : float, optional
         [s]; the trajectory's by default.
     sample_time : float, optional
@@ -210,22 +237,28 @@ def closed_loop(
     simulator = _simulator(plant, controller, sample_time, step, initial)
     dt = simulator.sample_time
     every = whole_samples("controller.period", controller.period, dt, least=1)
+    wanted_of = _trajectories(trajectory, controller)
     total = whole_samples(
-        "duration", trajectory.duration if duration is None else duration, dt, least=1
+        "duration", wanted_of.duration if duration is None else duration, dt, least=1
     )
-    check_angles(trajectory, total * dt)
+    for one in (
+        wanted_of.of_joint.values() if isinstance(wanted_of, JointTrajectories) else [wanted_of]
+    ):
+        check_angles(one, total * dt)
     if not math.isfinite(start):
         raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
     began = (
         round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
     )  # a restart at the same float
-    names = _recorded(simulator.rig, channels, measured)
+    alias = measured_by(controller, measured)
+    tracked = _angles(simulator.rig, controller, alias)
+    names = _recorded(simulator.rig, channels, tracked)
     read = reader_of(sensors, controller.period)
     if reset:
         controller.reset()
     commands = np.full(total + 1, np.nan)
-    alias = dict(measured or {})
+    whole = controller.answers == "inputs" and actuation is None
     k = 0
 
     def answer(sample: dict[str, float]) -> Any:
@@ -233,7 +266,10 @@ def closed_loop(
         now = (began + k) * dt
         for called, name in alias.items():
             sample[called] = sample[name]
-        command = controller.update(now, sample if read is None else read(sample), trajectory(now))
+        command = controller.update(now, sample if read is None else read(sample), wanted_of(now))
+        if whole:
+            k += every
+            return command
         try:
             value = float(command)
         except (TypeError, ValueError):
@@ -247,21 +283,81 @@ def closed_loop(
         return act(value)
 
     run = simulator.control(answer, total * dt, period=every * dt)
-    if actuation is None:
+    held: Any = commands
+    if whole:
+        held = {name: run[name] for name in core_rig(simulator.rig).inputs if name in run}
+    elif actuation is None:
         _check_volts(simulator.rig, commands)
     time = np.asarray(np.arange(total + 1) * dt, dtype=np.float64)
-    wanted = trajectory(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
+    wanted = wanted_of(np.asarray((began + np.arange(total + 1)) * dt, dtype=np.float64))
     out = {name: run[name] for name in names}
     return ClosedLoop(
         time,
         wanted,
-        commands,
+        held,
         out,
-        trajectory,
+        wanted_of,
         simulator.rig,
         run.events,
-        alias.get("joint_angle", "joint_angle"),
+        tuple(tracked[::2]),
     )
+
+
+def _trajectories(
+    given: Trajectory | Mapping[str, Trajectory] | JointTrajectories, controller: Controller
+) -> Trajectory | JointTrajectories:
+    """A trajectory for each joint of the controller, in its order."""
+    joints: tuple[str, ...] = getattr(controller, "joints", ("",))
+    if isinstance(given, JointTrajectories):
+        given = given.of_joint
+    if isinstance(given, Trajectory):
+        if len(joints) > 1:
+            raise ParameterError(
+                f"trajectory is one for the joints {', '.join(joints)}: a mapping of each to its "
+                "own is needed"
+            )
+        return given
+    if sorted(given) != sorted(joints):
+        raise ParameterError(
+            f"trajectory has the joints {', '.join(map(repr, given)) or 'none'}; those of the "
+            f"controller are {', '.join(map(repr, joints))}"
+        )
+    if len(joints) == 1:
+        return given[joints[0]]
+    return JointTrajectories({name: given[name] for name in joints})
+
+
+def measured_by(controller: Controller, measured: Mapping[str, str] | None) -> dict[str, str]:
+    """What the controller calls a channel -> the rig's name of it; a controller of one joint with a
+    name says it itself.
+
+    Parameters
+    ----------
+    controller : Controller
+    measured : mapping of str to str, optional
+        As for :func:`closed_loop`.
+
+    Returns
+    -------
+    dict of str to str
+    """
+    alias = dict(measured or {})
+    joints = getattr(controller, "joints", ("",))
+    if len(joints) == 1 and joints[0]:
+        alias.setdefault("joint_angle", f"joint_angle.{joints[0]}")
+    return alias
+
+
+def _angles(rig: Rig, controller: Controller, alias: Mapping[str, str]) -> list[str]:
+    """The rig's names of angle and rate of every joint that is tracked, one after the other."""
+    joints = getattr(controller, "joints", ("",))
+    if len(joints) == 1:
+        return list(tracked_of(rig, alias))
+    return [
+        name
+        for joint in joints
+        for name in tracked_of(rig, {"joint_angle": f"joint_angle.{joint}"})
+    ]
 
 
 def _check_volts(rig: Rig, commands: Array) -> None:
@@ -298,11 +394,9 @@ def _simulator(
     )
 
 
-def _recorded(
-    rig: Rig, channels: Iterable[str] | None, measured: Mapping[str, str] | None
-) -> list[str]:
+def _recorded(rig: Rig, channels: Iterable[str] | None, tracked: Iterable[str]) -> list[str]:
     """Names of the channels that are kept; the tracked ones always are."""
-    known, tracked = core_rig(rig).channels, tracked_of(rig, measured)
+    known = core_rig(rig).channels
     if channels is None:
         return known
     wanted = list(dict.fromkeys([*tracked, *channels]))
@@ -350,7 +444,8 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
 
 
 def actuation_of(rig: Rig, controller: Controller) -> Actuation:
-    """What a single command drives: the only valve, or the only regulator of a rig without valves.
+    """What a single command drives: the only valve, or the only regulator of a rig without valves;
+    what answers every input is left as it is.
 
     Parameters
     ----------
@@ -367,6 +462,8 @@ def actuation_of(rig: Rig, controller: Controller) -> Actuation:
     ParameterError
         If there is no such input, or more than one, or a valve would be given a pressure.
     """
+    if controller.answers == "inputs":
+        return lambda command: command
     inputs = core_rig(rig).inputs
     found = [name for name in inputs if name.startswith("valve_command")] or [
         n for n in inputs if n.startswith("supply_command")

@@ -8,6 +8,9 @@ IEEE Trans. Neural Networks 3, 1992).
     c_k,H' = -gamma_H phi theta_r'' s_D
     c_k,C' = -gamma_C phi theta_r' s_D
     c_k,G' = -gamma_G phi s_D
+
+Of several joints each has networks of its own angle: what the others do to it is left to the
+switching term, and learnt as far as it goes with its own angle.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from numpy.typing import NDArray
 
 from pamrs._writing import write_atomically
 from pamrs.control._adaptive import dead, held
-from pamrs.control._model import ArmModel
+from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
@@ -50,7 +53,7 @@ class Neural(SlidingController):
 
     Parameters
     ----------
-    arm : ArmModel
+    arm : JointModel
         Gives range and pressure limit and, with ``start="model"``, the start: ``H = I/C1``,
         ``C = b/C1``, ``G = (m g r sin - C2)/C1`` (5.17)-(5.19). With the torque ``"gaylord"`` that
         is the educated guess of (5.25).
@@ -96,7 +99,7 @@ class Neural(SlidingController):
 
     def __init__(
         self,
-        arm: ArmModel,
+        arm: JointModel,
         *,
         start: str = "zero",
         nodes: int = 22,
@@ -133,12 +136,15 @@ class Neural(SlidingController):
         self._bounds: tuple[float, ...] | None = (
             None if chosen is None else tuple(float(b) for b in chosen)
         )
-        self._first, last = float(arm.angle_range[0]), float(arm.angle_range[1])
+        self._single = arm.joints == 1
+        self._first, last = arm.angle_range
         self._density = (nodes - 1) / (last - self._first)
         self._initial = (
-            self._of_model(arm, last)
-            if start == "model"
-            else {name: [0.0] * nodes for name in NETWORKS}
+            {name: [0.0] * nodes for name in NETWORKS}
+            if start == "zero"
+            else self._of_model(arm, last)
+            if self._single
+            else self._of_joints(arm, last)
         )
         defaults: dict[str, Any] = {"slope": 3.0, "switching": 4e5, "boundary_layer": 2.0}
         super().__init__(arm, gains=(*self._gains, self._deadband), **{**defaults, **others})
@@ -146,19 +152,23 @@ class Neural(SlidingController):
         self._rates = tuple(gain * self.period for gain in self._gains)
         self.reset()
 
-    def _of_model(self, arm: ArmModel, last: float) -> dict[str, list[float]]:
+    def _of_model(self, arm: JointModel, last: float) -> dict[str, list[float]]:
         if not all(isinstance(value, float) for value in arm.gains):
             raise ParameterError(
                 "arm has arrays for estimates: networks start from one arm, whose numbers are "
                 "floats"
             )
         angle = np.linspace(self._first, last, self._nodes)
+        parameters = {parameter.name: parameter.value for parameter in arm.parameters}
         c1, c2 = (np.broadcast_to(value, angle.shape) for value in arm.torque.at(angle))
         started = {
-            "H": arm.inertia / c1,
-            "C": arm.viscous / c1,
-            "G": (arm.weight * np.sin(angle) - c2) / c1,
+            "H": parameters["inertia"] / c1,
+            "C": parameters["viscous"] / c1,
+            "G": (parameters["weight"] * np.sin(angle) - c2) / c1,
         }
+        return self._bounded(started)
+
+    def _bounded(self, started: dict[str, Array]) -> dict[str, list[Any]]:
         if self._bounds is not None:
             started = {
                 name: np.clip(w, -b, b)
@@ -166,32 +176,76 @@ class Neural(SlidingController):
             }
         return {name: weights.tolist() for name, weights in started.items()}
 
+    def _of_joints(self, arm: JointModel, last: Array) -> dict[str, list[Any]]:
+        """Each joint over its nodes, the others in the middle of their range: (J, nodes)."""
+        joints, nodes = arm.joints, self._nodes
+        found = {name: np.empty((joints, nodes)) for name in NETWORKS}
+        middle = np.repeat((0.5 * (self._first + last))[:, None], nodes, axis=1)
+        for k in range(joints):
+            angle, unit = middle.copy(), np.zeros((joints, nodes))
+            angle[k], unit[k] = np.linspace(self._first[k], last[k], nodes), 1.0
+            rows, still = angle.ravel(), np.zeros(angle.size)
+
+            def own(torque: Value, k: int = k) -> Array:
+                found: Array = np.asarray(torque).reshape(joints, nodes)[k]
+                return found
+
+            c1, c2 = (own(value) for value in arm.torque.at(rows))
+            held = own(arm.inverse_dynamics(rows, still, still, still))
+            pushed = own(arm.inverse_dynamics(rows, still, still, unit.ravel()))
+            turned = own(arm.inverse_dynamics(rows, still, unit.ravel(), still))
+            found["H"][k], found["C"][k] = (pushed - held) / c1, (turned - held) / c1
+            found["G"][k] = (held - c2) / c1
+        return self._bounded(found)
+
     def _start(self) -> dict[str, Any]:
-        return {name: list(weights) for name, weights in self._initial.items()}
+        # of several joints they become arrays with the first sample, which says of how many plants
+        return (
+            {name: list(weights) for name, weights in self._initial.items()}
+            if self._single
+            else dict.fromkeys(NETWORKS)
+        )
+
+    def _row_shape(self, name: str, start: Any) -> tuple[int, ...]:
+        return (self._nodes,)
 
     @property
     def angles(self) -> Array:
-        """Angles of the nodes [rad]."""
-        return self._first + np.arange(self._nodes) / self._density
+        """Angles of the nodes [rad], shape (nodes,); of several joints (J, nodes)."""
+        return np.asarray(
+            np.linspace(self._first, np.asarray(self.arm.angle_range[1]), self._nodes).T
+        )
 
     @property
     def weights(self) -> dict[str, Array]:
-        """Weights of the networks: name -> shape (nodes,), of a batch (n, nodes)."""
-        return {name: np.array(getattr(self, f"_{name}")) for name in NETWORKS}
+        """Weights of the networks: name -> shape (nodes,), of a batch (n, nodes); of several joints
+        (J, nodes) before the first sample, (J n, nodes) from then on.
+        """
+        now = {name: getattr(self, f"_{name}") for name in NETWORKS}
+        return {n: np.array(self._initial[n] if w is None else w) for n, w in now.items()}
 
     def basis(self, angle: Value) -> Array:
         """``phi`` of every node [1] at angles [rad], shape (nodes,) or (n, nodes)."""
-        place = np.clip((np.asarray(angle) - self._first) * self._density, 0.0, self._nodes - 1.0)
-        return np.maximum(1.0 - np.abs(place[..., None] - np.arange(self._nodes)), 0.0)
+        first, density = self._nodes_of(np.size(angle))
+        place = np.clip((np.asarray(angle) - first) * density, 0.0, self._nodes - 1.0)
+        return np.asarray(np.maximum(1.0 - np.abs(place[..., None] - np.arange(self._nodes)), 0.0))
+
+    def _nodes_of(self, rows: int) -> tuple[Any, Any]:
+        """First node [rad] and nodes per radian of every row."""
+        if self._single:
+            return self._first, self._density
+        plants = rows // self.arm.joints
+        return np.repeat(self._first, plants), np.repeat(self._density, plants)
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        """Desired gauge pressure [Pa] for a sample, within the arm's limits; see
         :meth:`pamrs.control.Controller.update`.
         """
         surface: tuple[Any, ...] = self._surface(time, measurement, reference)
         if self._batch is not None:
             return self._of_batch(*(np.broadcast_to(value, self._batch) for value in surface))
-        angle, rate, acceleration, s, switching = surface
+        angle, _, rate, acceleration, s, switching = surface
+        lowest, highest = self.arm.limits(angle)
         h, c, g = self._H, self._C, self._G
         place, top = (angle - self._first) * self._density, self._nodes - 1.0
         place = 0.0 if place < 0.0 else top if place > top else place
@@ -207,7 +261,7 @@ class Neural(SlidingController):
             + (before * g[k] + after * g[j])
             - switching
         )
-        pressure = clip(wanted, 0.0, self._limit)
+        pressure = clip(wanted, lowest, highest)
         error: Any = dead(s, self._deadband)
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
@@ -226,37 +280,56 @@ class Neural(SlidingController):
     _G: Any
 
     @property
+    def _span(self) -> list[Any]:
+        """Range of the nodes as a file has it."""
+        return [np.asarray(end).tolist() for end in self.arm.angle_range]
+
+    @property
     def _tops(self) -> tuple[float, ...]:
         return (math.inf, math.inf, math.inf) if self._bounds is None else self._bounds
 
+    def _rows_of(self, name: str, n: int) -> Array:
+        """Weights of a network, a row for each plant and joint, to be changed."""
+        kept = getattr(self, f"_{name}")
+        weights = np.asarray(self._initial[name] if kept is None else kept, dtype=np.float64)
+        if weights.ndim == 1:
+            return np.tile(weights, (n, 1))
+        if len(weights) < n:  # one for each joint
+            return np.repeat(weights, n // len(weights), axis=0)
+        # a refused sample leaves what was there, which a start of None does not copy
+        return weights if self._single else weights.copy()
+
     def _of_batch(
-        self, angle: Array, rate: Array, acceleration: Array, s: Array, switching: Array
+        self,
+        angle: Array,
+        motion: Array,
+        rate: Array,
+        acceleration: Array,
+        s: Array,
+        switching: Array,
     ) -> Array:
         """The same for a batch, each plant with weights of its own."""
         n = s.size
-        networks: list[Array] = []
-        for name in NETWORKS:
-            weights = np.asarray(getattr(self, f"_{name}"), dtype=np.float64)
-            networks.append(np.tile(weights, (n, 1)) if weights.ndim == 1 else weights)
-            setattr(self, f"_{name}", networks[-1])
-        place = np.minimum(
-            np.maximum((angle - self._first) * self._density, 0.0), self._nodes - 1.0
-        )
+        networks = [self._rows_of(name, n) for name in NETWORKS]
+        for name, weights in zip(NETWORKS, networks, strict=True):
+            setattr(self, f"_{name}", weights)
+        first, density = self._nodes_of(n)
+        place = np.minimum(np.maximum((angle - first) * density, 0.0), self._nodes - 1.0)
         k = np.minimum(place.astype(np.intp), self._nodes - 2)
         after = place - k
         before = 1.0 - after
         j, row = k + 1, np.arange(n)
         h, c, g = (before * w[row, k] + after * w[row, j] for w in networks)
         wanted = h * acceleration + c * rate + g - switching
-        pressure = np.asarray(clip(wanted, 0.0, self._limit))
-        error = dead(s, self._deadband)
+        pressure = np.asarray(clip(wanted, *self.arm.limits(angle)))
+        error = dead(s, self._rows(self._deadband, s))
         if self.hold_at_limit:
             error = held(error, wanted - pressure)
         factors: tuple[Any, ...] = (acceleration, rate, 1.0)
         for weights, gain, factor, bound in zip(
             networks, self._rates, factors, self._tops, strict=True
         ):
-            step = gain * factor * error
+            step = self._rows(gain, s) * factor * error
             weights[row, k] = np.minimum(np.maximum(weights[row, k] - step * before, -bound), bound)
             weights[row, j] = np.minimum(np.maximum(weights[row, j] - step * after, -bound), bound)
         return pressure
@@ -279,7 +352,7 @@ class Neural(SlidingController):
         """
         content = {
             "schema": _SCHEMA,
-            "angle_range": list(self.arm.angle_range),
+            "angle_range": self._span,
             "nodes": self._nodes,
         }
         weights = {name: array.tolist() for name, array in self.weights.items()}
@@ -306,7 +379,7 @@ class Neural(SlidingController):
                 raise ParameterError(
                     f"{path}: schema is {content['schema']!r}; {_SCHEMA!r} is needed"
                 )
-            nodes, span = content["nodes"], tuple(content["angle_range"])
+            nodes, span = content["nodes"], content["angle_range"]
             weights = {
                 name: np.asarray(content["weights"][name], dtype=np.float64) for name in NETWORKS
             }
@@ -314,8 +387,8 @@ class Neural(SlidingController):
             raise
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ParameterError(f"{path}: no networks of pamrs ({error})") from error
-        if nodes != self._nodes or span != tuple(self.arm.angle_range):
-            own = f"{self._nodes} nodes over {tuple(self.arm.angle_range)} rad"
+        if nodes != self._nodes or span != self._span:
+            own = f"{self._nodes} nodes over {self._span} rad"
             raise ParameterError(
                 f"{path}: {nodes} nodes over {span} rad; this controller has {own}"
             )

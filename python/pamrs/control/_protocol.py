@@ -58,9 +58,10 @@ class Controller(abc.ABC):
     ----------
     period : float
         Time between two updates [s].
-    answers : {"valve", "pressure"}
-        What :meth:`update` gives: a valve command [V], or a desired gauge pressure [Pa] that a
-        :class:`pamrs.control.Cascade` makes.
+    answers : {"valve", "pressure", "inputs"}
+        What :meth:`update` gives: a valve command [V]; a desired gauge pressure [Pa] that a
+        :class:`pamrs.control.Cascade` or a :class:`pamrs.control.RigController` makes; or every
+        input of a rig, as keywords of :meth:`pamrs.Simulator.step`.
     """
 
     period: float
@@ -156,6 +157,11 @@ def check_drives_valve(controller: Controller) -> None:
     ParameterError
         If it answers a pressure.
     """
+    if controller.answers == "inputs":
+        raise ParameterError(
+            f"controller is a {type(controller).__name__}, which answers every input of a rig: one "
+            "that answers a valve command [V] is needed here"
+        )
     if controller.answers != "valve":
         raise ParameterError(
             f"controller is a {type(controller).__name__}, which answers a {controller.answers} "

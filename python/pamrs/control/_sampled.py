@@ -73,6 +73,10 @@ class Stateful:
         for part in self._PARTS:
             getattr(self, part).restore(state[part])
 
+    def _row_shape(self, name: str, start: Any) -> tuple[int, ...]:
+        """Shape of a number of the state, of one plant."""
+        return np.shape(start)[-1:] if isinstance(start, list) else ()
+
     def _leaves(self) -> dict[str, bool]:
         """Every attribute in which a number of the state is kept, dotted, and whether it is changed
         in place.
@@ -117,7 +121,7 @@ class Stateful:
                 )
             if not np.all(np.isfinite(array)):
                 raise ParameterError(f"{where}.{name} is not finite")
-            shape = () if start is None else np.shape(start)[-1:] if isinstance(start, list) else ()
+            shape = self._row_shape(name, start)
             rows = array.shape[: array.ndim - len(shape)]
             if array.shape[len(rows) :] != shape or (
                 rows != () and (len(rows) > 1 or batch not in (-1, rows[0]))

@@ -10,17 +10,22 @@ Control, 1991, ch. 7 and 9).
 
 On the simplified plant (5.4) with the right parameters ``I s' = -b s - C1 KD sgn(s)``, so that
 ``s s' < 0`` outside the boundary layer.
+
+Of several joints the torque is ``M(q) q_r'' + C(q, q') q_r' + B q_r' + g(q)``
+(:meth:`pamrs.control.JointModel.inverse_dynamics`), and ``s' M s/2`` falls as ``I s^2/2`` does.
 """
 
 from __future__ import annotations
 
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from pamrs.control._joint_sensor import JointSensor
-from pamrs.control._model import ArmModel
+from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, SampledController
-from pamrs.control._values import as_value, clip, positive_gain, sign, sin
+from pamrs.control._values import as_value, clip, positive_gain, sign
 
 __all__ = ["Sliding", "SlidingController", "Surface"]
 
@@ -30,6 +35,8 @@ class Surface(NamedTuple):
 
     angle: Value
     """Filtered angle [rad]."""
+    motion: Value
+    """Filtered rate [rad/s]."""
     rate: Value
     """Reference rate ``theta_r'`` [rad/s]."""
     acceleration: Value
@@ -46,10 +53,11 @@ class SlidingController(SampledController):
 
     Parameters
     ----------
-    arm : ArmModel
+    arm : JointModel
         The controller's model.
     slope : float or ndarray, shape (n,)
-        ``lambda`` [1/s].
+        ``lambda`` [1/s]. Of J joints this, the next two and the gains of a law may be one number
+        for each joint, shape (J,), or (J n,) for a batch of n plants.
     switching : float or ndarray, shape (n,)
         ``KD`` [Pa].
     boundary_layer : float or ndarray, shape (n,)
@@ -67,7 +75,7 @@ class SlidingController(SampledController):
 
     def __init__(
         self,
-        arm: ArmModel,
+        arm: JointModel,
         *,
         slope: Value = 5.0,
         switching: Value = 2e4,
@@ -91,11 +99,20 @@ class SlidingController(SampledController):
             period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
         )
         filters = (self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
+        self._several = arm.joints > 1
+        own = (self._slope, self._switching, self._boundary_layer, *gains)
         super().__init__(
             period,
-            (self._slope, self._switching, self._boundary_layer, *arm.gains, *filters, *gains),
+            # one number for each joint says nothing about how many plants there are
+            (*(g for g in own if not (self._several and np.size(g) == arm.joints)), *arm.gains)
+            + filters,
         )
-        self._limit = arm.pressure_limit
+
+    def _rows(self, gain: Value, like: Value) -> Value:
+        """A gain in the rows of a value: one for each joint is that of all its plants."""
+        if not self._several or gain.__class__ is float or np.size(gain) == np.size(like):
+            return gain
+        return np.repeat(gain, np.size(like) // self.arm.joints)
 
     def _surface(self, time: float, measurement: Measurement, reference: Reference) -> Surface:
         """The sample, checked, and noted in the filters."""
@@ -103,11 +120,13 @@ class SlidingController(SampledController):
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
-        wanted = aim.rate - self._slope * (angle - aim.angle)
-        acceleration = aim.acceleration - self._slope * (rate - aim.rate)
+        slope = self._rows(self._slope, angle)
+        wanted = aim.rate - slope * (angle - aim.angle)
+        acceleration = aim.acceleration - slope * (rate - aim.rate)
         s = rate - wanted
-        side = sign(s) if self._sharp else clip(s / self._layer, -1.0, 1.0)
-        return Surface(angle, wanted, acceleration, s, self._switching * side)
+        side = sign(s) if self._sharp else clip(s / self._rows(self._layer, s), -1.0, 1.0)
+        switching = self._rows(self._switching, s) * side
+        return Surface(angle, rate, wanted, acceleration, s, switching)
 
 
 class Sliding(SlidingController):
@@ -120,7 +139,7 @@ class Sliding(SlidingController):
 
     Parameters
     ----------
-    arm : ArmModel
+    arm : JointModel
         The controller's model, simplified as in (5.1)-(5.4) or full.
     **others
         As for :class:`SlidingController`.
@@ -131,15 +150,18 @@ class Sliding(SlidingController):
         If a number is not finite or not allowed; the message names it.
     """
 
-    def __init__(self, arm: ArmModel, **others: Any) -> None:
+    def __init__(self, arm: JointModel, **others: Any) -> None:
         super().__init__(arm, **others)
         self.reset()
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:
-        """Desired gauge pressure [Pa] for a sample, within 0 and the limit; see
+        """Desired gauge pressure [Pa] for a sample, within the arm's limits; see
         :meth:`pamrs.control.Controller.update`.
         """
         arm = self.arm
-        angle, rate, acceleration, _, switching = self._surface(time, measurement, reference)
-        torque = arm.inertia * acceleration + arm.viscous * rate + arm.weight * sin(angle)
-        return clip(arm.pressure(torque, angle) - switching, 0.0, self._limit)
+        angle, motion, rate, acceleration, _, switching = self._surface(
+            time, measurement, reference
+        )
+        torque = arm.inverse_dynamics(angle, motion, rate, acceleration)
+        low, high = arm.limits(angle)
+        return clip(arm.pressure(torque, angle) - switching, low, high)

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control._loop import Actuation, actuation_of, tracked_of
+from pamrs.control._loop import Actuation, actuation_of, measured_by, tracked_of
 from pamrs.control._protocol import Controller, check_controller
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control._values import angle_factor
 from pamrs.control.metrics import slope_sine
 from pamrs.control.trajectories import Trajectory, check_angles
+from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import default_step, whole_samples
 
@@ -147,7 +148,12 @@ def sweep(
     act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
     read = reader_of(sensors, period)
     controller.reset()
-    alias = dict(measured or {})
+    joints = getattr(controller, "joints", ("",))
+    if len(joints) > 1:
+        raise ParameterError(
+            f"controller turns the joints {', '.join(joints)}: a sweep follows one joint"
+        )
+    alias = measured_by(controller, measured)
     angle, rate = tracked_of(batch.rigs[0], alias)
     sums = _Sums(len(batch), factor)
     k = 0

@@ -26,6 +26,7 @@ from pamrs.errors import ParameterError
 
 __all__ = [
     "TABLE_5_1",
+    "JointTrajectories",
     "Trajectory",
     "check_angles",
     "compound",
@@ -135,6 +136,44 @@ class Trajectory:
             np.arange(math.floor(length / sample_time + 1e-9) + 1) * sample_time, dtype=np.float64
         )
         return time, self(time)
+
+
+@dataclass(frozen=True)
+class JointTrajectories:
+    """Where several joints should be: a trajectory for each.
+
+    Attributes
+    ----------
+    of_joint : mapping of str to Trajectory
+        Name of the joint -> its trajectory, base first.
+    """
+
+    of_joint: Mapping[str, Trajectory]
+
+    @property
+    def duration(self) -> float:
+        """The longest of their records [s]."""
+        return max(one.duration for one in self.of_joint.values())
+
+    def __call__(self, time: float | Array) -> Reference:
+        """The references at a time or at many [s].
+
+        Parameters
+        ----------
+        time : float or ndarray, shape (k,)
+
+        Returns
+        -------
+        Reference
+            Of arrays of shape (joints,), or (joints, k).
+
+        Raises
+        ------
+        ParameterError
+            If a time is not finite.
+        """
+        each = [one(time) for one in self.of_joint.values()]
+        return Reference(*(np.array(values) for values in zip(*each, strict=True)))
 
 
 @dataclass(frozen=True)

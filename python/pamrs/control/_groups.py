@@ -1,0 +1,198 @@
+"""What of a rig a controller acts on: its joints, the muscles that turn each, what feeds them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pamrs.errors import ParameterError
+
+if TYPE_CHECKING:
+    from pamrs.rig import Rig
+
+__all__ = ["Feed", "Group", "groups_of", "highest_pressure", "joints_of", "named"]
+
+
+def named(word: str, name: str) -> str:
+    """A channel, or a block in full: the bare word for a block without a name."""
+    return f"{word}.{name}" if name else word
+
+
+@dataclass(frozen=True)
+class Feed:
+    """What sets the pressure of a chamber.
+
+    Attributes
+    ----------
+    input : {"valve_command", "supply_command", "pressure"}
+        Keyword of :meth:`pamrs.Simulator.step`: a valve's volts, a regulator's set pressure, or the
+        pressure itself where the rig has neither.
+    name : str
+        Of the valve, regulator or chamber.
+    supply : str or None
+        Name of the supply behind it; None where there is none.
+    """
+
+    input: str
+    name: str
+    supply: str | None
+
+
+@dataclass(frozen=True)
+class Group:
+    """Muscles that share a chamber, on one joint.
+
+    Attributes
+    ----------
+    chamber, joint : str
+        Their names.
+    muscles : tuple of str
+    feed : Feed
+    """
+
+    chamber: str
+    joint: str
+    muscles: tuple[str, ...]
+    feed: Feed
+
+
+def joints_of(rig: Rig) -> tuple[str, ...]:
+    """Names of a rig's joints, base first.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    tuple of str
+
+    Raises
+    ------
+    ParameterError
+        If it has no muscle, joint or arm; the message says what a load is instead.
+    """
+    if rig.tables("load"):
+        raise ParameterError(
+            f"rig {rig.name!r} has a [load] in the place of joint and arm, which no controller of "
+            "a joint turns: a rig with [joint] and [arm] is needed"
+        )
+    for block in ("muscle", "joint", "arm"):
+        if not rig.tables(block):
+            raise ParameterError(
+                f"rig {rig.name!r} has no [{block}]: a controller's model needs muscle, joint and "
+                "arm"
+            )
+    links = rig.ports("link")
+    if not links:
+        return tuple(rig.tables("joint"))
+    return tuple(_short(ports["joint"]) for ports in links.values())
+
+
+def groups_of(rig: Rig) -> tuple[Group, ...]:
+    """The groups of muscles of a rig, in the order of its chambers.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    tuple of Group
+
+    Raises
+    ------
+    ParameterError
+        If the muscles of a chamber turn different joints, or two valves feed one chamber.
+    """
+    muscles = {
+        name: (_short(ports["chamber"]), _short(ports["joint"]))
+        for name, ports in rig.ports("muscle").items()
+    }
+    found = []
+    ways = (rig.ports("valve"), rig.ports("line"), rig.tables("supply"))
+    for chamber in rig.tables("chamber"):
+        here = tuple(name for name, (place, _) in muscles.items() if place == chamber)
+        turned = {muscles[name][1] for name in here}
+        if len(turned) > 1:
+            raise ParameterError(
+                f"rig {rig.name!r}: the muscles of {named('chamber', chamber)} turn the joints "
+                f"{', '.join(sorted(turned))}; a controller's model needs a chamber for each"
+            )
+        if here:
+            found.append(Group(chamber, turned.pop(), here, _feed(rig.name, chamber, *ways)))
+    return tuple(found)
+
+
+def highest_pressure(rig: Rig) -> float:
+    """The largest gauge pressure that a controller may ask for by default [Pa]: what the supplies
+    hold at first, or ``max_pressure`` of ``[limits]`` where that is less, or a regulator is set by
+    the controller itself.
+
+    Raises
+    ------
+    ParameterError
+        If the rig says neither.
+    """
+    supplies = rig.tables("supply")
+    through_valves = {_short(ports["from"]) for ports in rig.ports("valve").values()}
+    held = [
+        float(supply["initial_pressure"])
+        for name, supply in supplies.items()
+        if supply.get("kind") != "regulator" or name in through_valves
+    ]
+    stated = rig.limits.get("max_pressure")
+    if stated is not None:
+        held = [min([float(stated), *held])] if held else [float(stated)]
+    if not held:
+        what = "regulators without valves" if supplies else "no [supply]"
+        raise ParameterError(
+            f"rig {rig.name!r} has {what}: the pressure limit cannot be taken from it; give "
+            "pressure_limit, or [limits] max_pressure in the rig"
+        )
+    return max(held)
+
+
+def _short(block: str) -> str:
+    """``"joint.elbow"`` as ``"elbow"``, ``"joint"`` as ``""``."""
+    return block.partition(".")[2]
+
+
+def _feed(
+    rig: str,
+    chamber: str,
+    valves: Mapping[str, Mapping[str, str]],
+    lines: Mapping[str, Mapping[str, str]],
+    supplies: Mapping[str, Mapping[str, Any]],
+) -> Feed:
+    """What lies up the way of the air, through lines, from a chamber of a rig."""
+    here, passed = named("chamber", chamber), set()
+    while here not in passed:
+        passed.add(here)
+        fed = [(name, ports) for name, ports in valves.items() if ports["to"] == here]
+        if len(fed) > 1:
+            raise ParameterError(
+                f"rig {rig!r}: the valves {', '.join(n for n, _ in fed)} feed {here}; a "
+                "controller's model needs one"
+            )
+        if fed:
+            place = fed[0][1]["from"]
+            supply = _short(place) if place.partition(".")[0] == "supply" else None
+            return Feed("valve_command", fed[0][0], supply)
+        before = [ports["from"] for ports in lines.values() if ports["to"] == here]
+        before += [named("line", name) for name, ports in lines.items() if ports["to"] == here]
+        places = [place for place in before if place and place not in passed]
+        supplied = [place for place in places if place.partition(".")[0] == "supply"]
+        if supplied:
+            name = _short(supplied[0])
+            if supplies[name].get("kind") != "regulator":
+                break
+            return Feed("supply_command", name, name)
+        if not places:
+            return Feed("pressure", chamber, None)
+        here = places[-1]
+    raise ParameterError(
+        f"rig {rig!r}: nothing that can be commanded feeds {named('chamber', chamber)}; a valve or "
+        "a regulator is needed"
+    )

@@ -1,0 +1,431 @@
+"""A law of motion on any rig: what it asks of each joint becomes pressures of the chambers, and
+these the commands of valves and regulators.
+
+::
+
+    law              angles -> drive of each joint            one equation, see each law
+    arm.torque       drive -> torque                          JointModel
+    share            torque -> pressure of each chamber       Together, CoContraction, Recruitment
+    way of the air   pressure -> command of its valve         PressureLoop, FlowInverse
+                     or regulator                             SetPoint
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
+
+import numpy as np
+
+from pamrs.control._air import AirModel
+from pamrs.control._groups import Group, named
+from pamrs.control._protocol import (
+    Controller,
+    Measurement,
+    Reference,
+    Value,
+    check_answers_pressure,
+)
+from pamrs.control._rig_model import RigModel
+from pamrs.control._sampled import Restorer, SampledController, Stateful
+from pamrs.control._sharing import CoContraction, Demand, Share, Together
+from pamrs.control._values import where as chosen
+from pamrs.control._ways import FlowInverse, SetPoint
+from pamrs.errors import ParameterError
+
+__all__ = ["RigController"]
+
+
+class _Law(Stateful):
+    """A law over all joints, as a part: with J joints its batch has J rows for each plant."""
+
+    def __init__(self, law: Controller, joints: int) -> None:
+        self.law, self.joints = law, joints
+        batch = getattr(law, "_gain_batch", None)
+        if batch is not None and batch % joints:
+            raise ParameterError(
+                f"law has gains for {batch} rows: a multiple of the {joints} joints is needed"
+            )
+        self.gain_batch = None if batch is None else batch // joints
+
+    def reset(self) -> None:
+        self.law.reset()
+
+    @property
+    def state(self) -> dict[str, Any]:
+        return self.law.state
+
+    def restore(self, state: Mapping[str, Any]) -> None:
+        self.law.restore(state)
+
+    def _leaves(self) -> dict[str, bool]:
+        leaves = self.law._leaves() if isinstance(self.law, Stateful) else {"state": False}
+        return {f"law.{name}": changed for name, changed in leaves.items()}
+
+    def _check_state(
+        self, state: Mapping[str, Any], where: str = "state", batch: int | None = -1
+    ) -> None:
+        if not isinstance(self.law, SampledController):
+            return
+        self.law._check_state(state, where)
+        own = state["batch"]
+        plants = 1 if batch is None else batch
+        allowed = (None, batch) if self.joints == 1 else (None, self.joints * plants)
+        if batch != -1 and own not in allowed:
+            raise ParameterError(
+                f"{where}.batch = {own!r} is not allowed: {self.joints * plants} rows are needed "
+                f"for {self.joints} joints of {plants} plants"
+            )
+
+
+class _Named(Stateful):
+    """Parts with the names of chambers or joints."""
+
+    def __init__(self, parts: Mapping[str, Any]) -> None:
+        self._PARTS = tuple(f"of {name}" for name in parts)  # type: ignore[misc]
+        for name, part in parts.items():
+            setattr(self, f"of {name}", part)
+
+
+class RigController(SampledController):
+    """A law of motion on any rig; answers the keywords of :meth:`pamrs.Simulator.step`.
+
+    Parameters
+    ----------
+    model : RigModel
+        What is known of the rig.
+    law : Controller
+        It answers a pressure (:class:`Sliding`, :class:`AdaptiveSliding`, :class:`Neural`,
+        :class:`FeedforwardPressure`, one of your own), and was made with ``model.arm``: the drive
+        of every joint.
+    stiffness : float, ndarray, shape (n,), callable, or mapping of str to one, optional
+        Of joints with muscles on both sides [N m/rad], see :class:`CoContraction`; the least
+        pressures by default.
+    shares : mapping of str to Share, optional
+        Joint -> how its muscles share the torque, in the place of :class:`Together` or
+        :class:`CoContraction`; a share by itself for a rig of one joint.
+    air : {"loop", "flow"} or mapping of str to AirWay, optional
+        From a wanted pressure to a valve's command: a pressure loop with a gain by the valve's
+        size, or the feedforward's :class:`FlowInverse`; or chamber -> one of your own. By default
+        ``"flow"`` with a law whose motion is commanded, else ``"loop"``. A regulator is set to the
+        pressure.
+    km : float or ndarray, shape (n,)
+        Of ``"flow"`` [1/s].
+    lead : float or "lag"
+        How far a regulator's set pressure is ahead of the wanted one [s], see :class:`SetPoint`;
+        ``"lag"``: by its own time constant.
+
+    Notes
+    -----
+    Channels are ``joint_angle``, ``joint_rate``, ``muscle_pressure`` and ``supply_pressure`` with
+    the rig's names behind. With several joints a reference has one entry for each along its first
+    axis, base first. Groups that the model leaves out stay vented.
+
+    Raises
+    ------
+    ParameterError
+        If the law answers no pressure, a name is unknown, or a number is not allowed.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> from pamrs.control import RigController, RigModel, Sliding, closed_loop
+    >>> from pamrs.control.trajectories import degrees, step
+    >>> rig = pamrs.rigs.named("antagonistic_joint")
+    >>> model = RigModel(rig)
+    >>> law = Sliding(model.arm, slope=8.0, period=0.005)
+    >>> controller = RigController(model, law, stiffness=6.0)
+    >>> run = closed_loop(rig, controller, step(*degrees(20, 45), duration=2.0))
+    >>> bool(abs(run.error[-1]) < 0.05)
+    True
+    """
+
+    answers = "inputs"
+    _PARTS: ClassVar[tuple[str, ...]] = ("law", "shares", "air")
+
+    def __init__(
+        self,
+        model: RigModel,
+        law: Controller,
+        *,
+        stiffness: Any = None,
+        shares: Share | Mapping[str, Share] | None = None,
+        air: str | Mapping[str, Any] | None = None,
+        km: Value = 20.0,
+        lead: Value | str = "lag",
+    ) -> None:
+        check_answers_pressure(law)
+        self.model, self.joints = model, model.joints
+        self.law = _Law(law, len(model.joints))
+        self._commanded = getattr(law, "motion", "measured") == "commanded"
+        given = {model.joints[0]: shares} if isinstance(shares, Share) else dict(shares or {})
+        self._check_names("shares", given, model.joints)
+        self._shares = [self._share(name, given.get(name), stiffness) for name in model.joints]
+        self.shares = _Named(dict(zip(model.joints, self._shares, strict=True)))
+        chosen = ("flow" if self._commanded else "loop") if air is None else air
+        self._ways = [self._way(group, chosen, law.period, km, lead) for group in model.groups]
+        self.air = _Named(
+            {group.chamber: way for group, way in zip(model.groups, self._ways, strict=True)}
+        )
+        super().__init__(law.period, parts=[w for w in self._ways if isinstance(w, Controller)])
+        sizes = {size for size in (self._gain_batch, self.law.gain_batch) if size is not None}
+        sizes |= {np.size(km)} if isinstance(km, np.ndarray) else set()
+        if len(sizes) > 1:
+            raise ParameterError(
+                f"law and air have gains for {sorted(sizes)} plants: one number is needed"
+            )
+        self._gain_batch = sizes.pop() if sizes else None
+        self._number = {name: k for k, name in enumerate(model.joints)}
+        self._channels = self._named_channels()
+        self._vented = [(group, self._opened(group)) for group in model.vented]
+        self._open = [self._opened(group) for group in model.groups]
+        self._before = Restorer(self)
+        self.reset()
+
+    # ------------------------------------------------------------------ made
+
+    @staticmethod
+    def _check_names(what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
+        for name in given:
+            if name not in known:
+                raise ParameterError(
+                    f"{what} has {name!r}; the rig has {', '.join(map(repr, known))}"
+                )
+
+    def _share(self, joint: str, given: Share | None, stiffness: Any) -> Share:
+        if isinstance(stiffness, Mapping):
+            self._check_names("stiffness", stiffness, self.joints)
+            stiffness = stiffness.get(joint)
+        torques, limit = self.model.torques_of(joint), self.model.pressure_limit
+        if given is not None:
+            if len(given.groups) != len(torques):
+                raise ParameterError(
+                    f"the share of {named('joint', joint)} is for {len(given.groups)} groups; the "
+                    f"joint has {len(torques)}"
+                )
+            return given
+        if self.model.opposed(joint):
+            return CoContraction(torques, limit, stiffness=stiffness)
+        if stiffness is not None:
+            raise ParameterError(
+                f"stiffness is given for {named('joint', joint)}, whose muscles are all on one "
+                "side: it follows from the torque"
+            )
+        return Together(torques, limit)
+
+    def _way(
+        self, group: Group, chosen: str | Mapping[str, Any], period: float, km: Value, lead: Any
+    ) -> Any:
+        model, feed = self.model, group.feed
+        if isinstance(chosen, Mapping):
+            self._check_names("air", chosen, [g.chamber for g in model.groups])
+            if group.chamber in chosen:
+                return chosen[group.chamber]
+            chosen = "flow" if self._commanded else "loop"
+        if chosen not in ("loop", "flow"):
+            raise ParameterError(
+                f"air = {chosen!r} is not allowed: 'loop', 'flow' or a way for each chamber"
+            )
+        if feed.input != "valve_command":
+            if lead == "lag":
+                supply = model.rig.tables("supply").get(feed.supply or "", {})
+                lead = float(supply.get("time_constant", 0.0))
+            return SetPoint(model.pressure_limit, period=period, lead=lead)
+        if chosen == "flow":
+            return FlowInverse(AirModel(model.rig, group.chamber), km, period=period)
+        return model.pressure_loop(group.chamber, period=period)
+
+    def _named_channels(self) -> tuple[list[str], list[str], list[str], list[str | None]]:
+        model = self.model
+        angles = [named("joint_angle", name) for name in model.joints]
+        rates = [named("joint_rate", name) for name in model.joints]
+        pressures = [named("muscle_pressure", group.chamber) for group in model.groups]
+        supplies = [
+            None if g.feed.supply is None else named("supply_pressure", g.feed.supply)
+            for g in model.groups
+        ]
+        return angles, rates, pressures, supplies
+
+    # ------------------------------------------------------------------ used
+
+    def update(  # type: ignore[override]
+        self, time: float, measurement: Measurement, reference: Reference
+    ) -> dict[str, Any]:
+        """Commands for a sample.
+
+        Parameters
+        ----------
+        time : float
+            [s]
+        measurement : mapping of str to float or ndarray, shape (n,)
+            Channels in SI units.
+        reference : Reference
+            Of one joint as for every controller; of J joints with entries of shape (J,), or (J, n)
+            for a batch, or numbers for all.
+
+        Returns
+        -------
+        dict
+            ``valve_command`` [V], ``supply_command`` or ``pressure`` [Pa], each a number (an array
+            of a batch) or a mapping of names to one.
+
+        Raises
+        ------
+        ParameterError
+            If a channel is missing or not finite; the message names it. Nothing is changed then.
+        """
+        angles, rates, pressures, supplies = self._read_all(measurement)
+        aim = self._rows_of(reference)
+        sample: dict[str, Value] = {"joint_angle": self._stacked(angles)}
+        if rates is not None:
+            sample["joint_rate"] = self._stacked(rates)
+        before = self._before.take()
+        try:
+            drive = self.law.law.update(time, sample, aim)
+            self._tick(time)
+            return self._commands(time, drive, sample, aim, pressures, supplies)
+        except ParameterError as error:
+            self._before.put_back(before)
+            raise self._refusal(str(error)) from None
+
+    def _read_all(
+        self, measurement: Measurement
+    ) -> tuple[list[Value], list[Value] | None, list[Value], list[Value]]:
+        angle, rate, pressure, supply = self._channels
+        limit = self.model.pressure_limit
+        angles = [self._read(measurement, name) for name in angle]
+        rates = (
+            [self._read(measurement, name) for name in rate]
+            if all(name in measurement for name in rate)
+            else None
+        )
+        pressures = [self._read(measurement, name) for name in pressure]
+        supplies = [
+            self._read(measurement, name) if name is not None and name in measurement else limit
+            for name in supply
+        ]
+        return angles, rates, pressures, supplies
+
+    def _commands(
+        self,
+        time: float,
+        drive: Value,
+        sample: Mapping[str, Value],
+        aim: Reference,
+        pressures: list[Value],
+        supplies: list[Value],
+    ) -> dict[str, Any]:
+        """From the drive of the joints to the commands of their air."""
+        arm = self.model.arm
+        at = aim.angle if self._commanded else sample["joint_angle"]
+        c1, c2 = arm.torque.at(self._full(at))
+        torque = c1 * drive + c2
+        each = [self._of_each(value) for value in (drive, torque, at)]
+        turning = aim.rate if self._commanded else sample.get("joint_rate", 0.0)
+        turned = self._of_each(self._full(turning))
+        wanted: dict[str, Value] = {}
+        idle: dict[str, Any] = {}
+        for k, (name, share) in enumerate(zip(self.joints, self._shares, strict=True)):
+            which = [i for i, g in enumerate(self.model.groups) if g.joint == name]
+            demand = Demand(
+                time,
+                each[0][k],
+                each[1][k],
+                each[2][k],
+                tuple(pressures[i] for i in which),
+                tuple(supplies[i] for i in which),
+            )
+            for i, value in zip(which, share.pressures(demand), strict=True):
+                wanted[self.model.groups[i].chamber] = value
+            for i, vented in zip(which, share.vented, strict=True):
+                idle[self.model.groups[i].chamber] = vented
+        answers: dict[str, Any] = {}
+        for i, (group, way) in enumerate(zip(self.model.groups, self._ways, strict=True)):
+            k = self._number[group.joint]
+            seen = {
+                "muscle_pressure": pressures[i],
+                "supply_pressure": supplies[i],
+                "joint_angle": each[2][k],
+                "joint_rate": turned[k],
+            }
+            command = self._sized_for_batch(way.track(time, seen, wanted[group.chamber]))
+            vented = idle[group.chamber]
+            if vented is not False:
+                command = chosen(vented, self._open[i], command)
+            self._answer(answers, group, command)
+        for group, command in self._vented:
+            self._answer(answers, group, self._sized_for_batch(command))
+        return answers
+
+    def _opened(self, group: Group) -> float:
+        """The command that opens a group that is not used to the ambient."""
+        if group.feed.input != "valve_command":
+            return 0.0
+        valve = self.model.rig.tables("valve")[group.feed.name]
+        return float(valve["null_voltage"]) - float(valve["half_range"])
+
+    @staticmethod
+    def _answer(answers: dict[str, Any], group: Group, command: Value) -> None:
+        feed = group.feed
+        if feed.name:
+            answers.setdefault(feed.input, {})[feed.name] = command
+        else:
+            answers[feed.input] = command
+
+    # ------------------------------------------------------------------ rows
+
+    def _rows_of(self, reference: Reference) -> Reference:
+        """The reference with the rows of the law."""
+        joints = len(self.joints)
+        if joints == 1:
+            return self._aim(reference)
+        try:
+            fields = Reference(*reference)
+            arrays = [np.asarray(value, dtype=np.float64) for value in fields]
+        except (TypeError, ValueError):
+            raise self._refusal(
+                f"reference = {reference!r} is not allowed: a Reference with an entry for each of "
+                f"{', '.join(self.joints)} is needed"
+            ) from None
+        plants = 1 if self._size is None else self._size
+        found = []
+        for name, array in zip(Reference._fields, arrays, strict=True):
+            if not np.all(np.isfinite(array)):
+                raise self._refusal(f"reference.{name} is not finite")
+            if array.ndim == 2 and array.shape[0] == joints and self._size is None:
+                self._size = plants = array.shape[1]
+            if array.shape not in ((), (joints,), (joints, plants)):
+                raise self._refusal(
+                    f"reference.{name} has shape {array.shape}: {(joints,)} is needed, or "
+                    f"{(joints, plants)}"
+                )
+            rows = array if array.ndim == 0 else array.reshape(joints, -1)
+            found.append(np.broadcast_to(rows, (joints, plants)).ravel())
+        return Reference(*found)
+
+    def _stacked(self, values: list[Value]) -> Value:
+        """Values of each joint as rows."""
+        if len(values) == 1:
+            return values[0]
+        plants = self._size or 1
+        return np.concatenate([np.broadcast_to(value, plants) for value in values])
+
+    def _full(self, value: Value) -> Value:
+        """Rows of a value that may be one number for all."""
+        if value.__class__ is float and len(self.joints) == 1:
+            return value
+        rows = len(self.joints) * (self._size or 1)
+        return np.broadcast_to(value, rows) if np.ndim(value) == 0 else value
+
+    def _of_each(self, value: Value) -> list[Value]:
+        """Rows as one value for each joint."""
+        if len(self.joints) == 1:
+            return [value]
+        rows = np.asarray(value).reshape(len(self.joints), -1)
+        return rows[:, 0].tolist() if self._size is None else list(rows)
+
+    def _sized_for_batch(self, value: Value) -> Value:
+        """A command for every plant of a batch."""
+        if self._size is None:
+            return float(value)
+        return np.full(self._size, value) if np.ndim(value) == 0 else np.asarray(value)
