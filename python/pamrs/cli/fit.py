@@ -204,7 +204,7 @@ def _friction(
     check_writable(json, png)
     check_packages("report", *(["matplotlib"] if png else []))
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    map_ = _loops(data, muscle, sizes, where or [], clipped)
+    map_ = _loops(data, muscle, sizes, where or [], clipped).with_directions()
     from pamrs.fit import fit_friction
 
     with progress(f"fitting {map_.label}"):

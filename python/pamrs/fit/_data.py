@@ -22,6 +22,7 @@ from pamrs.fit._checks import (
     check_units,
     reachable,
 )
+from pamrs.fit._ways import table_ways
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -366,6 +367,27 @@ class ForceMap:
             )
         chosen = np.unique(np.asarray(levels, dtype=np.intp) % count)
         return self._without(~np.isin(self.level, chosen), LEFT_OUT)
+
+    def with_directions(self) -> ForceMap:
+        """The map with the directions of motion that the order of its rows tells, where it has
+        none.
+
+        Returns
+        -------
+        ForceMap
+            Itself where a row has a direction, or where the order tells one only. Else with those
+            of the strokes between turning points: of the length at each pressure; at held lengths
+            of the pressure, whose rising counts as contracting.
+        """
+        if np.any(self.direction):
+            return self
+        pressure, contraction, _, level, _ = self.used_rows()
+        way = np.zeros(len(self), dtype=np.int8)
+        way[self.used] = table_ways(contraction, pressure, level)
+        if not (np.any(way < 0) and np.any(way > 0)):
+            return self
+        note = "directions of motion are those of the rows' order: no column gives them"
+        return replace(self, direction=way, notes=(*self.notes, note))
 
     def level_indices(self, pressures: Sequence[float]) -> list[int]:
         """Indices of the levels nearest to some pressures.
