@@ -453,7 +453,8 @@ class ForceMap:
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")
         map_ = map_._without(map_.used & ~_solved(muscle, e, map_.used), "no solution")
         pressure, contraction, force, _, _ = map_.used_rows()
-        able = float(np.max(pressure)) * float(np.max(np.abs(muscle.gas_area(contraction))))
+        body = muscle.replace(model="gaylord") if muscle.model == "map" else muscle
+        able = float(np.max(pressure)) * float(np.max(np.abs(body.gas_area(contraction))))
         pull = np.abs(force)
         check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
         if able <= 0.0:  # no pressure, or no pull of the gas: nothing to judge by
