@@ -183,7 +183,7 @@ def test_what_the_loops_do_not_determine_is_named():
     ):
         fit_friction(**loops(LEVELS[:1]))
     order = np.random.default_rng(2).permutation(len(made["force"]))
-    for rows in (np.lexsort((made["contraction"], made["pressure"])), order[:6]):
+    for rows in (np.lexsort((made["contraction"], made["pressure"])), order, order[:6]):
         with pytest.raises(RecordingError, match="no row has a direction of motion: give a column"):
             fit_friction(**without_direction(made, rows))
     one_way = made["direction"] < 0

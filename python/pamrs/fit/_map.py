@@ -31,6 +31,8 @@ _MOST_LEVELS: Final = 24
 """Pressure levels that are nodes themselves; of more, as in a ramp, this many are taken."""
 _NODES: Final = 20
 _MOST_NODES: Final = 200
+_SHARE: Final = 0.3
+"""Of all rows in each direction: then the branches are told apart."""
 _STIFF: Final = 1e-4
 """Penalty on second differences, of a node's mean weight: it decides nothing where rows are."""
 
@@ -46,11 +48,14 @@ class MapFit:
     force : (p, e) array
         Force at each [N], falling with contraction and rising with pressure.
     scatter : float
-        Root mean square of what the rows differ from the table [N], both branches of a hysteresis
-        included.
+        Root mean square of what the rows differ from the table [N]; of branches whose direction is
+        known, from a table of their own.
     between : float
         The same for each inner pressure level, predicted by the others [N]; NaN with fewer than
         three levels.
+    half_width : float
+        Root mean square of half the distance of both branches [N]: hysteresis, which is no error of
+        the table but for a diagnosis to find; NaN where the directions are not known.
     share : float
         The larger of both over the root mean square of the forces [1]: the model error.
     rows : int
@@ -66,6 +71,7 @@ class MapFit:
     force: Array
     scatter: float
     between: float
+    half_width: float
     share: float
     rows: int
     rest_length: float
@@ -171,6 +177,11 @@ class MapFit:
             f"{e[0]:.3g} to {e[-1]:.3g} %",
             f"  {self.rows} rows scatter by {self.scatter:.3g} N rms about it",
             f"  a pressure predicted by the others: {between}",
+            *(
+                []
+                if math.isnan(self.half_width)
+                else [f"  both branches lie {self.half_width:.3g} N rms beside it: hysteresis"]
+            ),
             f"  model error: {100.0 * self.share:.2g} % of the force",
         ]
         return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)]) + "\n"
@@ -183,6 +194,7 @@ class MapFit:
             "force": self.force.tolist(),
             "scatter": self.scatter,
             "between": None if math.isnan(self.between) else self.between,
+            "half_width": None if math.isnan(self.half_width) else self.half_width,
             "share": self.share,
             "rows": self.rows,
             "rest_length": self.rest_length,
@@ -196,7 +208,9 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
     Parameters
     ----------
     data : ForceMap
-        Forces at two pressures at least; both branches of a hysteresis are averaged.
+        Forces at two pressures at least; both branches of a hysteresis are averaged. Where no
+        column has the directions, the order of the rows may tell them
+        (:meth:`ForceMap.with_directions`).
     nodes : int
         Contractions of the table, from 3 to 200.
 
@@ -213,7 +227,8 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
     """
     if not 3 <= int(nodes) <= _MOST_NODES:
         raise ParameterError(f"nodes = {nodes!r} is not allowed: from 3 to {_MOST_NODES}")
-    gas, e, pull, _, _ = data.used_rows()
+    data = data.with_directions()
+    gas, e, pull, _, way = data.used_rows()
     pressure = _levels(data)
     contraction = np.linspace(float(e.min()), float(e.max()), int(nodes))
     if len(pressure) < 2 or not contraction[-1] > contraction[0]:
@@ -222,10 +237,21 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
             f"{100 * e.max():.3g} % contraction; a table needs two pressures at least, over a "
             "range of contraction"
         )
-    force = _table(pressure, contraction, gas, e, pull)
-    residual = pull - _predict(pressure, contraction, force, gas, e)
-    scatter = float(np.sqrt(np.mean(residual**2)))
-    between = _left_out(pressure, contraction, gas, e, pull)
+    groups = _branches(way)
+    tables = [_table(pressure, contraction, gas[r], e[r], pull[r]) for r in groups]
+    force = np.mean(tables, axis=0)  # a mean of monotone ones is one
+    squares = [
+        (pull[r] - _predict(pressure, contraction, own, gas[r], e[r])) ** 2
+        for r, own in zip(groups, tables, strict=True)
+    ]
+    count = len(pull)  # what the nodes took is given back, as far as rows are more than nodes
+    spare = count - min(len(groups) * force.size, count // 2)
+    scatter = float(np.sqrt(np.sum(np.concatenate(squares)) / spare))
+    left = [_left_out(pressure, contraction, gas[r], e[r], pull[r]) for r in groups]
+    between = float(np.sqrt(np.mean(np.concatenate(left)))) if len(left[0]) else math.nan
+    half_width = math.nan
+    if len(groups) == 2:
+        half_width = float(np.sqrt(np.mean((0.5 * (tables[1] - tables[0])) ** 2)))
     size = float(np.sqrt(np.mean(pull**2)))
     largest = max(scatter, 0.0 if math.isnan(between) else between)
     return MapFit(
@@ -234,6 +260,7 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
         force=force,
         scatter=scatter,
         between=between,
+        half_width=half_width,
         share=largest / size if size > 0.0 else 0.0,
         rows=len(pull),
         rest_length=data.rest_length,
@@ -321,8 +348,16 @@ def _isotonic(values: Array, weights: Array) -> Array:
     return np.repeat(means, counts)
 
 
-def _left_out(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> float:
-    """What each inner pressure differs from the table of the others [N]."""
+def _branches(way: NDArray[np.int8]) -> list[NDArray[np.bool_]]:
+    """Rows of either direction, where most have one; else all rows."""
+    both = [way < 0, way > 0]
+    if min(rows.sum() for rows in both) >= _SHARE * len(way):
+        return both
+    return [np.ones(len(way), dtype=bool)]
+
+
+def _left_out(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> Array:
+    """Squares of what each inner pressure differs from the table of the others [N2]."""
     nearest = np.argmin(np.abs(gas[:, None] - pressure[None, :]), axis=1)
     squares: list[Array] = []
     for k in range(1, len(pressure) - 1):
@@ -332,7 +367,7 @@ def _left_out(pressure: Array, contraction: Array, gas: Array, e: Array, pull: A
         left = np.delete(pressure, k)
         table = _table(left, contraction, gas[~mine], e[~mine], pull[~mine])
         squares.append((pull[mine] - _predict(left, contraction, table, gas[mine], e[mine])) ** 2)
-    return float(np.sqrt(np.mean(np.concatenate(squares)))) if squares else math.nan
+    return np.concatenate(squares) if squares else np.empty(0)
 
 
 def _unmeasured(pressure: Array, contraction: Array, gas: Array, e: Array) -> list[str]:

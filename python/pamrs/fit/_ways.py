@@ -17,6 +17,7 @@ Index = NDArray[np.intp]
 _HELD: Final = 0.005  # of the rest length: within it a length is held, a frame that yields included
 _CYCLED: Final = 0.1  # of the largest pressure: what the pressure does while a length is held
 _MOST: Final = 0.8  # of the rows stand at held lengths where the map is isometric
+_STROKE: Final = 4  # rows of a stroke at least, on average
 _FEWEST: Final = 8  # rows at one held length: two branches of four
 
 
@@ -123,6 +124,8 @@ def strokes(values: Array, *, whole: bool = False) -> Array:
     known = values[rows]
     turns = _turning_points(known, 0.1 * float(np.ptp(known)))
     if whole:
+        if len(rows) < _STROKE * (len(turns) - 1):  # rows in no order turn at every other one
+            return way
         for start, stop in zip(turns[:-1], turns[1:], strict=True):
             first = start + 1 if start else 0
             way[rows[first : stop + 1]] = np.sign(known[stop] - known[start])
