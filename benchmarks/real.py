@@ -202,7 +202,8 @@ def _percent(share: float) -> str:
     return f"{'0' if text == '-0' else text} %"
 
 
-def _budget(told: dict[str, Any]) -> str:
+def shown_budget(told: dict[str, Any]) -> str:
+    """The budget of a result in words."""
     names = {"parameters": "parameters inside tolerance", "form": "a form without a name"}
     parts = []
     for term in told["budget"]:
@@ -215,7 +216,8 @@ def _budget(told: dict[str, Any]) -> str:
     return "; ".join(parts)
 
 
-def _values(told: dict[str, Any]) -> str:
+def shown_values(told: dict[str, Any]) -> str:
+    """The values of what is named, and parameters at their wall."""
     parts = []
     for effect in told["effects"] if told["verdict"] == "effects" else []:
         for name, entry in effect["parameters"].items():
@@ -230,7 +232,8 @@ def _values(told: dict[str, Any]) -> str:
     return "; ".join(parts) or "-"
 
 
-def _errors(told: dict[str, Any]) -> str:
+def shown_errors(told: dict[str, Any]) -> str:
+    """Noise, nominal, refitted and named error of each channel."""
     held = told["fit"]["held_out"]
     parts = []
     for channel, e in (held or told["fit"]["channels"]).items():
@@ -246,9 +249,9 @@ def _row(name: str, told: dict[str, Any]) -> tuple[str, ...]:
     return (
         name,
         f"{told['verdict']} ({likely})",
-        _budget(told),
-        _values(told),
-        _errors(told),
+        shown_budget(told),
+        shown_values(told),
+        shown_errors(told),
         f"{told['clock']:.0f}",
     )
 

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Batch",
+    "ForceTable",
     "Gas",
     "Joint",
     "Muscle",
@@ -48,6 +49,11 @@ class Batch:
     def samples(self) -> int: ...
     @property
     def substeps(self) -> int: ...
+
+@final
+class ForceTable:
+    def __new__(cls, pressure: _Array, contraction: _Array, force: _Array) -> ForceTable: ...
+    def force(self, pressure: _Array, contraction: _Array) -> _Array: ...
 
 @final
 class Gas:

@@ -222,3 +222,39 @@ def test_missing_files_and_folders_are_named(capsys, table):
     code, _, err = run(capsys, table, *OPTIONS, "--png", "no_folder/x.png")
     assert code == 2
     assert "folder no_folder does not exist" in err
+
+
+def test_isometric_loops_without_a_direction_are_fitted_and_drawn(capsys, tmp_path):
+    muscle = Muscle(
+        rest_length=REST,
+        rest_diameter=0.0254,
+        braid_angle=np.radians(73.5),
+        wall_thickness=0.003175,
+        modulus_slope=[3.0, -0.35],
+        modulus_offset=[1.15e6, -0.15e6],
+        friction_coefficient=C0,
+        friction_pressure_slope=C1,
+        friction_floor=0.01,
+    )
+    t = np.arange(0.0, 120.0, 0.02)
+    p = 3.5e5 - 2.8e5 * np.cos(2 * np.pi * t / 20.0)
+    way = np.where(np.sin(2 * np.pi * t / 20.0) > 0.0, -1.0, 1.0)
+    e = np.repeat([0.05, 0.1, 0.15], len(t) // 3)
+    rng = np.random.default_rng(4)
+    force = muscle.force(p, e, direction=way) + 2.0 * rng.normal(size=len(t))
+    length = REST * (1.0 - e) * 1e3 + 0.02 * rng.normal(size=len(t))
+    table, picture, result = (tmp_path / name for name in ("iso.csv", "iso.png", "iso.json"))
+    np.savetxt(
+        table,
+        np.column_stack([t, length, p / 1e5, force]),
+        delimiter=",",
+        header="time [s],length [mm],muscle_pressure [bar],force [N]",
+        comments="",
+        fmt="%.8g",
+    )
+    code, out, err = run(capsys, table, *OPTIONS, "--png", picture, "--json", result)
+    assert code == 0, err
+    assert printed(out, "c0")[0] == pytest.approx(C0, rel=0.03)
+    assert "rising pressure counts as contracting" in out
+    assert json.loads(result.read_text(encoding="utf-8"))["fit"]["isometric"] is True
+    assert picture.read_bytes().startswith(b"\x89PNG")

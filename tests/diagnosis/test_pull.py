@@ -147,3 +147,26 @@ def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
     assert found.where["block"] == "arm"
     torque = next(m for b in found.blocks for m in b.mismatch if m.block == "torque")
     assert not torque.fitted.refit.more_than_noise
+
+
+def test_a_muscle_that_is_a_table_is_diagnosed_as_others_are() -> None:
+    """No force model: its measured map, with a kink in pressure that no other model has."""
+    given = BENCH.muscle
+    assert given is not None
+    sizes = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness", "geometry")
+    muscle = pamrs.Muscle.from_law(
+        lambda p, e: 1.5e-3 * 3e4 * np.logaddexp(0.0, (p - 1e5) / 3e4) * (1 - 2.5 * e) - 300 * e,
+        max_pressure=4e5,
+        contraction=(-0.01, 0.3),
+        **{name: given.parameters[name] for name in sizes},
+    )
+    bench = pamrs.rigs.bench(muscle)
+    for concealed in ({}, {"friction_constant": 12.0, "presliding": 1e-3}):
+        true = bench.with_effect("muscle_hysteresis", concealed) if concealed else bench
+        case = pulled(true)
+        case = pamrs.Case("bench", bench, case.recordings, Path())
+        found = pamrs.diagnose(case)
+        assert found.verdict == ("effects" if concealed else "none")
+        if concealed:
+            assert found.effects[0].id == "muscle_hysteresis"
+            assert found.effects[0].probability > 0.8

@@ -23,7 +23,7 @@ COMMAND = 5.2 + 0.5 * np.sin(0.2 * np.arange(60)) + 0.2 * (np.arange(60) // 15 %
 
 def regulated() -> pamrs.Rig:
     """The shoulder behind a regulator."""
-    text = pamrs.rigs.shoulder().to_toml_text()
+    text = pamrs.rigs.shoulder().to_toml_text(comments=False)
     head, _, rest = text.partition("[supply]")
     _, _, rest = rest.partition("\n\n")
     supply = (

@@ -182,8 +182,10 @@ def test_what_the_loops_do_not_determine_is_named():
         RecordingError, match=r"one pressure only \(100 kPa\): the slope c1 is not determinable"
     ):
         fit_friction(**loops(LEVELS[:1]))
-    with pytest.raises(RecordingError, match="no row has a direction of motion"):
-        fit_friction(**{**made, "direction": np.zeros(len(made["force"]))})
+    order = np.random.default_rng(2).permutation(len(made["force"]))
+    for rows in (np.lexsort((made["contraction"], made["pressure"])), order, order[:6]):
+        with pytest.raises(RecordingError, match="no row has a direction of motion: give a column"):
+            fit_friction(**without_direction(made, rows))
     one_way = made["direction"] < 0
     with pytest.raises(RecordingError, match="no pressure gives a coefficient"):
         fit_friction(**{name: values[one_way] for name, values in made.items()})
@@ -205,3 +207,78 @@ def test_impossible_arguments_are_named(options, message):
         fit_friction(**{**loops(), **options})
     with pytest.raises(ParameterError, match="pressure: a value is not finite"):
         fit_friction(**loops()).predict(np.nan)
+
+
+def without_direction(made, rows=slice(None)):
+    """Rows of loops that nobody gave a direction."""
+    return {name: made[name][rows] for name in ("pressure", "contraction", "force")}
+
+
+def pressure_loops(contractions, *, count=120, noise=0.0, cycles=2, seed=0):
+    """Pressure cycles at held lengths."""
+    rng = np.random.default_rng(seed)
+    one = np.concatenate([np.linspace(0.5e5, 6e5, count), np.linspace(6e5, 0.5e5, count)])
+    p = np.tile(one, cycles)
+    way = np.tile(np.repeat([-1, 1], count), cycles)
+    body = muscle(**RUBBED)
+    return {
+        "pressure": np.tile(p, len(contractions)),
+        "contraction": np.repeat(contractions, len(p)),
+        "force": np.concatenate(
+            [
+                body.force(p, np.full(len(p), e), direction=way) + noise * rng.normal(size=len(p))
+                for e in contractions
+            ]
+        ),
+    }
+
+
+@pytest.mark.parametrize(("noise", "bound"), [(0.0, 2e-3), (5.0, 0.03)])
+def test_the_order_of_the_rows_tells_the_directions(noise, bound):
+    made = loops(noise=noise)
+    made["contraction"] = made["contraction"] + 2e-4 * noise * np.random.default_rng(5).normal(
+        size=len(made["force"])
+    )
+    given = fit_friction(**made)
+    found = fit_friction(**without_direction(made))
+    assert "directions of motion are those of the rows' order" in " ".join(found.issues)
+    for name, true in zip(found.params, (C0, C1), strict=True):
+        assert found.params[name].value == pytest.approx(true, rel=max(bound, 1e-3) * 2)
+        assert found.params[name].value == pytest.approx(given.params[name].value, rel=0.01)
+
+
+def test_the_order_tells_the_presliding_distance_too():
+    made = loops(LEVELS[:3], count=400, presliding=4e-3)
+    found = fit_friction(**without_direction(made), rest_length=REST)
+    assert found.presliding == pytest.approx(4e-3, rel=0.05)
+
+
+@pytest.mark.parametrize("contractions", [[0.1], [0.02, 0.08, 0.14, 0.2]])
+def test_pressure_cycles_at_held_lengths_are_loops(contractions):
+    made = pressure_loops(contractions, noise=2.0)
+    made["contraction"] = made["contraction"] + 3e-4 * np.random.default_rng(1).normal(
+        size=len(made["force"])
+    )
+    fit = fit_friction(**made, rest_length=REST)
+    assert fit.isometric
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.02)
+    assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=0.04)
+    assert fit.presliding is None
+    assert fit.presliding_reason == "not determinable: the length is held"
+    pressure, contraction, force = fit.mean_curve()
+    assert np.allclose(force, muscle().force(pressure, contraction), rtol=0.02, atol=8.0)
+    assert fit.to_dict()["isometric"] is True
+
+
+def test_pressure_steps_at_a_held_length_are_enough():
+    """Sixteen steps up and down, one reading each."""
+    made = pressure_loops([0.1], count=16, cycles=1)
+    fit = fit_friction(**made)
+    assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.01)
+    one_way = without_direction(pressure_loops([0.05, 0.1], count=16, cycles=1))
+    rising = np.tile(np.arange(32) < 16, 2)
+    with pytest.raises(RecordingError, match="over pressure and back at each length"):
+        fit_friction(**{name: values[rising] for name, values in one_way.items()})
+    few = pressure_loops([0.1], count=7, cycles=1)
+    with pytest.raises(RecordingError, match="have both branches at a held length, 8 at least"):
+        fit_friction(**few)

@@ -281,3 +281,12 @@ def test_tables_as_programs_write_them(tmp_path: Path, program: str) -> None:
     assert set(only.channels) == {"muscle_pressure", "joint_angle"}
     pressure = only.channels["muscle_pressure"]
     np.testing.assert_allclose(pressure, 3e5 * LIFT[:200], atol=6.0)
+
+
+def test_a_load_frames_load_cell_is_its_force(tmp_path: Path) -> None:
+    """Its diagnosis is of the force alone."""
+    table = tmp_path / "frame.csv"
+    rows = "\n".join(f"{k / 100};{2 + 0.01 * k};{50 + k};{270 - 0.1 * k}" for k in range(50))
+    table.write_text(f"time [s];p [bar];load_cell [N];position [mm]\n{rows}\n", encoding="utf-8")
+    found = propose([table], pamrs.rigs.named("bench")).case_toml(tmp_path)
+    assert 'force = { column = "load_cell", unit = "N" }' in found

@@ -251,6 +251,40 @@ def write_json_mcap(path: Path, data: dict[str, Array]) -> None:
         writer.finish()
 
 
+def write_protobuf_mcap(path: Path, data: dict[str, Array]) -> None:
+    """A message type made here, with a stamp, nested numbers, and a repeated field."""
+    from google.protobuf import descriptor_pb2, descriptor_pool, message_factory, timestamp_pb2
+    from mcap_protobuf.writer import Writer
+
+    file = descriptor_pb2.FileDescriptorProto(
+        name="rig.proto",
+        package="rig",
+        syntax="proto3",
+        dependency=["google/protobuf/timestamp.proto"],
+    )
+    kinds = descriptor_pb2.FieldDescriptorProto
+    state = file.message_type.add(name="State")
+    for number, name in enumerate(UNITS, 1):
+        state.field.add(
+            name=name, number=number, type=kinds.TYPE_DOUBLE, label=kinds.LABEL_OPTIONAL
+        )
+    state.field.add(
+        name="stamp", number=90, type=kinds.TYPE_MESSAGE, label=kinds.LABEL_OPTIONAL,
+        type_name=".google.protobuf.Timestamp",
+    )  # fmt: skip
+    state.field.add(name="spare", number=91, type=kinds.TYPE_DOUBLE, label=kinds.LABEL_REPEATED)
+    pool = descriptor_pool.DescriptorPool()
+    pool.AddSerializedFile(timestamp_pb2.DESCRIPTOR.serialized_pb)
+    pool.Add(file)
+    kind = message_factory.GetMessageClass(pool.FindMessageTypeByName("rig.State"))
+    with path.open("wb") as stream, Writer(stream) as writer:
+        for row, seconds in enumerate(data["t"]):
+            message = kind(**{name: float(data[name][row]) for name in UNITS}, spare=[1.0, 2.0])
+            nanos = 1_715_500_000 * 10**9 + round(seconds * 1e9)
+            message.stamp.seconds, message.stamp.nanos = divmod(nanos, 10**9)
+            writer.write_message("/rig", message, log_time=nanos, publish_time=nanos)
+
+
 #: Name of the file, who writes it, where its channels are, its times.
 FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any]] = {
     "excel": ("run.csv", write_excel, "{}", "Zeit"),
@@ -273,6 +307,7 @@ FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any
     "bag": ("run_bag", write_bag, "/rig/position[{}]", None),
     "mcap": ("run.mcap", write_mcap, "/rig/{}", None),
     "json mcap": ("run.mcap", write_json_mcap, "/rig/{}", None),
+    "protobuf mcap": ("run.mcap", write_protobuf_mcap, "/rig/{}", None),
 }
 
 

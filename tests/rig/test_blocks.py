@@ -72,6 +72,7 @@ def test_pickling_leaves_out_what_is_made_again() -> None:
         "_tolerances",
         "_effect_std",
         "source",
+        "_text",
     }
 
 

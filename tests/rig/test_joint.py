@@ -90,7 +90,7 @@ def rig_with(kind: str) -> str:
     }.get(kind, "")
     lines = []
     block = ""
-    for line in pamrs.rigs.shoulder().to_toml_text().splitlines():
+    for line in pamrs.rigs.shoulder().to_toml_text(comments=False).splitlines():
         block = line if line.startswith("[") else block
         name = line.partition(" = ")[0]
         if name == "kind" and block == "[joint]":

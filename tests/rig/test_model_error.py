@@ -10,7 +10,7 @@ import pamrs
 from pamrs.errors import RigError
 from pamrs.rig import parse_rig
 
-TEXT = pamrs.rigs.shoulder().to_toml_text()
+TEXT = pamrs.rigs.shoulder().to_toml_text(comments=False)
 
 
 def stated(lines: str) -> pamrs.Rig:
@@ -34,7 +34,7 @@ def test_an_error_may_be_a_table_like_any_other_quantity() -> None:
 
 
 def test_of_several_chambers_each_may_have_its_own() -> None:
-    text = pamrs.rigs.named("antagonistic_joint").to_toml_text()
+    text = pamrs.rigs.named("antagonistic_joint").to_toml_text(comments=False)
     rig = parse_rig(f'{text}\n[model_error.muscle_pressure]\nflexor = "2 %"\n')
     assert rig.model_error == {"muscle_pressure.flexor": {"share": 0.02}}
 

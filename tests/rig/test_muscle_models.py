@@ -13,7 +13,7 @@ import pamrs
 from pamrs.rig import parse_rig
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, GEOMETRIES, MODELS
 
-SHOULDER = pamrs.rigs.shoulder().to_toml_text()
+SHOULDER = pamrs.rigs.shoulder().to_toml_text(comments=False)
 ELASTIC: dict[str, dict[str, Any]] = {
     "mooney_rivlin": {"c10": 2e5, "c01": 5e4},
     "elbow_linear": {"bladder_modulus": 1e6},

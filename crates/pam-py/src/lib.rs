@@ -17,6 +17,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add_class::<rig::Rig>()?;
     m.add_class::<muscle::Muscle>()?;
+    m.add_class::<muscle::ForceTable>()?;
     m.add_class::<gas::Gas>()?;
     m.add_class::<joint::Joint>()?;
     m.add_class::<simulator::Simulator>()?;

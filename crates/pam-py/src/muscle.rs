@@ -5,9 +5,43 @@ use std::sync::OnceLock;
 use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::description::muscle_from_json;
-use pam_core::muscle::{CompiledMuscle, Muscle as CoreMuscle};
+use pam_core::muscle::{CompiledMuscle, MapSurface, Muscle as CoreMuscle};
 use pam_core::Result;
 use pyo3::prelude::*;
+
+/// A table of forces over gauge pressure and contraction ratio, as a muscle with the model `map`
+/// has it.
+#[pyclass(frozen, module = "pamrs._core")]
+pub struct ForceTable {
+    inner: MapSurface,
+}
+
+#[pymethods]
+impl ForceTable {
+    #[new]
+    fn new(
+        py: Python<'_>,
+        pressure: PyReadonlyArray1<'_, f64>,
+        contraction: PyReadonlyArray1<'_, f64>,
+        force: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Self> {
+        MapSurface::of(&values(&pressure), &values(&contraction), &values(&force))
+            .map(|inner| Self { inner })
+            .map_err(|e| error(py, &e))
+    }
+
+    /// Force [N] at gauge pressures [Pa] and contraction ratios, as many as there are of both.
+    fn force<'py>(
+        &self,
+        py: Python<'py>,
+        pressure: PyReadonlyArray1<'py, f64>,
+        contraction: PyReadonlyArray1<'py, f64>,
+    ) -> Bound<'py, PyArray1<f64>> {
+        let (p, e) = (values(&pressure), values(&contraction));
+        let force = p.iter().zip(&e).map(|(p, e)| self.inner.force(*p, *e));
+        array(py, force.collect())
+    }
+}
 
 /// A muscle made from a JSON description (SI, radians); its table is compiled when it is first
 /// needed.

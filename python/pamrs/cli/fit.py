@@ -23,13 +23,14 @@ from pamrs.cli._shared import (
 )
 
 if TYPE_CHECKING:
-    from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
+    from pamrs.fit import ForceMap, FrictionFit, MapFit, ModelComparison, MuscleFit
     from pamrs.rig import Muscle, Rig
 
 __all__ = ["fit_app"]
 
 SCHEMA: Final = "pamrs.muscle_fit/1"
 FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
+MAP_SCHEMA: Final = "pamrs.map_fit/1"
 _MODULI: Final = {"modulus_slope": "dimensionless"}
 
 
@@ -176,6 +177,47 @@ def _muscle(
         )
 
 
+@fit_app.command("map")
+def _map(
+    context: typer.Context,
+    data: Annotated[
+        Path, typer.Argument(help="Force map, recording of a bench, or a TOML description.")
+    ],
+    muscle: _MuscleName = None,
+    rest_length: _RestLength = None,
+    rest_diameter: _RestDiameter = None,
+    braid_angle: _BraidAngle = None,
+    wall_thickness: _WallThickness = None,
+    where: _Where = None,
+    clipped: _Clipped = None,
+    nodes: Annotated[int, typer.Option(help="Contractions of the table.")] = 20,
+    rig: Annotated[
+        Path | None,
+        typer.Option(help="Write the rig with this table as its muscle, and the table's error."),
+    ] = None,
+    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {MAP_SCHEMA}).")] = (
+        None
+    ),
+) -> None:
+    """Make a table of forces of measurements alone, monotone in pressure and contraction: a muscle
+    that no force model has to fit. Its geometry gives the volume only.
+    """
+    check_writable(rig, json)
+    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
+    inputs = _inputs(data, muscle, sizes, where or [], clipped)
+    from pamrs.fit import fit_map
+
+    with progress(f"fitting {inputs.data.label}"):
+        fit = fit_map(inputs.data, nodes=nodes)
+    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
+    if json is not None:
+        contents[json] = _map_json(fit, inputs.data, _command(context))
+    if rig is not None:
+        contents[rig] = fit.to_rig(inputs.muscle, inputs.rig).to_toml_text()
+    typer.echo(f"{inputs.data.label}: {fit.fit_report()}", nl=False)
+    write(contents)
+
+
 @fit_app.command("friction")
 def _friction(
     context: typer.Context,
@@ -204,7 +246,7 @@ def _friction(
     check_writable(json, png)
     check_packages("report", *(["matplotlib"] if png else []))
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    map_ = _loops(data, muscle, sizes, where or [], clipped)
+    map_ = _loops(data, muscle, sizes, where or [], clipped).with_directions()
     from pamrs.fit import fit_friction
 
     with progress(f"fitting {map_.label}"):
@@ -597,5 +639,17 @@ def _friction_json(fit: FrictionFit, data: ForceMap, command: str) -> str:
         "source": data.source,
         "command": command,
         "rows": len(data),
+    }
+    return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"
+
+
+def _map_json(fit: MapFit, data: ForceMap, command: str) -> str:
+    import json
+
+    document = {
+        "schema": MAP_SCHEMA,
+        "name": data.label,
+        "source": data.source,
+        "command": command,
     }
     return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from pamrs.fit._engine import fit_muscle
     from pamrs.fit._friction import FrictionFit, fit_friction
     from pamrs.fit._load import MeasuredMuscle, load_force_map, load_measured_muscle
+    from pamrs.fit._map import MapFit, fit_map
     from pamrs.fit._result import MuscleFit
     from pamrs.fit._solution import COEFFICIENTS, GEOMETRY
     from pamrs.fit._statistics import FitParameter
@@ -33,6 +34,7 @@ __all__ = [
     "FitParameter",
     "ForceMap",
     "FrictionFit",
+    "MapFit",
     "MeasuredMuscle",
     "ModelComparison",
     "MuscleFit",
@@ -40,6 +42,7 @@ __all__ = [
     "compare_models",
     "fit_cylinder_friction",
     "fit_friction",
+    "fit_map",
     "fit_muscle",
     "from_recording",
     "load_force_map",
@@ -54,6 +57,7 @@ _HOMES: Final[dict[str, str]] = {
     "ForceMap": "_data",
     "FrictionFit": "_friction",
     "GEOMETRY": "_solution",
+    "MapFit": "_map",
     "MeasuredMuscle": "_load",
     "ModelComparison": "_compare",
     "MuscleFit": "_result",
@@ -61,6 +65,7 @@ _HOMES: Final[dict[str, str]] = {
     "compare_models": "_compare",
     "fit_cylinder_friction": "cylinder.friction",
     "fit_friction": "_friction",
+    "fit_map": "_map",
     "fit_muscle": "_engine",
     "from_recording": "_bench",
     "load_force_map": "_load",

@@ -22,6 +22,7 @@ from pamrs.fit._checks import (
     check_units,
     reachable,
 )
+from pamrs.fit._ways import table_ways
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -367,6 +368,27 @@ class ForceMap:
         chosen = np.unique(np.asarray(levels, dtype=np.intp) % count)
         return self._without(~np.isin(self.level, chosen), LEFT_OUT)
 
+    def with_directions(self) -> ForceMap:
+        """The map with the directions of motion that the order of its rows tells, where it has
+        none.
+
+        Returns
+        -------
+        ForceMap
+            Itself where a row has a direction, or where the order tells one only. Else with those
+            of the strokes between turning points: of the length at each pressure; at held lengths
+            of the pressure, whose rising counts as contracting.
+        """
+        if np.any(self.direction):
+            return self
+        pressure, contraction, _, level, _ = self.used_rows()
+        way = np.zeros(len(self), dtype=np.int8)
+        way[self.used] = table_ways(contraction, pressure, level)
+        if not (np.any(way < 0) and np.any(way > 0)):
+            return self
+        note = "directions of motion are those of the rows' order: no column gives them"
+        return replace(self, direction=way, notes=(*self.notes, note))
+
     def level_indices(self, pressures: Sequence[float]) -> list[int]:
         """Indices of the levels nearest to some pressures.
 
@@ -431,7 +453,8 @@ class ForceMap:
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")
         map_ = map_._without(map_.used & ~_solved(muscle, e, map_.used), "no solution")
         pressure, contraction, force, _, _ = map_.used_rows()
-        able = float(np.max(pressure)) * float(np.max(np.abs(muscle.gas_area(contraction))))
+        body = muscle.replace(model="gaylord") if muscle.model == "map" else muscle
+        able = float(np.max(pressure)) * float(np.max(np.abs(body.gas_area(contraction))))
         pull = np.abs(force)
         check_forces(self.label, float(np.quantile(pull, _MOST)), able, self.units)
         if able <= 0.0:  # no pressure, or no pull of the gas: nothing to judge by

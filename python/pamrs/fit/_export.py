@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -96,7 +97,6 @@ def _scatter(fit: MuscleFit) -> str:
 
 def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
     """What :meth:`MuscleFit.to_rig` returns."""
-    from pamrs.rig import Rig
     from pamrs.rigs import bench
 
     muscle = fit.muscle
@@ -112,9 +112,7 @@ def to_rig(fit: MuscleFit, rig: Rig | None) -> Rig:
         if given.tol > 0.0 and _kept(name, given.value, parameters)
     }
     fitted = {f"muscle.{free.name}": fit.params[free.name].stderr for free in fit.free}
-    return Rig(
-        rig.name, {**base, "muscle": parameters}, {**known, **fitted}, rig._effect_std, rig.source
-    )
+    return replace(rig, _model={**base, "muscle": parameters}, _tolerances={**known, **fitted})
 
 
 def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:

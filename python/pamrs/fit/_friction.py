@@ -19,6 +19,7 @@ from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._data import ForceMap
 from pamrs.fit._level_line import LawParameter, LevelLine, fit_levels
 from pamrs.fit._validation import WEAK
+from pamrs.fit._ways import held_lengths
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -41,6 +42,7 @@ _HALFWAY: Final = (
 )  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
 _PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
 _RESOLVED: Final = 3  # rows in transition that a reversal needs
+_NEAR_TURN: Final = 0.05  # of the range of a pressure cycle, where the force is between branches
 _SIGNIFICANT: Final = 0.05
 _SURE: Final = 4.0  # standard errors, for a friction that nobody asked about
 
@@ -58,6 +60,9 @@ class FrictionLevel:
     contraction, force, half_width : (k,) array
         Contractions of the branch with fewer of them, within both [1], mean force of the branches
         there [N], half their difference [N].
+    pressures : (k,) array
+        Gauge pressure at each of them [Pa]: that of the level, or, at held lengths, those of the
+        branch with fewer of them.
     rows : int
         Rows of both branches.
     at_floor : bool
@@ -70,6 +75,7 @@ class FrictionLevel:
     contraction: Array
     force: Array
     half_width: Array
+    pressures: Array
     rows: int
     at_floor: bool = False
 
@@ -105,6 +111,8 @@ class FrictionFit:
         Chance of a slope this far from zero if there were none; NaN without a spare level.
     issues : list of str
         What was found.
+    isometric : bool
+        Whether the loops are those of pressure cycles at held lengths.
     """
 
     params: dict[str, LawParameter]
@@ -122,6 +130,7 @@ class FrictionFit:
     covar: Array
     slope_pvalue: float
     issues: list[str]
+    isometric: bool = False
 
     def __repr__(self) -> str:
         c0, c1 = (
@@ -176,11 +185,8 @@ class FrictionFit:
         """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data
         free of friction.
         """
-        pressure = np.concatenate(
-            [np.full(len(level.force), level.pressure) for level in self.levels]
-        )
         return (
-            pressure,
+            np.concatenate([level.pressures for level in self.levels]),
             np.concatenate([level.contraction for level in self.levels]),
             np.concatenate([level.force for level in self.levels]),
         )
@@ -257,6 +263,7 @@ class FrictionFit:
             "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
             "slope_pvalue": _or_none(self.slope_pvalue),
             "slope_significant": self.slope_significant,
+            "isometric": self.isometric,
             "issues": self.issues,
         }
 
@@ -284,10 +291,12 @@ def fit_friction(
     Parameters
     ----------
     data : ForceMap, optional
-        A map with directions; else give arrays.
+        A map, of length cycles at held pressures or of pressure cycles at held lengths
+        (isometric); else give arrays.
     pressure, contraction, force, direction : (n,) array_like, optional
         Gauge pressure [Pa], contraction [1], force [N], and -1 while contracting, +1 while
-        lengthening, in the order measured.
+        lengthening, in the order measured. Without directions they are those of the rows' order
+        (:meth:`ForceMap.with_directions`).
     rest_length : float, optional
         With arrays [m]; without it the presliding distance, a length, is not determined.
     floor : float
@@ -300,22 +309,28 @@ def fit_friction(
     Raises
     ------
     ParameterError
-        If neither a map nor all four arrays are given, or ``floor`` is negative or not below 1.
+        If neither a map nor pressure, contraction and force are given, or ``floor`` is negative or
+        not below 1.
     RecordingError
-        If no direction is known, or fewer than two pressures have both branches.
+        If no direction is known or can be told, or fewer than two pressures have both branches.
     """
     if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
         raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
     rested = data is not None or rest_length is not None
     if data is None:
         data = _map(pressure, contraction, force, direction, rest_length)
-    levels, issues = _loops(data)
+    data = data.with_directions()
+    gas, e, *_ = data.used_rows()
+    held = held_lengths(e, gas)
+    levels, issues = _isometric_levels(data, held) if held else _loops(data)
     line, above = _law(levels, floor)
     above &= np.array([x.coefficient > floor for x in levels])
     issues += _doubts(levels, above, floor)
     levels = [replace(x, at_floor=not bool(on)) for x, on in zip(levels, above, strict=True)]
     free = max(int(above.sum()) - 2, 0)
-    if rested:
+    if held:
+        distance, reason = None, "not determinable: the length is held"
+    elif rested:
         distance, reason = _presliding(data, levels)
     else:
         distance, reason = None, "not determinable: a length, and rest_length is not given"
@@ -342,6 +357,7 @@ def fit_friction(
         covar=line.covar,
         slope_pvalue=_pvalue(line, free),
         issues=issues,
+        isometric=bool(held),
     )
 
 
@@ -359,12 +375,7 @@ def _map(
     ParameterError
         If an array is missing.
     """
-    given = {
-        "pressure": pressure,
-        "contraction": contraction,
-        "force": force,
-        "direction": direction,
-    }
+    given = {"pressure": pressure, "contraction": contraction, "force": force}
     missing = [word for word, values in given.items() if values is None]
     if missing or pressure is None or contraction is None or force is None:
         raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
@@ -385,10 +396,7 @@ def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
     """
     gas, e, pull, level, way = data.used_rows()
     if not np.any(way != 0):
-        raise RecordingError(
-            f"{data.label}: no row has a direction of motion; friction needs both branches of the "
-            "loop"
-        )
+        raise RecordingError(f"{data.label}: {_NO_WAY}")
     issues = list(data.issues)
     unknown = int(np.sum(way == 0))
     if unknown:
@@ -413,6 +421,67 @@ def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
         raise RecordingError(
             f"{data.label}: one pressure only ({levels[0].pressure / 1e3:.0f} kPa): the slope c1 "
             "is not determinable"
+        )
+    return levels, issues
+
+
+_NO_WAY: Final = (
+    "friction needs both branches of a loop, and no row has a direction of motion: give a column "
+    "direction (-1 or 'contracting', 1 or 'lengthening'), or the rows in the order measured, over "
+    "length and back at each pressure or over pressure and back at each length"
+)
+"""What a map without directions needs."""
+
+
+def _isometric_levels(
+    data: ForceMap, held: list[NDArray[np.intp]]
+) -> tuple[list[FrictionLevel], list[str]]:
+    """The loops of pressure cycles at held lengths, by bands of pressure.
+
+    The law (2.36) is about motion between the fittings; held, the braid still slides where the
+    muscle pulls itself straight: rising pressure is its contracting.
+
+    Raises
+    ------
+    RecordingError
+        If no direction is known, or too few pressures have both branches.
+    """
+    gas, e, pull, _, way = data.used_rows()
+    if not np.any(way != 0):
+        raise RecordingError(f"{data.label}: {_NO_WAY}")
+    issues = [
+        *data.issues,
+        "loops of pressure at held lengths: rising pressure counts as contracting",
+    ]
+    pairs = []
+    for part in held:
+        found = _pairs(gas[part], pull[part], way[part])
+        length = f"{100.0 * float(np.median(e[part])):.3g} % contraction"
+        if isinstance(found, str):
+            issues.append(f"{length}: {found}: not used")
+            continue
+        grid, mean, half = found
+        low, high = float(gas[part].min()), float(gas[part].max())
+        margin = _NEAR_TURN * (high - low)
+        inside = (grid >= low + margin) & (grid <= high - margin)
+        at = np.full(len(grid), float(np.median(e[part])))
+        pairs.append(np.column_stack([grid, at, mean, half])[inside])
+    rows = np.concatenate(pairs) if pairs else np.empty((0, 4))
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    bands = min(_BLOCKS, len(rows) // _FEWEST)
+    if bands < 2:
+        raise RecordingError(
+            f"{data.label}: {len(rows)} pressures have both branches at a held length, "
+            f"{2 * _FEWEST} at least are needed" + (f" ({'; '.join(issues)})" if issues else "")
+        )
+    levels = []
+    for band in np.array_split(rows, bands):
+        pressure, at, mean, half = band.T
+        coefficient, stderr = _coefficient(mean, half)
+        size = np.abs(mean)
+        middle = _ratio(pressure * size, size)  # weighted as the ratios are
+        levels.append(
+            FrictionLevel(middle, coefficient, stderr, at, mean, half, pressure, len(band))
         )
     return levels, issues
 
@@ -447,26 +516,43 @@ def _loop(
     pressure: float, contraction: Array, force: Array, way: NDArray[np.int8]
 ) -> FrictionLevel | str:
     """The loop of one level, or why it has none."""
-    branches = [(contraction[way == d], force[way == d]) for d in (-1, 1)]
-    for (e, _), word in zip(branches, ("contracting", "lengthening"), strict=True):
-        if len(e) < _FEWEST:
-            return f"{len(e)} rows while {word}, {_FEWEST} at least are needed"
-    merged = [_merged(e, f) for e, f in branches]
-    low, high = max(float(e[0]) for e, _ in merged), min(float(e[-1]) for e, _ in merged)
-    grid = min((e[(e >= low) & (e <= high)] for e, _ in merged), key=len)
+    found = _pairs(contraction, force, way)
+    if isinstance(found, str):
+        return found
+    grid, mean, half = found
+    coefficient, stderr = _coefficient(mean, half)
+    at = np.full(len(grid), pressure)
+    return FrictionLevel(pressure, coefficient, stderr, grid, mean, half, at, int(np.sum(way != 0)))
+
+
+def _pairs(
+    abscissa: Array, force: Array, way: NDArray[np.int8]
+) -> tuple[Array, Array, Array] | str:
+    """Where both branches of a loop are known, their mean there and half their difference; or why
+    nowhere.
+    """
+    branches = [(abscissa[way == d], force[way == d]) for d in (-1, 1)]
+    for (at, _), word in zip(branches, ("contracting", "lengthening"), strict=True):
+        if len(at) < _FEWEST:
+            return f"{len(at)} rows while {word}, {_FEWEST} at least are needed"
+    merged = [_merged(at, f) for at, f in branches]
+    low, high = max(float(at[0]) for at, _ in merged), min(float(at[-1]) for at, _ in merged)
+    grid = min((at[(at >= low) & (at <= high)] for at, _ in merged), key=len)
     if len(grid) < _FEWEST:
         return f"the two branches share {len(grid)} contractions, {_FEWEST} at least are needed"
-    shortening, lengthening = (np.interp(grid, e, f) for e, f in merged)
-    mean, half = 0.5 * (lengthening + shortening), 0.5 * (lengthening - shortening)
+    shortening, lengthening = (np.interp(grid, at, f) for at, f in merged)
+    return grid, 0.5 * (lengthening + shortening), 0.5 * (lengthening - shortening)
+
+
+def _coefficient(mean: Array, half: Array) -> tuple[float, float]:
+    """``c_F`` of a loop and its standard error, from the scatter of stretches of it."""
     size = np.abs(mean)
     strong = size > _SLACK * float(size.max())
     coefficient = _ratio(half[strong], size[strong])
     blocks = [part for part in np.array_split(np.flatnonzero(strong), _BLOCKS) if len(part)]
     parts = np.array([_ratio(half[part], size[part]) for part in blocks])
     stderr = float(np.std(parts, ddof=1) / math.sqrt(len(parts))) if len(parts) > 1 else 0.0
-    return FrictionLevel(
-        pressure, coefficient, stderr, grid, mean, half, sum(len(e) for e, _ in branches)
-    )
+    return coefficient, stderr
 
 
 def _merged(contraction: Array, force: Array) -> tuple[Array, Array]:

@@ -51,13 +51,13 @@ def friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
 def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
     """Measured branches by pressure, and the mean curve of each loop."""
     cmap, norm = pressure_colours(data.levels)
-    contraction = 100.0 * data.contraction
+    across = data.pressure / 1e3 if fit.isometric else 100.0 * data.contraction
     for index, pressure in enumerate(data.levels.tolist()):
         colour = cmap(norm(pressure / 1e3))
         for way, mark, _ in _MARKS:
             rows = thinned(np.flatnonzero((data.level == index) & (data.direction == way)))
             axes.scatter(
-                contraction[rows],
+                across[rows],
                 data.force[rows],
                 s=7.0,
                 marker=mark,
@@ -67,7 +67,10 @@ def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
             )
     for level in fit.levels:
         axes.plot(
-            100.0 * level.contraction, level.force, color=cmap(norm(level.pressure / 1e3)), lw=1.3
+            level.pressures / 1e3 if fit.isometric else 100.0 * level.contraction,
+            level.force,
+            color=cmap(norm(level.pressure / 1e3)),
+            **({"ls": "", "marker": "_", "ms": 5.0} if fit.isometric else {"lw": 1.3}),
         )
     for _, mark, word in _MARKS:
         axes.scatter([], [], s=16.0, marker=mark, color=_INK, lw=0, label=word)
@@ -80,7 +83,7 @@ def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
         pad=0.02,
         aspect=40,
     )
-    axes.set_xlabel("contraction [%]")
+    axes.set_xlabel("pressure [kPa]" if fit.isometric else "contraction [%]")
     axes.set_ylabel("pulling force [N]")
     axes.set_title("Loops: measured, and their mean")
     axes.legend(loc="upper right")

@@ -117,6 +117,8 @@ def channels_of(rig: Rig | None) -> list[str]:
         ("chamber", "muscle_pressure"),
         ("joint", "joint_angle"),
         ("load", "length"),
+        ("load", "force"),
+        ("joint", "joint_torque"),
     )
     found = [dotted(channel, name) for block, channel in kinds for name in rig.tables(block)]
     for name, table in rig.tables("supply").items():

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from pamrs.rig._checks import muscle_problems
 from pamrs.rig._joint import Joint
+from pamrs.rig._law import force_table
 from pamrs.rig._muscle import Muscle
 from pamrs.rig._reader import Reader
 from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig
@@ -20,6 +21,7 @@ __all__ = [
     "Parameter",
     "Reader",
     "Rig",
+    "force_table",
     "load_rig",
     "muscle_problems",
     "parse_rig",

@@ -50,11 +50,31 @@ def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
     factors = muscle.get("extension_factors", [])
     if factors and len(factors) != 3:
         problems.append(f"{label}.extension_factors has {len(factors)} values; three are needed")
+    problems += _map_problems(f"{label}.map", muscle) if "map_force" in muscle else []
     thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
     if not thickness < diameter / 2:
         problems.append(
             f"{label}.wall_thickness = {thickness:g} m is not allowed: "
             f"less than half of {label}.rest_diameter = {diameter:g} m is needed"
+        )
+    return problems
+
+
+def _map_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
+    """What is wrong with a table of forces."""
+    problems = []
+    sizes = []
+    for axis, most in (("pressure", 200), ("contraction", 400)):
+        values = muscle[f"map_{axis}"]
+        sizes.append(len(values))
+        if not 2 <= len(values) <= most:
+            problems.append(f"{label}.{axis} has {len(values)} values; from 2 to {most} are needed")
+        if any(b <= a for a, b in zip(values, values[1:], strict=False)):
+            problems.append(f"{label}.{axis} is not allowed: its values must rise")
+    if len(muscle["map_force"]) != sizes[0] * sizes[1]:
+        problems.append(
+            f"{label}.force has {len(muscle['map_force'])} values; {sizes[0]} x {sizes[1]} are "
+            "needed, a row over the contractions for each pressure"
         )
     return problems
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs.errors import ParameterError
-from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, own_geometry
+from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
 __all__ = ["Muscle"]
 
@@ -19,10 +19,13 @@ Array = NDArray[np.float64]
 
 
 class Muscle:
-    """A braided muscle with one of the quasi-static force models of the dissertation (ch. 2 to 4).
+    """A braided muscle with one of the quasi-static force models of the dissertation (ch. 2 to 4),
+    or with a table of forces.
 
-    Every model is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j)
-    elastic_basis(e)[j]``.
+    Every model but ``map`` is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j)
+    elastic_basis(e)[j]``. A ``map`` is ``F = modulus_scale map(P, e)``, interpolated monotonically;
+    the geometry then gives the volume alone. :meth:`from_law` and
+    :func:`pamrs.fit.fit_map` make one.
 
     Parameters
     ----------
@@ -34,7 +37,7 @@ class Muscle:
         Bladder thickness at rest [m].
     model : str
         ``gaylord``, ``chou_hannaford``, ``mooney_rivlin``, ``ferraresi`` (2.8), ``kothera`` (2.16),
-        ``robinson`` (2.16 on elliptic ends) or ``elbow_linear`` (4.4)-(4.7).
+        ``robinson`` (2.16 on elliptic ends), ``elbow_linear`` (4.4)-(4.7) or ``map``.
     geometry : {"cylinder", "elliptic", "elliptic_published"}, optional
         Shape of the ends; by default that of the model's source: elliptic for ``robinson``, else
         cylinder.
@@ -48,6 +51,10 @@ class Muscle:
     extension_factors : sequence of float
         Factors on the wall's pressure, on FL and on FT while the muscle lengthens [1]
         (``elbow_linear``).
+    map_pressure, map_contraction, map_force : sequence of float
+        Gauge pressures [Pa] and contractions [1] of a table, rising, and its forces [N], a row over
+        the contractions for each pressure, one after the other (``map``). Beyond them the force
+        goes on along straight lines.
     friction_coefficient, friction_pressure_slope, friction_floor : float
         ``c_F = max(coefficient + slope P, floor)`` of the friction hysteresis (2.36) [1, 1/Pa, 1];
         all zero: none.
@@ -60,7 +67,7 @@ class Muscle:
     count : int
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float
-        Factor on every elastic parameter [1].
+        Factor on every elastic parameter, of a ``map`` on its force [1].
     k0, contraction_slope, extension_slope, neck_floor : float
         Axis ratio of the elliptic ends at rest, its slopes per unit contraction, and the smallest
         radius in extension relative to rest [1].
@@ -96,6 +103,9 @@ class Muscle:
         c01: float = 0.0,
         bladder_modulus: float = 0.0,
         extension_factors: Sequence[float] = (0.3, 0.8, 0.8),
+        map_pressure: Sequence[float] = (),
+        map_contraction: Sequence[float] = (),
+        map_force: Sequence[float] = (),
         friction_coefficient: float = 0.0,
         friction_pressure_slope: float = 0.0,
         friction_floor: float = 0.0,
@@ -122,6 +132,9 @@ class Muscle:
             "c01": c01,
             "bladder_modulus": bladder_modulus,
             "extension_factors": [float(v) for v in extension_factors],
+            "map_pressure": [float(v) for v in map_pressure],
+            "map_contraction": [float(v) for v in map_contraction],
+            "map_force": [float(v) for v in map_force],
             "modulus_scale": modulus_scale,
             "friction_coefficient": friction_coefficient,
             "friction_pressure_slope": friction_pressure_slope,
@@ -162,6 +175,60 @@ class Muscle:
         """
         return cls(**model)
 
+    @classmethod
+    def from_law(
+        cls,
+        law: Callable[[Array, Array], ArrayLike],
+        *,
+        max_pressure: float,
+        contraction: tuple[float, float],
+        min_pressure: float = 0.0,
+        tolerance: float = 1e-3,
+        **parameters: Any,
+    ) -> Muscle:
+        """A muscle by a force law of one's own, compiled to a table.
+
+        Parameters
+        ----------
+        law : callable
+            ``law(pressure, contraction)`` is the pulling force [N] at gauge pressures [Pa] and
+            contraction ratios [1], arrays of one shape. It is asked while the table is made and
+            never again.
+        max_pressure, min_pressure : float
+            Range of the gauge pressure [Pa].
+        contraction : tuple of float
+            Range of the contraction ratio [1].
+        tolerance : float
+            Largest error of the table between its nodes, as a share of the largest force.
+        **parameters
+            What else :class:`Muscle` takes: the geometry, which gives the volume, and friction.
+
+        Returns
+        -------
+        Muscle
+            With the model ``map``.
+
+        Raises
+        ------
+        ParameterError
+            If the law gives no finite force somewhere or no array of the shape asked for, a range
+            is empty, or no table of 200 by 400 nodes is as near as `tolerance`.
+
+        Examples
+        --------
+        >>> import pamrs
+        >>> muscle = pamrs.Muscle.from_law(
+        ...     lambda p, e: 1.2e-3 * p * (1.0 - 3.1 * e) ** 2 - 40.0 * e,
+        ...     max_pressure=6e5, contraction=(-0.02, 0.3), rest_length=0.25,
+        ...     rest_diameter=0.02, braid_angle=1.2, wall_thickness=0.0015)
+        >>> muscle.force(4e5, [0.0, 0.1]).round(0)
+        array([480., 225.])
+        """
+        from pamrs.rig._law import compiled_law
+
+        table = compiled_law(law, (min_pressure, max_pressure), contraction, tolerance)
+        return cls(model="map", **table, **parameters)
+
     def replace(self, **changes: Any) -> Muscle:
         """The same muscle with other parameters.
 
@@ -190,10 +257,8 @@ class Muscle:
         model = str(changes.get("model", self.model))
         if model != self.model:
             parameters["geometry"] = None
-            kept = ELASTIC_PARAMETERS.get(model, ())
-            for name in {
-                name for names in ELASTIC_PARAMETERS.values() for name in names
-            }.difference(kept):
+            kept = PARAMETERS.get(model, ())
+            for name in {name for names in PARAMETERS.values() for name in names}.difference(kept):
                 parameters.pop(name)
             if "modulus_slope" in kept and not parameters["modulus_slope"]:
                 parameters["modulus_slope"] = parameters["modulus_offset"] = [0.0]

@@ -84,6 +84,7 @@ class Rig:
     _tolerances: dict[str, float] = field(default_factory=dict, repr=False)
     _effect_std: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
     source: str = field(default="", repr=False)
+    _text: str = field(default="", repr=False)  # the file, as its author wrote it
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in _MADE_AGAIN}
@@ -347,7 +348,7 @@ class Rig:
             table[key.name] = int(number) if whole else number
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
-        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source, self._text)
         return found._with_origin(self, numbers)
 
     # A rig that differs from another one by numbers only is not wired again: the core takes the
@@ -367,7 +368,7 @@ class Rig:
         left = {full_name(old) for old in entries} - {full}
         kept = {name: known for name, known in self._effect_std.items() if name in left}
         model = {**self._model, "effects": entries}
-        found = Rig(self.name, model, self._tolerances, {**kept, **std}, self.source)
+        found = Rig(self.name, model, self._tolerances, {**kept, **std}, self.source, self._text)
         own = {f"{full}.{name}": value for name, value in entry["parameters"].items()}
         if len(entries) > len(before):
             origin, numbers = self._grown_by(entry)
@@ -391,7 +392,7 @@ class Rig:
         """
         model = {name: value for name, value in self._model.items() if name != "case"}
         model |= {"case": folder} if folder else {}
-        return Rig(self.name, model, self._tolerances, self._effect_std, self.source)
+        return Rig(self.name, model, self._tolerances, self._effect_std, self.source, self._text)
 
     def _grown_by(self, entry: Entry) -> tuple[Rig, dict[str, float]]:
         """The rig that this one differs from by numbers with an effect more, and these numbers."""
@@ -400,7 +401,9 @@ class Rig:
         kind = _kind(entry)
         if kind not in grown:
             same = {**origin._model, "effects": [*origin._model["effects"], entry]}
-            grown[kind] = Rig(self.name, same, self._tolerances, origin._effect_std, self.source)
+            grown[kind] = Rig(
+                self.name, same, self._tolerances, origin._effect_std, self.source, self._text
+            )
             object.__setattr__(origin, "_grown", grown)
         return grown[kind], before
 
@@ -473,7 +476,7 @@ class Rig:
         model = {**self._model, "effects": entries}
         left = {full_name(entry) for entry in entries}
         kept = {name: std for name, std in self._effect_std.items() if name in left}
-        return Rig(self.name, model, self._tolerances, kept, self.source)
+        return Rig(self.name, model, self._tolerances, kept, self.source, self._text)
 
     # ------------------------------------------------------------------ writing
 
@@ -492,11 +495,27 @@ class Rig:
         """
         return core_json(self._model, self._ports())
 
-    def to_toml_text(self) -> str:
-        """The rig as TOML in SI units; reading it gives the same numbers to the last bit, the same
-        names and the same ports.
+    def to_toml_text(self, *, comments: bool = True) -> str:
+        """The rig as TOML; reading it gives the same numbers to the last bit, the same names and
+        the same ports.
+
+        Parameters
+        ----------
+        comments : bool
+            A rig that was read keeps the comments, the order and the units of its file; what
+            differs from the file is written anew. False: all in SI units and in one order, so that
+            equal rigs have equal texts.
+
+        Returns
+        -------
+        str
         """
-        return toml_text(Content(self.name, self._model, self._tolerances, self._effect_std))
+        content = Content(self.name, self._model, self._tolerances, self._effect_std)
+        if not comments or not self._text:
+            return toml_text(content)
+        from pamrs.rig._edited import edited_text
+
+        return edited_text(self._text, content)
 
     def to_toml(self, path: str | os.PathLike[str]) -> Path:
         """Write :meth:`to_toml_text` to a file.
@@ -579,4 +598,4 @@ def load_rig(path: str | os.PathLike[str]) -> Rig:
 def parse_rig(text: str, *, source: str = "rig") -> Rig:
     """Read a rig from TOML text; ``source`` names it in messages. See :func:`load_rig`."""
     content = read_model(text, source)
-    return Rig(content.name, content.model, content.tolerances, content.effect_std, source)
+    return Rig(content.name, content.model, content.tolerances, content.effect_std, source, text)

@@ -24,7 +24,14 @@ from pamrs.rig.schema import (
     tables_of,
 )
 
-__all__ = ["core_json", "toml_text"]
+__all__ = [
+    "block_lines",
+    "core_json",
+    "effect_lines",
+    "entry_text",
+    "limit_lines",
+    "toml_text",
+]
 
 _STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
 
@@ -48,34 +55,45 @@ def toml_text(content: Content) -> str:
     lines += [f"case = {_text(content.model['case'])}"] if content.model.get("case") else []
     for block in BLOCKS:
         for name, table in tables_of(content.model, block).items():
-            lines += ["", f"[{qualified(block, name)}]", *_block(content, block, name, table)]
+            lines += ["", f"[{qualified(block, name)}]", *block_lines(content, block, name, table)]
     lines += error_lines(content.model)
-    limits = content.model.get("limits", {})
-    lines += ["", "[limits]"] if limits else []
-    lines += [
-        f"{key.name} = {_entry(key, limits[key.name], 0.0)}" for key in LIMITS if key.name in limits
-    ]
+    lines += limit_lines(content.model)
     for effect in content.model["effects"]:
-        place = effect.get("at", "")
-        lines += [
-            "",
-            "[[effects]]",
-            f"id = {_text(effect['id'])}",
-            *([f"at = {_text(place)}"] if place else []),
-            *([f"form = {_text(effect['form'])}"] if "form" in effect else []),
-            "[effects.parameters]",
-        ]
-        units = _effect_units(effect["id"], effect.get("form", ""))
-        spread = content.effect_std.get(qualified(effect["id"], place), {})
-        for name, value in effect["parameters"].items():
-            std = f", std = {_number(spread[name])}" if name in spread else ""
-            lines.append(
-                f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}"
-            )
+        lines += effect_lines(content, effect)
     return "\n".join(lines) + "\n"
 
 
-def _block(content: Content, block: str, name: str, table: Mapping[str, Any]) -> Iterator[str]:
+def limit_lines(model: Mapping[str, Any]) -> list[str]:
+    """``[limits]`` as lines of TOML; none where the stand's are not given."""
+    limits = model.get("limits", {})
+    lines = ["", "[limits]"] if limits else []
+    return lines + [
+        f"{key.name} = {entry_text(key, limits[key.name], 0.0)}"
+        for key in LIMITS
+        if key.name in limits
+    ]
+
+
+def effect_lines(content: Content, effect: Mapping[str, Any]) -> list[str]:
+    """One table ``[[effects]]`` as lines of TOML."""
+    place = effect.get("at", "")
+    lines = [
+        "",
+        "[[effects]]",
+        f"id = {_text(effect['id'])}",
+        *([f"at = {_text(place)}"] if place else []),
+        *([f"form = {_text(effect['form'])}"] if "form" in effect else []),
+        "[effects.parameters]",
+    ]
+    units = _effect_units(effect["id"], effect.get("form", ""))
+    spread = content.effect_std.get(qualified(effect["id"], place), {})
+    for name, value in effect["parameters"].items():
+        std = f", std = {_number(spread[name])}" if name in spread else ""
+        lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
+    return lines
+
+
+def block_lines(content: Content, block: str, name: str, table: Mapping[str, Any]) -> Iterator[str]:
     """The lines of one block: its ports as the file gave them, its keys, its groups of keys."""
     label = qualified(block, name)
     given = content.model.get("ports", {}).get(label, {})
@@ -88,7 +106,7 @@ def _block(content: Content, block: str, name: str, table: Mapping[str, Any]) ->
     for key in keys_of(block, table):
         if key.name not in table:
             continue
-        entry = _entry(key, table[key.name], content.tolerances.get(f"{label}.{key.name}", 0.0))
+        entry = entry_text(key, table[key.name], content.tolerances.get(f"{label}.{key.name}", 0.0))
         if len(key.where) == 1:
             yield f"{key.name} = {entry}"
         else:
@@ -96,7 +114,8 @@ def _block(content: Content, block: str, name: str, table: Mapping[str, Any]) ->
     yield from (f"{group} = {{ {', '.join(members)} }}" for group, members in groups.items())
 
 
-def _entry(key: Key, value: Any, tol: float) -> str:
+def entry_text(key: Key, value: Any, tol: float) -> str:
+    """The value of one key, with its unit and tolerance."""
     if key.kind == "choice":
         return _text(value)
     if key.kind == "count":

@@ -5,9 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 __all__ = [
+    "ALL_MODELS",
     "ELASTIC_PARAMETERS",
     "GEOMETRIES",
+    "MAP_PARAMETERS",
     "MODELS",
+    "PARAMETERS",
     "POLYNOMIAL_MODELS",
     "models_with",
     "own_geometry",
@@ -24,15 +27,21 @@ ELASTIC_PARAMETERS: Final[dict[str, tuple[str, ...]]] = {
     "robinson": _POLYNOMIAL,
     "elbow_linear": ("bladder_modulus", "extension_factors"),
 }
-#: Names of the force models.
+#: What a muscle that is known by its measured forces alone has.
+MAP_PARAMETERS: Final = ("map_pressure", "map_contraction", "map_force")
+#: The same of every model, the map included.
+PARAMETERS: Final[dict[str, tuple[str, ...]]] = {**ELASTIC_PARAMETERS, "map": MAP_PARAMETERS}
+#: Names of the force models with elastic parameters, which can be fitted.
 MODELS: Final = tuple(ELASTIC_PARAMETERS)
+#: Names of all models.
+ALL_MODELS: Final = tuple(PARAMETERS)
 #: Names of the outer profiles.
 GEOMETRIES: Final = ("cylinder", "elliptic", "elliptic_published")
 
 
 def models_with(parameter: str) -> tuple[str, ...]:
-    """The models that have an elastic parameter."""
-    return tuple(model for model, names in ELASTIC_PARAMETERS.items() if parameter in names)
+    """The models that have a parameter."""
+    return tuple(model for model, names in PARAMETERS.items() if parameter in names)
 
 
 #: Models whose elasticity is a polynomial stress with moduli linear in pressure.

@@ -11,7 +11,7 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final, Literal, NamedTuple
 
-from pamrs.rig.muscle_models import GEOMETRIES, MODELS, models_with
+from pamrs.rig.muscle_models import ALL_MODELS, GEOMETRIES, models_with
 
 __all__ = [
     "BLOCKS",
@@ -108,6 +108,7 @@ _TENDON = ("tendon", "published")
 _TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
 _ONE_LINK = ("one_link",)
 _ISO = ("iso_6358",)
+_MAP = ("map",)
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
 _KINDS: Final = {
@@ -227,7 +228,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("alpha", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.2),
     ),
     "muscle": (
-        Key("model", default="robinson", kind="choice", choices=MODELS),
+        Key("model", default="robinson", kind="choice", choices=ALL_MODELS),
         Key("geometry", default="", kind="choice", choices=GEOMETRIES),  # the model's own
         Key("count", "1", 1, 1000, 1, kind="count"),
         Key("rest_length", "m", 1e-3, 10.0),
@@ -247,6 +248,36 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             (0.3, 0.8, 0.8),
             kind="vector",
             only=models_with("extension_factors"),
+        ),
+        Key(
+            "map_pressure",
+            "Pa",
+            -1e5,
+            1e8,
+            kind="vector",
+            path=("map", "pressure"),
+            only=_MAP,
+            note="gauge, rising",
+        ),
+        Key(
+            "map_contraction",
+            "1",
+            -1.0,
+            1.0,
+            kind="vector",
+            path=("map", "contraction"),
+            only=_MAP,
+            note="rising",
+        ),
+        Key(
+            "map_force",
+            "N",
+            -1e7,
+            1e7,
+            kind="vector",
+            path=("map", "force"),
+            only=_MAP,
+            note="a row over the contractions for each pressure, one after the other",
         ),
         Key("modulus_scale", "1", 0.0, 100.0, 1.0),
         Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),

@@ -47,7 +47,7 @@ class Plan:
     def of(cls, rig: Rig, axes: Axes, drive: Drive, chunk: int | None) -> Plan:
         """A plan; by default some 64 chunks, of 1024 to 65 536 runs."""
         size = min(max(len(axes) // _PARTS, _FEWEST), _MOST) if chunk is None else chunk
-        return cls(rig.to_toml_text(), rig.name, axes, drive, size)
+        return cls(rig.to_toml_text(comments=False), rig.name, axes, drive, size)
 
     @cached_property
     def blocks(self) -> Blocks:

@@ -49,9 +49,12 @@ impl Plan {
     pub(crate) fn new(rig: &Rig) -> Option<Self> {
         let wiring = &rig.wiring;
         let body = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Mass { .. });
-        // the curves hold torques, which know nothing of a muscle that goes slack
+        // the curves hold torques linear in pressure, which know nothing of a muscle that goes slack
         let plain = wiring.ports.effects.is_empty()
-            && wiring.groups.iter().all(|g| !g.direction && !g.muscle.buckles());
+            && wiring
+                .groups
+                .iter()
+                .all(|g| !g.direction && !g.muscle.buckles() && !g.muscle.mapped());
         let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
         let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
         if !(body && plain && one_joint && areas) {

@@ -11,6 +11,7 @@ pub mod ferraresi;
 pub mod friction;
 pub mod gaylord;
 pub mod kothera;
+pub mod map;
 pub mod model;
 pub mod mooney_rivlin;
 pub mod robinson;
@@ -19,11 +20,12 @@ pub mod spec;
 pub mod table;
 
 pub use self::friction::Friction;
+pub use self::map::MapSurface;
 pub use self::model::{Coefficients, Elasticity, ForceModel};
 pub use self::spec::{MuscleSpec, HIGHEST_ORDER, STRUT};
 pub use self::table::{Table, TablePoint};
 use crate::braid::{MuscleGeometry, Shape};
-use crate::error::{check_range, Result};
+use crate::error::{check_range, Error, Result};
 use crate::scalar::{constant, Scalar};
 
 /// Lowest gauge pressure [Pa]: vacuum at standard ambient pressure.
@@ -41,6 +43,7 @@ pub struct Muscle {
     contracting: Elasticity,
     lengthening: Option<Elasticity>,
     friction: Option<Friction>,
+    map: Option<MapSurface>,
 }
 
 impl Muscle {
@@ -58,6 +61,7 @@ impl Muscle {
             contracting,
             lengthening,
             friction: spec.friction(),
+            map: MapSurface::new(spec)?,
         })
     }
 
@@ -72,8 +76,14 @@ impl Muscle {
     /// Exact coefficients of the force of one muscle at contraction ratio `e`, while contracting.
     ///
     /// # Errors
-    /// As [`Muscle::shape`].
+    /// As [`Muscle::shape`]; [`Error::Model`] for a map, whose force is not linear in pressure.
     pub fn coefficients(&self, e: f64) -> Result<Coefficients> {
+        if self.map.is_some() {
+            return Err(Error::Model(
+                "muscle.model = \"map\" has no coefficients: its force is not linear in pressure"
+                    .into(),
+            ));
+        }
         Ok(self.contracting.coefficients(self.geometry.braid(), &self.shape(e)?))
     }
 
@@ -99,7 +109,12 @@ impl Muscle {
     /// length.
     pub fn force(&self, pressure: f64, e: f64) -> Result<f64> {
         check_pressure(pressure)?;
-        Ok(self.coefficients(e)?.force(pressure, self.spec.modulus_scale))
+        let scale = self.spec.modulus_scale;
+        if let Some(map) = &self.map {
+            self.shape(e)?;
+            return Ok(scale * map.force(pressure, e));
+        }
+        Ok(self.coefficients(e)?.force(pressure, scale))
     }
 
     /// Exact force of one muscle [N] in a direction of motion, from -1 (contracting) to +1
@@ -114,7 +129,14 @@ impl Muscle {
             (self.geometry.braid(), self.shape(e)?, self.spec.modulus_scale);
         let force = |branch: &Elasticity| branch.coefficients(braid, &shape).force(pressure, scale);
         let lengthening = self.lengthening.as_ref().map(force);
-        Ok(moving(force(&self.contracting), lengthening, self.friction, pressure, direction))
+        let mapped = self.map.as_ref().map_or(0.0, |map| scale * map.force(pressure, e));
+        Ok(moving(
+            force(&self.contracting) + mapped,
+            lengthening,
+            self.friction,
+            pressure,
+            direction,
+        ))
     }
 }
 
@@ -156,6 +178,30 @@ impl CompiledMuscle {
     #[must_use]
     pub fn has_direction(&self) -> bool {
         self.lengthening.is_some() || self.exact.friction.is_some()
+    }
+
+    /// Whether the force is a map's, and not the table's.
+    #[must_use]
+    pub fn mapped(&self) -> bool {
+        self.exact.map.is_some()
+    }
+
+    /// Force of one muscle [N] while contracting, without friction; `table` is its point at `e`.
+    #[inline]
+    pub fn pull<S: Scalar>(&self, table: &TablePoint<S>, pressure: S, e: S, scale: S) -> S {
+        match &self.exact.map {
+            None => table.force(pressure, scale),
+            Some(map) => scale * map.force(pressure, e),
+        }
+    }
+
+    /// Share of the bladder in that force [N]; of a map what it has without pressure.
+    #[inline]
+    pub fn bladder<S: Scalar>(&self, table: &TablePoint<S>, pressure: S, e: S, scale: S) -> S {
+        match &self.exact.map {
+            None => scale * (pressure * table.a_elastic + table.b_elastic),
+            Some(map) => scale * map.force(constant(0.0), e),
+        }
     }
 
     /// Whether the muscle buckles when it is pushed.
@@ -210,7 +256,7 @@ impl CompiledMuscle {
         let (low, high) = (self.table.e_min, self.table.e_max);
         check_range("muscle.contraction_ratio", e, low, high, "(the table's range)")?;
         let scale = self.exact.spec.modulus_scale;
-        let force = self.table.eval(e).force(pressure, scale);
+        let force = self.pull(&self.table.eval(e), pressure, e, scale);
         match direction {
             Some(d) => Ok(self.moving(force, e, pressure, scale, check_direction(d)?)),
             None => Ok(force),

@@ -53,11 +53,13 @@ pub enum ForceModel {
     Robinson,
     /// See [`elbow_linear`].
     ElbowLinear,
+    /// See [`super::map`]: the force is not linear in pressure, and stands beside the coefficients.
+    Map,
 }
 
 impl ForceModel {
     /// Names, in the order of the physics reference.
-    pub const NAMES: [(&'static str, Self); 7] = [
+    pub const NAMES: [(&'static str, Self); 8] = [
         ("gaylord", Self::Gaylord),
         ("chou_hannaford", Self::ChouHannaford),
         ("mooney_rivlin", Self::MooneyRivlin),
@@ -65,6 +67,7 @@ impl ForceModel {
         ("kothera", Self::Kothera),
         ("robinson", Self::Robinson),
         ("elbow_linear", Self::ElbowLinear),
+        ("map", Self::Map),
     ];
 
     /// The model of a name.
@@ -99,6 +102,7 @@ impl ForceModel {
             Self::Kothera => kothera::gas(braid, shape),
             Self::Robinson => robinson::gas(braid, shape),
             Self::ElbowLinear => elbow_linear::gas(braid, shape, factors),
+            Self::Map => constant(0.0),
         }
     }
 
@@ -111,7 +115,7 @@ impl ForceModel {
         factors: Factors,
     ) -> S {
         match self {
-            Self::Gaylord | Self::ChouHannaford => constant(0.0),
+            Self::Gaylord | Self::ChouHannaford | Self::Map => constant(0.0),
             Self::MooneyRivlin => mooney_rivlin::elastic(moduli, braid, shape),
             Self::Ferraresi => ferraresi::elastic(moduli, braid, shape),
             Self::Kothera => kothera::elastic(moduli, braid, shape),
@@ -138,7 +142,9 @@ impl Elasticity {
     pub fn contracting(spec: &MuscleSpec) -> Result<Self> {
         let model = spec.force_model()?;
         let (slope, offset) = match model {
-            ForceModel::Gaylord | ForceModel::ChouHannaford => (Vec::new(), Vec::new()),
+            ForceModel::Gaylord | ForceModel::ChouHannaford | ForceModel::Map => {
+                (Vec::new(), Vec::new())
+            }
             ForceModel::MooneyRivlin => (vec![0.0; 2], vec![spec.c10, spec.c01]),
             ForceModel::ElbowLinear => (vec![0.0], vec![spec.bladder_modulus]),
             _ => (spec.modulus_slope.clone(), spec.modulus_offset.clone()),

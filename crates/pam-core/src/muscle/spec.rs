@@ -55,7 +55,16 @@ pub struct MuscleSpec {
     /// Factors of the lengthening branch [1] (`elbow_linear`).
     #[serde(default = "default_factors")]
     pub extension_factors: Factors,
-    /// Factor on every modulus [1].
+    /// Gauge pressures of the map, rising [Pa] (`map`).
+    #[serde(default)]
+    pub map_pressure: Vec<f64>,
+    /// Contraction ratios of the map, rising [1] (`map`).
+    #[serde(default)]
+    pub map_contraction: Vec<f64>,
+    /// Forces of the map [N], a row over the contractions for each pressure (`map`).
+    #[serde(default)]
+    pub map_force: Vec<f64>,
+    /// Factor on every modulus, of a map on its force [1].
     #[serde(default = "default_scale")]
     pub modulus_scale: f64,
     /// `c0` of the friction hysteresis [1].
@@ -130,6 +139,9 @@ impl MuscleSpec {
             c01: 0.0,
             bladder_modulus: 0.0,
             extension_factors: default_factors(),
+            map_pressure: Vec::new(),
+            map_contraction: Vec::new(),
+            map_force: Vec::new(),
             modulus_scale: default_scale(),
             friction_coefficient: 0.0,
             friction_pressure_slope: 0.0,
@@ -267,6 +279,8 @@ impl MuscleSpec {
         let polynomial = model.is_polynomial();
         let (mooney_rivlin, elbow) =
             (model == ForceModel::MooneyRivlin, model == ForceModel::ElbowLinear);
+        let map = model == ForceModel::Map;
+        let numbers = |list: &[f64]| format!("{} numbers", list.len());
         let default = self.extension_factors == default_factors();
         let given = [
             ("modulus_slope", format!("{:?}", self.modulus_slope), polynomial || orders == 0),
@@ -283,6 +297,13 @@ impl MuscleSpec {
                 elbow || self.bladder_modulus == 0.0,
             ),
             ("extension_factors", format!("{:?}", self.extension_factors), elbow || default),
+            ("map_pressure", numbers(&self.map_pressure), map || self.map_pressure.is_empty()),
+            (
+                "map_contraction",
+                numbers(&self.map_contraction),
+                map || self.map_contraction.is_empty(),
+            ),
+            ("map_force", numbers(&self.map_force), map || self.map_force.is_empty()),
         ];
         for (name, value, fits) in given {
             if !fits {
@@ -294,6 +315,9 @@ impl MuscleSpec {
             [("c10", self.c10), ("c01", self.c01), ("bladder_modulus", self.bladder_modulus)]
         {
             check_range(&format!("muscle.{name}"), value, -1e13, 1e13, "Pa")?;
+        }
+        if map {
+            return super::map::check(&self.map_pressure, &self.map_contraction, &self.map_force);
         }
         if !polynomial {
             return Ok(());

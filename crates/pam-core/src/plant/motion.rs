@@ -224,21 +224,20 @@ impl Plant<'_, f64> {
             for i in 0..=32 {
                 let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
                 let point = group.joint.eval(angle);
-                let table = group.muscle.table.eval(point.shortening / group.rest_length);
-                let torque = table.force(Dual64::from(gauge), Dual64::from(self.scales[k]))
-                    * point.torque_arm;
+                let contraction = point.shortening / group.rest_length;
+                let table = group.muscle.table.eval(contraction);
+                let pull = |scale: f64| {
+                    let (gauge, scale) = (Dual64::from(gauge), Dual64::from(scale));
+                    group.muscle.pull(&table, gauge, contraction, scale)
+                };
+                let torque = pull(self.scales[k]) * point.torque_arm;
                 let arm = point.moment_arm.re.abs();
                 let volume = (self.fixed_volume[group.chamber]
                     + table.volume.re.max(0.0) * group.count)
                     .max(f64::MIN_POSITIVE);
                 let swept = table.volume_slope.re * arm * group.count / group.rest_length;
                 let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
-                let friction = self.presliding_stiffness(
-                    k,
-                    group,
-                    table.force(Dual64::from(gauge), Dual64::from(1.0)).re.abs(),
-                    gauge,
-                );
+                let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
                 most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
             }
             total += most;
@@ -303,8 +302,10 @@ impl Plant<'_, f64> {
             let at = |i: u32| {
                 let angle = low + (high - low) * f64::from(i) / f64::from(ARM_POINTS);
                 let point = group.joint.eval(angle);
-                let table = group.muscle.table.eval(point.shortening / group.rest_length);
-                (table.force(gauge, self.scales[k]) * point.torque_arm * group.count).abs()
+                let contraction = point.shortening / group.rest_length;
+                let table = group.muscle.table.eval(contraction);
+                let pull = group.muscle.pull(&table, gauge, contraction, self.scales[k]);
+                (pull * point.torque_arm * group.count).abs()
             };
             (0..=ARM_POINTS).map(at).fold(0.0, f64::max)
         };

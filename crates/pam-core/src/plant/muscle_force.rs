@@ -51,7 +51,7 @@ impl<S: Scalar> Plant<'_, S> {
         let force = if self.altered.muscles && self.wiring.ports.muscles[k].some {
             self.altered_force(k, group, state, memory, start, point, table, felt)
         } else {
-            let force = table.force(gauge, scale);
+            let force = group.muscle.pull(table, gauge, *contraction, scale);
             self.directed(group, memory, start, *contraction, gauge, scale, force)
         };
         group.muscle.buckled(force) * group.count
@@ -99,9 +99,9 @@ impl<S: Scalar> Plant<'_, S> {
         for acting in &here.gauge {
             at.gauge = self.effect(acting).gauge(at.gauge);
         }
-        let mut force = table.force(at.gauge, scale);
+        let mut force = group.muscle.pull(table, at.gauge, at.contraction, scale);
         for acting in &here.bladder {
-            let bladder = scale * (at.gauge * table.a_elastic + table.b_elastic);
+            let bladder = group.muscle.bladder(table, at.gauge, at.contraction, scale);
             feel(acting, bladder, felt);
             force += self.effect(acting).bladder(self.own(acting, state), bladder, at.contraction);
         }

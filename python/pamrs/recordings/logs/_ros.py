@@ -56,7 +56,7 @@ def read_bag(path: Path, form: TextFormat) -> Log:
 
 
 def read_mcap(path: Path, form: TextFormat) -> Log:
-    """Read an MCAP file with messages of ROS 2 or in JSON.
+    """Read an MCAP file with messages of ROS 2, of Protobuf, or in JSON.
 
     Parameters
     ----------
@@ -73,17 +73,19 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
         first one on; the stamps in the messages are channels of their own.
     """
     from mcap.reader import make_reader
-    from mcap_ros2.decoder import DecoderFactory
 
     unread: dict[str, str] = {}
 
     def messages(stream: Any) -> _Messages:
-        factory = DecoderFactory()
+        factories: dict[str, Any] = {}
         for schema, channel, message in make_reader(stream).iter_messages():
             if channel.message_encoding == "json":
                 yield channel.topic, message.log_time, json.loads(message.data)
                 continue
-            decode = factory.decoder_for(channel.message_encoding, schema)
+            kind = channel.message_encoding
+            if kind not in factories:
+                factories[kind] = _decoders(kind)
+            decode = factories[kind] and factories[kind].decoder_for(kind, schema)
             if decode is None:
                 unread[channel.topic] = (
                     f"messages encoded as {channel.message_encoding!r} are not read"
@@ -93,6 +95,19 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
 
     with path.open("rb") as stream:
         return _collected(path, messages(stream), unread)
+
+
+def _decoders(encoding: str) -> Any:
+    """What decodes messages of an encoding; None where nothing does."""
+    if encoding == "cdr":
+        from mcap_ros2.decoder import DecoderFactory as Ros
+
+        return Ros()
+    if encoding == "protobuf":
+        from mcap_protobuf.decoder import DecoderFactory as Protobuf
+
+        return Protobuf()
+    return None
 
 
 def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
@@ -133,9 +148,10 @@ def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
                 yield from _numbers(f"{name}[{index}]", item, depth + 1)
         return
     fields = value if isinstance(value, dict) else _slots(value)
-    if {"sec", "nanosec"} == set(fields):
-        yield name, float(fields["sec"]) + 1e-9 * float(fields["nanosec"])
-        return
+    for whole, part in (("sec", "nanosec"), ("seconds", "nanos")):  # of ROS, of Protobuf
+        if {whole, part} == set(fields):
+            yield name, float(fields[whole]) + 1e-9 * float(fields[part])
+            return
     labels = fields.get("name")
     if not isinstance(labels, (list, tuple)) or not all(isinstance(item, str) for item in labels):
         labels = ()
@@ -153,9 +169,23 @@ def _length(value: Any) -> int:
 
 
 def _slots(message: Any) -> dict[str, Any]:
+    descriptor = getattr(message, "DESCRIPTOR", None)
+    if descriptor is not None:
+        return {
+            field.name: _field(getattr(message, field.name))
+            for field in descriptor.fields
+            if not field.has_presence or message.HasField(field.name)
+        }
     names = getattr(message, "__slots__", None) or getattr(message, "__dict__", {})
     return {
         str(name): getattr(message, name)
         for name in names
         if not str(name).startswith("_") and hasattr(message, name)
     }
+
+
+def _field(value: Any) -> Any:
+    """A field of a Protobuf message: repeated ones as lists, maps as dictionaries."""
+    if hasattr(value, "items"):
+        return dict(value.items())
+    return list(value) if hasattr(value, "append") else value

@@ -1,0 +1,395 @@
+"""A muscle known by its measured forces alone: a table of forces over pressure and contraction, and
+how far the measurements scatter about it.
+
+The table is the least squares one of the rows: bilinear between its nodes, with a small penalty on
+second differences that carries it into corners nobody measured. It is then made monotone, falling
+with contraction and rising with pressure, by isotonic regression along both axes (R. E. Barlow et
+al., *Statistical Inference under Order Restrictions*, 1972: pooled adjacent violators), which keeps
+the order along the first axis while it makes that along the second.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit._data import ForceMap
+
+if TYPE_CHECKING:
+    from pamrs.rig import Muscle, Rig
+
+__all__ = ["MapFit", "fit_map"]
+
+Array = NDArray[np.float64]
+
+_MOST_LEVELS: Final = 24
+"""Pressure levels that are nodes themselves; of more, as in a ramp, this many are taken."""
+_NODES: Final = 20
+_MOST_NODES: Final = 200
+_SHARE: Final = 0.3
+"""Of all rows in each direction: then the branches are told apart."""
+_STIFF: Final = 1e-4
+"""Penalty on second differences, of a node's mean weight: it decides nothing where rows are."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MapFit:
+    """A table of forces, and what the measurements say of it.
+
+    Attributes
+    ----------
+    pressure, contraction : (p,), (e,) array
+        Nodes: gauge pressure [Pa] and contraction ratio [1].
+    force : (p, e) array
+        Force at each [N], falling with contraction and rising with pressure.
+    scatter : float
+        Root mean square of what the rows differ from the table [N]; of branches whose direction is
+        known, from a table of their own.
+    between : float
+        The same for each inner pressure level, predicted by the others [N]; NaN with fewer than
+        three levels.
+    half_width : float
+        Root mean square of half the distance of both branches [N]: hysteresis, which is no error of
+        the table but for a diagnosis to find; NaN where the directions are not known.
+    share : float
+        The larger of both over the root mean square of the forces [1]: the model error.
+    rows : int
+        Rows that were used.
+    rest_length : float
+        Length at zero contraction [m].
+    issues : list of str
+        What was found.
+    """
+
+    pressure: Array
+    contraction: Array
+    force: Array
+    scatter: float
+    between: float
+    half_width: float
+    share: float
+    rows: int
+    rest_length: float
+    issues: list[str] = field(default_factory=list)
+
+    def __repr__(self) -> str:
+        return (
+            f"MapFit({len(self.pressure)} x {len(self.contraction)} nodes, {self.rows} rows, error "
+            f"{100 * self.share:.2g} %)"
+        )
+
+    def predict(self, pressure: Any, contraction: Any) -> Array:
+        """Force [N] at gauge pressures [Pa] and contraction ratios [1], broadcast together, as a
+        muscle with this table has it.
+
+        Parameters
+        ----------
+        pressure, contraction : array_like
+
+        Returns
+        -------
+        ndarray
+        """
+        return _predict(self.pressure, self.contraction, self.force, pressure, contraction)
+
+    def to_muscle(self, muscle: Muscle) -> Muscle:
+        """A muscle with this table.
+
+        Parameters
+        ----------
+        muscle : Muscle
+            Gives the geometry, which the volume follows from, the friction and the count.
+
+        Returns
+        -------
+        Muscle
+            With the model ``map``.
+
+        Raises
+        ------
+        ParameterError
+            If its rest length is another.
+        """
+        rest = float(muscle.parameters["rest_length"])
+        if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
+            raise ParameterError(
+                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
+                "the same is needed"
+            )
+        return muscle.replace(
+            model="map",
+            geometry=muscle.geometry,
+            modulus_scale=1.0,
+            map_pressure=self.pressure,
+            map_contraction=self.contraction,
+            map_force=self.force.ravel(),
+        )
+
+    def to_rig(self, muscle: Muscle, rig: Rig | None = None) -> Rig:
+        """A rig with this table as its muscle's force, and the error of it as ``[model_error]``.
+
+        Parameters
+        ----------
+        muscle : Muscle
+            As for :meth:`to_muscle`.
+        rig : Rig, optional
+            The rig that it is a part of; by default a load frame.
+
+        Returns
+        -------
+        Rig
+        """
+        from pamrs.rig.schema import keys_of
+        from pamrs.rigs import bench
+
+        own = self.to_muscle(muscle)
+        if rig is None:
+            rig = bench(own)
+        base = rig.model
+        count = own.parameters["count"] if base["muscle"] is None else base["muscle"]["count"]
+        given = {**own.parameters, "count": count}
+        table = {key.name: given[key.name] for key in keys_of("muscle", given)}
+        error = {**(base.get("model_error") or {}), "muscle": {"share": min(self.share, 1.0)}}
+        kept = {
+            name: tol
+            for name, tol in rig._tolerances.items()
+            if not name.startswith("muscle.") or name.removeprefix("muscle.") in table
+        }
+        model = {**base, "muscle": table, "model_error": error}
+        return replace(rig, _model=model, _tolerances=kept)
+
+    def fit_report(self) -> str:
+        """The result as text."""
+        p, e = self.pressure / 1e3, 100.0 * self.contraction
+        between = (
+            "not determinable, fewer than three levels"
+            if math.isnan(self.between)
+            else f"{self.between:.3g} N rms"
+        )
+        lines = [
+            "force table of the muscle: monotone in pressure and contraction",
+            f"  {len(p)} pressures from {p[0]:.4g} to {p[-1]:.4g} kPa, {len(e)} contractions from "
+            f"{e[0]:.3g} to {e[-1]:.3g} %",
+            f"  {self.rows} rows scatter by {self.scatter:.3g} N rms about it",
+            f"  a pressure predicted by the others: {between}",
+            *(
+                []
+                if math.isnan(self.half_width)
+                else [f"  both branches lie {self.half_width:.3g} N rms beside it: hysteresis"]
+            ),
+            f"  model error: {100.0 * self.share:.2g} % of the force",
+        ]
+        return "\n".join([*lines, *(f"  note: {issue}" for issue in self.issues)]) + "\n"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The result as plain data, SI units; None where a number is not determinable."""
+        return {
+            "pressure": self.pressure.tolist(),
+            "contraction": self.contraction.tolist(),
+            "force": self.force.tolist(),
+            "scatter": self.scatter,
+            "between": None if math.isnan(self.between) else self.between,
+            "half_width": None if math.isnan(self.half_width) else self.half_width,
+            "share": self.share,
+            "rows": self.rows,
+            "rest_length": self.rest_length,
+            "issues": self.issues,
+        }
+
+
+def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
+    """The table of forces of a muscle, from measurements alone.
+
+    Parameters
+    ----------
+    data : ForceMap
+        Forces at two pressures at least; both branches of a hysteresis are averaged. Where no
+        column has the directions, the order of the rows may tell them
+        (:meth:`ForceMap.with_directions`).
+    nodes : int
+        Contractions of the table, from 3 to 200.
+
+    Returns
+    -------
+    MapFit
+
+    Raises
+    ------
+    ParameterError
+        If `nodes` is not possible.
+    RecordingError
+        If there are fewer than two pressures or fewer than three contractions.
+    """
+    if not 3 <= int(nodes) <= _MOST_NODES:
+        raise ParameterError(f"nodes = {nodes!r} is not allowed: from 3 to {_MOST_NODES}")
+    data = data.with_directions()
+    gas, e, pull, _, way = data.used_rows()
+    pressure = _levels(data)
+    contraction = np.linspace(float(e.min()), float(e.max()), int(nodes))
+    if len(pressure) < 2 or not contraction[-1] > contraction[0]:
+        raise RecordingError(
+            f"{data.label}: {len(pressure)} pressures from {100 * e.min():.3g} to "
+            f"{100 * e.max():.3g} % contraction; a table needs two pressures at least, over a "
+            "range of contraction"
+        )
+    groups = _branches(way)
+    tables = [_table(pressure, contraction, gas[r], e[r], pull[r]) for r in groups]
+    force = np.mean(tables, axis=0)  # a mean of monotone ones is one
+    squares = [
+        (pull[r] - _predict(pressure, contraction, own, gas[r], e[r])) ** 2
+        for r, own in zip(groups, tables, strict=True)
+    ]
+    count = len(pull)  # what the nodes took is given back, as far as rows are more than nodes
+    spare = count - min(len(groups) * force.size, count // 2)
+    scatter = float(np.sqrt(np.sum(np.concatenate(squares)) / spare))
+    left = [_left_out(pressure, contraction, gas[r], e[r], pull[r]) for r in groups]
+    between = float(np.sqrt(np.mean(np.concatenate(left)))) if len(left[0]) else math.nan
+    half_width = math.nan
+    if len(groups) == 2:
+        half_width = float(np.sqrt(np.mean((0.5 * (tables[1] - tables[0])) ** 2)))
+    size = float(np.sqrt(np.mean(pull**2)))
+    largest = max(scatter, 0.0 if math.isnan(between) else between)
+    return MapFit(
+        pressure=pressure,
+        contraction=contraction,
+        force=force,
+        scatter=scatter,
+        between=between,
+        half_width=half_width,
+        share=largest / size if size > 0.0 else 0.0,
+        rows=len(pull),
+        rest_length=data.rest_length,
+        issues=[*data.issues, *_unmeasured(pressure, contraction, gas, e)],
+    )
+
+
+def _levels(data: ForceMap) -> Array:
+    """Pressures of the table: the levels of the map, fewer where these are a ramp."""
+    levels = np.asarray(data.levels, dtype=np.float64)
+    if len(levels) <= _MOST_LEVELS:
+        return levels
+    return np.linspace(levels[0], levels[-1], _MOST_LEVELS)
+
+
+def _predict(pressure: Array, contraction: Array, force: Array, gas: Any, e: Any) -> Array:
+    from pamrs.rig import force_table
+
+    p, x = np.broadcast_arrays(np.asarray(gas, dtype=float), np.asarray(e, dtype=float))
+    found = force_table(pressure, contraction, force)
+    return found(np.ascontiguousarray(p.ravel()), np.ascontiguousarray(x.ravel())).reshape(p.shape)
+
+
+def _table(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> Array:
+    """Forces at the nodes, monotone along both axes."""
+    from scipy.sparse import csr_array, eye_array, kron
+    from scipy.sparse.linalg import spsolve
+
+    rows = len(pull)
+    i, x = _place(pressure, gas)
+    j, y = _place(contraction, e)
+    count = len(contraction)
+    index = np.concatenate([(i + a) * count + j + b for a in (0, 1) for b in (0, 1)])
+    weight = np.concatenate([wx * wy for wx in (1.0 - x, x) for wy in (1.0 - y, y)])
+    size = len(pressure) * count
+    design = csr_array((weight, (np.tile(np.arange(rows), 4), index)), shape=(rows, size))
+    along_e = kron(eye_array(len(pressure)), _second(contraction))
+    along_p = kron(_second(pressure), eye_array(count))
+    stiff = _STIFF * rows / size
+    normal = design.T @ design + stiff * (along_e.T @ along_e + along_p.T @ along_p)
+    normal = normal + 1e-12 * stiff * eye_array(size)
+    found = np.asarray(spsolve(normal.tocsc(), design.T @ pull)).reshape(len(pressure), count)
+    seen = np.asarray(design.sum(axis=0)).reshape(found.shape)
+    trust = np.maximum(seen.mean(axis=0), 1e-3 * seen.mean())
+    falling = np.array([-_isotonic(-row, trust) for row in found])
+    trust = np.maximum(seen.mean(axis=1), 1e-3 * seen.mean())
+    return np.column_stack([_isotonic(column, trust) for column in falling.T])
+
+
+def _place(axis: Array, values: Array) -> tuple[NDArray[np.intp], Array]:
+    """Interval of each value, and where in it."""
+    cell = np.clip(np.searchsorted(axis, values, side="right") - 1, 0, len(axis) - 2)
+    return cell, (values - axis[cell]) / (axis[cell + 1] - axis[cell])
+
+
+def _second(axis: Array) -> Any:
+    """Second differences on an axis that need not be even, in units of its mean interval."""
+    from scipy.sparse import csr_array
+
+    unit = axis / np.mean(np.diff(axis))
+    lines = []
+    for k in range(1, len(axis) - 1):
+        before, after = unit[k] - unit[k - 1], unit[k + 1] - unit[k]
+        line = np.zeros(len(axis))
+        line[k - 1], line[k + 1] = 1.0 / before, 1.0 / after
+        line[k] = -line[k - 1] - line[k + 1]
+        lines.append(line)
+    return csr_array(np.array(lines).reshape(len(lines), len(axis)))
+
+
+def _isotonic(values: Array, weights: Array) -> Array:
+    """The rising values nearest to some values, by pooled adjacent violators."""
+    means: list[float] = []
+    sizes: list[float] = []
+    counts: list[int] = []
+    for value, weight in zip(values.tolist(), weights.tolist(), strict=True):
+        means.append(value)
+        sizes.append(weight)
+        counts.append(1)
+        while len(means) > 1 and means[-2] > means[-1]:
+            total = sizes[-2] + sizes[-1]
+            means[-2:] = [(means[-2] * sizes[-2] + means[-1] * sizes[-1]) / total]
+            sizes[-2:] = [total]
+            counts[-2:] = [counts[-2] + counts[-1]]
+    return np.repeat(means, counts)
+
+
+def _branches(way: NDArray[np.int8]) -> list[NDArray[np.bool_]]:
+    """Rows of either direction, where most have one; else all rows."""
+    both = [way < 0, way > 0]
+    if min(rows.sum() for rows in both) >= _SHARE * len(way):
+        return both
+    return [np.ones(len(way), dtype=bool)]
+
+
+def _left_out(pressure: Array, contraction: Array, gas: Array, e: Array, pull: Array) -> Array:
+    """Squares of what each inner pressure differs from the table of the others [N2]."""
+    nearest = np.argmin(np.abs(gas[:, None] - pressure[None, :]), axis=1)
+    squares: list[Array] = []
+    for k in range(1, len(pressure) - 1):
+        mine = nearest == k
+        if not mine.any() or mine.all():
+            continue
+        left = np.delete(pressure, k)
+        table = _table(left, contraction, gas[~mine], e[~mine], pull[~mine])
+        squares.append((pull[mine] - _predict(left, contraction, table, gas[mine], e[mine])) ** 2)
+    return np.concatenate(squares) if squares else np.empty(0)
+
+
+def _unmeasured(pressure: Array, contraction: Array, gas: Array, e: Array) -> list[str]:
+    """Where the table only goes on from its neighbours."""
+    found = []
+    step = float(contraction[1] - contraction[0])
+    nearest = np.argmin(np.abs(gas[:, None] - pressure[None, :]), axis=1)
+    for k, level in enumerate(pressure.tolist()):
+        mine = e[nearest == k]
+        title = f"{level / 1e3:.4g} kPa"
+        if not len(mine):
+            found.append(f"{title}: no row, the table goes on from its neighbours")
+            continue
+        low, high = float(mine.min()), float(mine.max())
+        if low > contraction[0] + step or high < contraction[-1] - step:
+            found.append(
+                f"{title}: rows from {100 * low:.3g} to {100 * high:.3g} % contraction; beyond, "
+                "the table goes on from its neighbours"
+            )
+    if pressure[0] > 0.02 * pressure[-1]:
+        found.append(
+            f"no row below {pressure[0] / 1e3:.4g} kPa: there the force goes on along a straight "
+            "line"
+        )
+    return found

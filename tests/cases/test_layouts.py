@@ -1,0 +1,64 @@
+"""Rigs as laboratories have them, each diagnosed with its effect concealed."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import pamrs
+
+HOME = Path(__file__).parents[2] / "cases" / "layouts"
+
+
+@pytest.fixture(scope="module")
+def layouts() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("layouts", HOME / "layouts.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["layouts"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_every_layout_writes_a_case_that_is_read(layouts: ModuleType, tmp_path: Path) -> None:
+    assert layouts.main([str(tmp_path)]) == 0
+    for name in layouts.LAYOUTS:
+        case = pamrs.load_case(tmp_path / name)
+        assert [r.role for r in case.recordings] == ["fit", "fit", "held_out"]
+    hanging = pamrs.load_case(tmp_path / "hanging_mass")
+    for recording in hanging.recordings:
+        masked = int(np.sum(~recording.mask["length"]))
+        assert 40 <= masked <= 120  # six dropouts of eight samples, and little beside them
+    assert layouts.main([str(tmp_path), "moon"]) == 2
+
+
+def test_an_isometric_bench_has_no_force_below_a_pressure(
+    layouts: ModuleType, tmp_path: Path
+) -> None:
+    layout = layouts.LAYOUTS["isometric_bench"]
+    found = pamrs.diagnose(layouts.write(layout, tmp_path))
+    assert [e.id for e in found.effects] == [layout.conceals]
+    assert found.effects[0].parameters["threshold"]["value"] == pytest.approx(2e4, rel=0.1)
+
+
+def test_three_nozzles_show_the_heat_of_the_wall(layouts: ModuleType, tmp_path: Path) -> None:
+    layout = layouts.LAYOUTS["tank_three_nozzles"]
+    found = pamrs.diagnose(layouts.write(layout, tmp_path))
+    assert [e.id for e in found.effects] == [layout.conceals]
+    value = found.effects[0].parameters["heat_transfer_coefficient"]["value"]
+    assert value == pytest.approx(50.0, rel=0.02)
+
+
+@pytest.mark.slow
+def test_one_gauge_finds_the_dead_time(layouts: ModuleType, tmp_path: Path) -> None:
+    layout = layouts.LAYOUTS["regulator_one_gauge"]
+    found = pamrs.diagnose(layouts.write(layout, tmp_path))
+    (wrong,) = found.wrong_parameters
+    assert wrong.name == layout.conceals
+    assert wrong.value == pytest.approx(0.03, abs=5e-4)
