@@ -7,14 +7,16 @@ use crate::blocks::gas::{Gas, LAMINAR_RATIO};
 use crate::chebyshev::{interpolate, lobatto};
 use pulp::Simd;
 
-const NODES: usize = 19;
+/// So many that the flow is right to 1e-11.
+const NODES: usize = 12;
 
 /// Flow through orifices of one gas. `psi^2/(1 - r)` is a polynomial over the subsonic ratios.
 #[derive(Debug, Clone)]
 pub(super) struct Orifice {
     critical_ratio: f64,
-    middle: f64,
     per_half_width: f64,
+    /// Where the middle of the curve is, in half-widths, below zero.
+    middle: f64,
     curve: [f64; NODES],
     choked: f64,
     laminar: f64,
@@ -36,8 +38,8 @@ impl Orifice {
         let curve = interpolate(&std::array::from_fn::<_, NODES, _>(node)).map(|[c]| c);
         Self {
             critical_ratio: low,
-            middle,
             per_half_width: 1.0 / half,
+            middle: -middle / half,
             curve,
             choked: gas.psi(0.0),
             laminar: gas.psi(LAMINAR_RATIO) / (1.0 - LAMINAR_RATIO),
@@ -45,17 +47,23 @@ impl Orifice {
         }
     }
 
+    /// What [`Self::mass_flow`] takes in the place of a discharge area [m2].
+    #[inline(always)]
+    pub fn conductance<S: Simd, const R: usize>(&self, area: Num<S, R>) -> Num<S, R> {
+        area * self.factor
+    }
+
     /// Mass flow [kg/s] from `upstream` to `downstream`, as [`Gas::mass_flow`].
     #[inline(always)]
     pub fn mass_flow<S: Simd, const R: usize>(
         &self,
-        area: Num<S, R>,
+        conductance: Num<S, R>,
         upstream: Num<S, R>,
         downstream: Num<S, R>,
     ) -> Num<S, R> {
         let high = upstream.or_above(downstream);
         let ratio = upstream.or_below(downstream) / high;
-        let flow = area * high * self.psi(ratio) * self.factor;
+        let flow = conductance * high * self.psi(ratio);
         downstream.at_most(upstream).select(flow, -flow)
     }
 
@@ -65,10 +73,8 @@ impl Orifice {
         if ratio.constant(self.critical_ratio).less(ratio).nowhere() {
             return choked;
         }
-        let subsonic = ratio
-            .or_above(ratio.constant(self.critical_ratio))
-            .or_below(ratio.constant(LAMINAR_RATIO));
-        let place = (subsonic - self.middle) * self.per_half_width;
+        let subsonic = ratio.or_above(self.critical_ratio).or_below(LAMINAR_RATIO);
+        let place = subsonic.times_plus(self.per_half_width, self.middle);
         let curved = ((-subsonic + 1.0) * place.polynomial(&self.curve)).sqrt();
         let straight = (-ratio + 1.0) * self.laminar;
         let open = ratio.at_most(ratio.constant(LAMINAR_RATIO)).select(curved, straight);
@@ -97,7 +103,7 @@ impl<S: Simd, const R: usize> Tube<S, R> {
         let edge = ratio.constant(LAMINAR_RATIO);
         let curved = ratio.or_above(self.critical_ratio).or_below(edge);
         let x = (curved - self.critical_ratio) / (-self.critical_ratio + 1.0);
-        let ellipse = (-(x * x) + 1.0).sqrt();
+        let ellipse = x.times_from(x, 1.0).sqrt();
         // Beyond the edge the ellipse stands at its value there.
         let straight = ellipse * (-ratio + 1.0) / (1.0 - LAMINAR_RATIO);
         ratio.at_most(edge).select(ellipse, straight)
@@ -128,10 +134,21 @@ impl<S: Simd, const R: usize> Supply<S, R> {
             Self::Tank(stiffness) => -(outflow * *stiffness),
             Self::Constant => pressure.constant(0.0),
             Self::Regulator { time_constant, droop } => {
-                (set - pressure - *droop * outflow) / *time_constant
+                droop.times_from(outflow, set - pressure) / *time_constant
             }
         }
     }
+}
+
+/// How the torque of a weight follows the angle.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Turns {
+    /// Not at all: it hangs.
+    Not,
+    /// By the sine of angles up to [`super::num::NEAR`].
+    Near,
+    /// By the sine of any angle.
+    Far,
 }
 
 /// What moves: an arm of one link, or a mass that hangs from the muscle (without inertia of its
@@ -142,8 +159,8 @@ pub(super) struct Body<S: Simd, const R: usize> {
     pub mobility: Num<S, R>,
     /// Torque of the weight where it pulls across [N m], or the weight itself [N].
     pub weight: Num<S, R>,
-    /// The weight follows the sine of the angle.
-    pub turns: bool,
+    /// How the weight follows the angle.
+    pub turns: Turns,
     pub viscous: Num<S, R>,
     pub coulomb: Num<S, R>,
     /// Some lane has Coulomb friction.
@@ -156,15 +173,20 @@ pub(super) struct Body<S: Simd, const R: usize> {
 impl<S: Simd, const R: usize> Body<S, R> {
     #[inline(always)]
     pub fn acceleration(&self, angle: Num<S, R>, rate: Num<S, R>, torque: Num<S, R>) -> Num<S, R> {
-        let mut sum = torque - self.viscous * rate;
+        // What resists is known before the torque is.
+        let mut resists = match self.turns {
+            Turns::Not => self.weight,
+            Turns::Near => self.weight * angle.sin_near(),
+            Turns::Far => self.weight * angle.sin(),
+        };
+        resists = self.viscous.times_plus(rate, resists);
         if self.rubs {
-            sum = sum - self.coulomb * (rate * self.coulomb_slope).tanh();
+            resists = self.coulomb.times_plus((rate * self.coulomb_slope).tanh(), resists);
         }
-        sum = if self.turns { sum - self.weight * angle.sin() } else { sum - self.weight };
         if let Some(stops) = &self.stops {
-            sum += stop_torque(stops, angle, rate);
+            resists = resists - stop_torque(stops, angle, rate);
         }
-        sum * self.mobility
+        (torque - resists) * self.mobility
     }
 }
 
@@ -177,9 +199,12 @@ fn stop_torque<S: Simd, const R: usize>(
 ) -> Num<S, R> {
     let zero = angle.constant(0.0);
     let (low, high) = (angle.constant(stops.min_angle), angle.constant(stops.max_angle));
+    let (below, above): (Mask<S, R>, Mask<S, R>) = (angle.less(low), high.less(angle));
+    if below.nowhere() && above.nowhere() {
+        return zero;
+    }
     let damping = rate * stops.damping;
-    let up = ((low - angle) * stops.stiffness - damping).or_above(zero);
-    let down = ((angle - high) * stops.stiffness + damping).or_above(zero);
-    let above: Mask<S, R> = high.less(angle);
-    angle.less(low).select(up, above.select(-down, zero))
+    let up = (low - angle).times_plus(stops.stiffness, -damping).or_above(zero);
+    let down = (angle - high).times_plus(stops.stiffness, damping).or_above(zero);
+    below.select(up, above.select(-down, zero))
 }

@@ -5,7 +5,7 @@
 //! cells, refined until they agree with [`crate::blocks::joint::Joint::eval`] and
 //! [`crate::muscle::Table::eval`] at points off the nodes. No cell crosses a kink of the muscle.
 
-use super::num::{side_by_side, Num, MOST_LANES, WHOLE};
+use super::num::{side_by_side, Num, MOST_LANES, PAIR, WHOLE};
 use crate::chebyshev::{interpolate, lobatto};
 use crate::plant::Group;
 use pulp::Simd;
@@ -18,8 +18,9 @@ const DEGREE: usize = 5;
 const NODES: usize = DEGREE + 1;
 const VOLUME: usize = 3;
 const SLOPE: usize = 4;
-/// Numbers of a cell: its powers one after the other, all columns of each.
-const STRIDE: usize = NODES * COLUMNS;
+/// A cell: its powers, of the distance from its middle in its width, one after the other, all
+/// columns of each.
+type Cell = [f64; NODES * COLUMNS];
 /// Largest error, relative to the largest magnitude of each column.
 pub(super) const TOLERANCE: f64 = 1e-9;
 /// Cells are halved until the error is below this.
@@ -30,13 +31,13 @@ const CHECKS: [f64; 5] = [-0.93, -0.55, 0.07, 0.62, 0.95];
 /// Points at which kinks are looked for.
 const SCAN: usize = 512;
 
-/// Uniform cells between two kinks.
+/// Uniform cells between two kinks: the number of a cell follows its coordinate.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
     start: f64,
     cells_per_unit: f64,
-    first: f64,
-    last: f64,
+    /// Number of the middle of the first cell, less that of zero.
+    offset: f64,
 }
 
 /// All columns of one group over a range of its coordinate.
@@ -45,7 +46,9 @@ pub(super) struct Curves {
     pub low: f64,
     pub high: f64,
     pieces: Vec<Piece>,
-    cells: Vec<f64>,
+    cells: Vec<Cell>,
+    /// In the place of a cell that is not there.
+    none: Cell,
 }
 
 impl Curves {
@@ -59,82 +62,103 @@ impl Curves {
         let (mut pieces, mut cells) = (Vec::new(), Vec::new());
         for pair in ends.windows(2) {
             let fitted = refined(group, pair[0], pair[1], &scales)?;
-            let count = fitted.len() / STRIDE;
-            pieces.push(Piece {
-                start: pair[0],
-                cells_per_unit: count as f64 / (pair[1] - pair[0]),
-                first: (cells.len() / STRIDE) as f64,
-                last: (count - 1) as f64,
-            });
-            cells.extend(fitted);
+            let cells_per_unit = fitted.len() as f64 / (pair[1] - pair[0]);
+            let offset = cells.len() as f64 - 0.5 - pair[0] * cells_per_unit;
+            pieces.push(Piece { start: pair[0], cells_per_unit, offset });
+            cells.extend(fitted.iter().map(stored));
         }
-        Some(Self { low, high, pieces, cells })
+        // what rounds beyond the last cell's end finds the same curve
+        cells.push(after(cells.last()?));
+        Some(Self { low, high, pieces, cells, none: [0.0; NODES * COLUMNS] })
     }
 
-    /// The columns at an angle of each lane, worked out in registers of some width, those for the
-    /// power only where they are asked for; beyond the range its end.
+    /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
+    /// its end.
     #[inline(always)]
     pub fn eval<W: Simd, S: Simd, const R: usize>(
         &self,
         wide: W,
+        simd: S,
         at: Num<S, R>,
-        power: bool,
     ) -> [Num<S, R>; COLUMNS] {
-        let at = at.or_above(at.constant(self.low)).or_below(at.constant(self.high));
-        let (cell, x) = self.place(at);
+        let (cell, x) = self.place(at.or_above(self.low).or_below(self.high));
+        let square = x * x;
+        let mut columns = [at; COLUMNS];
         if side_by_side::<S, R>() == 1 {
             let mut row = [0.0; COLUMNS];
-            self.row(wide, cell.numbers()[0], x.numbers()[0], &mut row);
-            return row.map(|column| at.constant(column));
-        }
-        let mut rows = [0.0; COLUMNS * MOST_LANES];
-        for (lane, row) in rows.chunks_exact_mut(COLUMNS).take(side_by_side::<S, R>()).enumerate() {
-            self.row(wide, cell.numbers()[lane], x.numbers()[lane], row);
-        }
-        let mut columns = [at; COLUMNS];
-        let wanted = if power { COLUMNS } else { SLOPE + 1 };
-        for (column, values) in columns.iter_mut().enumerate().take(wanted) {
-            for (lane, value) in values.numbers_mut().iter_mut().enumerate() {
-                *value = rows[lane * COLUMNS + column];
+            let place = [x.numbers()[0], square.numbers()[0]];
+            self.row(wide, cell.numbers()[0], place, &mut row);
+            for (column, value) in columns.iter_mut().zip(row) {
+                *column = at.constant(value);
             }
+            return columns;
+        }
+        for register in 0..R {
+            let mut rows = [0.0; COLUMNS * MOST_LANES / PAIR];
+            let lanes = rows.chunks_exact_mut(COLUMNS).take(S::F64_LANES);
+            for (row, lane) in lanes.zip(register * S::F64_LANES..) {
+                let place = [x.numbers()[lane], square.numbers()[lane]];
+                self.row(wide, cell.numbers()[lane], place, row);
+            }
+            Num::turn(simd, &rows, &mut columns, register);
         }
         columns
     }
 
-    /// All columns at a place of one cell, see [`Self::place`].
+    /// All columns at a place of one cell and the square of it, see [`Self::place`].
     #[inline(always)]
-    fn row<W: Simd>(&self, wide: W, cell: f64, x: f64, row: &mut [f64]) {
+    fn row<W: Simd>(&self, wide: W, cell: f64, [x, square]: [f64; 2], row: &mut [f64]) {
         let per_row = COLUMNS / W::F64_LANES;
-        let last = self.cells.len() / STRIDE - 1;
-        let cell = (cell.to_bits() as u32 as usize).min(last);
-        let powers = W::as_simd_f64s(&self.cells[cell * STRIDE..(cell + 1) * STRIDE]).0;
-        let x = wide.splat_f64s(x);
+        let cell = self.cells.get(cell.to_bits() as u32 as usize).unwrap_or(&self.none);
+        let powers = W::as_simd_f64s(cell).0;
+        let (x, square) = (wide.splat_f64s(x), wide.splat_f64s(square));
         for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
-            let mut sum = powers[DEGREE * per_row + k];
-            for power in (0..DEGREE).rev() {
-                sum = wide.add_f64s(wide.mul_f64s(sum, x), powers[power * per_row + k]);
-            }
-            *out = sum;
+            let power = |power: usize| powers[power * per_row + k];
+            let low = wide.mul_add_f64s(power(1), x, power(0));
+            let middle = wide.mul_add_f64s(power(3), x, power(2));
+            let high = wide.mul_add_f64s(power(5), x, power(4));
+            let above = wide.mul_add_f64s(high, square, middle);
+            *out = wide.mul_add_f64s(above, square, low);
         }
     }
 
-    /// Cell of each lane, in the last digits of a number, and the place in it from -1 to 1.
+    /// Cell of each lane, in the last digits of a number, and the place in it from -1/2 to 1/2.
     #[inline(always)]
     fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
         let first = &self.pieces[0];
-        let (mut start, mut scale) = (at.constant(first.start), at.constant(first.cells_per_unit));
-        let (mut begin, mut last) = (at.constant(first.first), at.constant(first.last));
+        let (mut scale, mut offset) =
+            (at.constant(first.cells_per_unit), at.constant(first.offset));
         for piece in &self.pieces[1..] {
             let here = at.constant(piece.start).at_most(at);
-            start = here.select(at.constant(piece.start), start);
             scale = here.select(at.constant(piece.cells_per_unit), scale);
-            begin = here.select(at.constant(piece.first), begin);
-            last = here.select(at.constant(piece.last), last);
+            offset = here.select(at.constant(piece.offset), offset);
         }
-        let position = (at - start) * scale - 0.5;
-        let cell = position.round().or_above(at.constant(0.0)).or_below(last);
-        ((begin + cell) + WHOLE, (position - cell) * 2.0)
+        let position = at.times_plus(scale, offset);
+        let cell = position + WHOLE;
+        (cell, position - (cell - WHOLE))
     }
+}
+
+/// A cell as it is stored, of one in powers of half its width.
+fn stored(powers: &[[f64; COLUMNS]; NODES]) -> Cell {
+    std::array::from_fn(|k| {
+        let (power, column) = (k / COLUMNS, k % COLUMNS);
+        powers[power][column] * f64::from(1 << power)
+    })
+}
+
+/// The same curve as in a cell, about the middle of the cell that would come after it.
+fn after(cell: &Cell) -> Cell {
+    let mut shifted = *cell;
+    // Horner's rule about -1, power by power
+    for done in 0..DEGREE {
+        for power in (done..DEGREE).rev() {
+            for column in 0..COLUMNS {
+                shifted[power * COLUMNS + column] += shifted[(power + 1) * COLUMNS + column];
+            }
+        }
+    }
+    shifted
 }
 
 /// The columns at an angle, the slope (zero here) left to the volume's polynomial.
@@ -205,8 +229,13 @@ fn scales(group: &Group, low: f64, high: f64) -> [f64; COLUMNS] {
 }
 
 /// Cells of one piece, doubled until they are as good as they get.
-fn refined(group: &Group, start: f64, stop: f64, scales: &[f64; COLUMNS]) -> Option<Vec<f64>> {
-    let mut best: Option<(Vec<f64>, f64)> = None;
+fn refined(
+    group: &Group,
+    start: f64,
+    stop: f64,
+    scales: &[f64; COLUMNS],
+) -> Option<Vec<[[f64; COLUMNS]; NODES]>> {
+    let mut best: Option<(Vec<[[f64; COLUMNS]; NODES]>, f64)> = None;
     let mut count = 1;
     while count <= MOST_CELLS {
         let (cells, error) = fitted(group, start, stop, count, scales);
@@ -230,11 +259,11 @@ fn fitted(
     stop: f64,
     count: usize,
     scales: &[f64; COLUMNS],
-) -> (Vec<f64>, f64) {
+) -> (Vec<[[f64; COLUMNS]; NODES]>, f64) {
     let width = (stop - start) / count as f64;
     let at =
         |cell: usize, x: f64| (start + (cell as f64 + 0.5 + 0.5 * x) * width).clamp(start, stop);
-    let (mut cells, mut worst) = (Vec::with_capacity(count * STRIDE), 0.0_f64);
+    let (mut cells, mut worst) = (Vec::with_capacity(count), 0.0_f64);
     for index in 0..count {
         let values: [[f64; COLUMNS]; NODES] =
             std::array::from_fn(|j| exact(group, at(index, lobatto(j, DEGREE))));
@@ -251,7 +280,7 @@ fn fitted(
                 worst = if error <= worst { worst } else { error };
             }
         }
-        cells.extend(cell.iter().flatten());
+        cells.push(cell);
         if worst.is_nan() || worst > 1e3 * TOLERANCE {
             return (cells, f64::INFINITY);
         }

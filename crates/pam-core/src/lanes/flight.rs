@@ -4,7 +4,7 @@
 
 use super::group::{Group, Rigs, Row, Runs, Spent};
 use super::num::{side_by_side, Num, MOST_LANES, PAIR};
-use super::rates::Lanes;
+use super::rates::{Lanes, Shape};
 use super::reads::Reads;
 use super::rk4::Rk4;
 use super::Plan;
@@ -215,9 +215,20 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     /// The steps of one sample, and which lanes they led beyond the curves.
     #[inline(always)]
     fn sample<W: Simd>(&mut self, wide: W) {
+        match self.lanes.shape {
+            shape if S::F64_LANES == 1 || !shape.is_small() => {
+                self.steps(wide, shape.of_any_size());
+            }
+            shape if shape.sums() => self.steps(wide, Shape::small(true)),
+            _ => self.steps(wide, Shape::small(false)),
+        }
+    }
+
+    #[inline(always)]
+    fn steps<W: Simd>(&mut self, wide: W, shape: Shape) {
         let angle = self.runs.runs[0].stepper.plant.rig().layout.angle(0);
         let (mut low, mut high) = (self.state[angle], self.state[angle]);
-        let (shape, step) = (self.lanes.shape.of_any_size(), self.timing.step());
+        let step = self.timing.step();
         for _ in 0..self.timing.substeps {
             self.method.step(wide, shape, &mut self.lanes, &mut self.state, step);
             low = self.state[angle].or_below(low);
@@ -295,8 +306,8 @@ impl<S: Simd, const R: usize> Group for Flight<'_, S, R> {
     fn advance(&mut self, samples: usize, drive: &Drive<'_>) {
         let simd = self.simd;
         let advance = Advance { flight: self, samples, drive };
-        if side_by_side::<S, R>() == 1 {
-            Arch::new().dispatch(advance); // one plant has columns side by side
+        if S::F64_LANES == 1 {
+            Arch::new().dispatch(advance); // the columns of a plant stand side by side
         } else {
             simd.vectorize(advance);
         }

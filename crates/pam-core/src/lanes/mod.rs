@@ -27,7 +27,7 @@ pub use request::{Outcome, Request, Signal};
 pub use run::simulate;
 pub(crate) use solo::Solo;
 
-use self::blocks::Orifice;
+use self::blocks::{Orifice, Turns};
 use self::curves::Curves;
 use crate::plant::{BodyUnit, Group, Passes, Rig};
 
@@ -62,6 +62,15 @@ impl Plan {
         }
         let curves = wiring.groups.iter().map(|group| curves(rig, group));
         Some(Self { orifice: Orifice::new(&rig.gas), curves: curves.collect::<Option<_>>()? })
+    }
+
+    /// How a weight follows the angles inside all curves.
+    fn turns(&self) -> Turns {
+        let near = |curves: &Curves| curves.low.abs().max(curves.high.abs()) <= num::NEAR;
+        match self.curves.iter().any(near) {
+            true => Turns::Near,
+            false => Turns::Far,
+        }
     }
 
     /// Whether a coordinate is inside all curves.

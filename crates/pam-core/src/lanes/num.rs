@@ -1,8 +1,10 @@
 //! Numbers of several plants side by side, and the few functions that their equations need.
 //!
-//! Every operation is one of IEEE 754 on each lane (add, multiply, divide, root, compare, select),
-//! in a fixed order, without fused multiply-adds and without sums over lanes: a lane has the same
-//! bits whatever its neighbours hold, and however many there are.
+//! Every operation is one of IEEE 754 on each lane (add, multiply, multiply and add with one
+//! rounding, divide, root, compare, select), in a fixed order and without sums over lanes: a lane
+//! has the same bits whatever its neighbours hold, and however many there are. What is multiplied
+//! and added at once is said to be ([`Num::times_plus`]): no compiler chooses. A processor without
+//! such an instruction finds the same number with many others.
 
 use pulp::bytemuck;
 use pulp::Simd;
@@ -34,6 +36,26 @@ pub(super) struct Mask<S: Simd, const R: usize> {
     lanes: [S::m64s; R],
 }
 
+/// What a number is multiplied by, or what is added to it: a number of each lane, or one of all.
+pub(super) trait Operand<S: Simd, const R: usize> {
+    /// As a number of each lane.
+    fn in_lanes(self, simd: S) -> Num<S, R>;
+}
+
+impl<S: Simd, const R: usize> Operand<S, R> for Num<S, R> {
+    #[inline(always)]
+    fn in_lanes(self, _: S) -> Self {
+        self
+    }
+}
+
+impl<S: Simd, const R: usize> Operand<S, R> for f64 {
+    #[inline(always)]
+    fn in_lanes(self, simd: S) -> Num<S, R> {
+        Num::splat(simd, self)
+    }
+}
+
 impl<S: Simd, const R: usize> Num<S, R> {
     /// The same number in each lane.
     #[inline(always)]
@@ -59,6 +81,43 @@ impl<S: Simd, const R: usize> Num<S, R> {
     #[inline(always)]
     pub fn numbers_mut(&mut self) -> &mut [f64] {
         bytemuck::cast_slice_mut(&mut self.lanes)
+    }
+
+    /// Eight numbers of each lane of one register, which stand lane by lane, put where they belong.
+    #[inline(always)]
+    pub fn turn(simd: S, rows: &[f64], columns: &mut [Self; 8], register: usize) {
+        let (rows_of, _) = S::as_simd_f64s(rows);
+        // pulp: registers as rows of two or of four numbers, turned; lanes in the order that it says
+        match (S::F64_LANES, rows_of) {
+            (8, [a, b, c, d, e, f, g, h, ..]) => {
+                // numbers k and k + 4 of four lanes each, then of all eight
+                let first = simd.deinterleave_shfl_f64s([*a, *b, *c, *d]);
+                let last = simd.deinterleave_shfl_f64s([*e, *f, *g, *h]);
+                for k in [0, 2] {
+                    let [x, y] = simd.deinterleave_shfl_f64s([first[k], first[k + 1]]);
+                    let [z, w] = simd.deinterleave_shfl_f64s([last[k], last[k + 1]]);
+                    let found = simd.deinterleave_shfl_f64s([x, y, z, w]);
+                    for (place, lanes) in [k, k + 1, k + 4, k + 5].into_iter().zip(found) {
+                        columns[place].lanes[register] = lanes;
+                    }
+                }
+            }
+            (4, [a, b, c, d, e, f, g, h, ..]) => {
+                let low = simd.deinterleave_shfl_f64s([*a, *c, *e, *g]);
+                let high = simd.deinterleave_shfl_f64s([*b, *d, *f, *h]);
+                for (column, lanes) in columns.iter_mut().zip(low.into_iter().chain(high)) {
+                    column.lanes[register] = lanes;
+                }
+            }
+            _ => {
+                for (k, column) in columns.iter_mut().enumerate() {
+                    let numbers = &mut column.numbers_mut()[register * S::F64_LANES..];
+                    for (number, row) in numbers.iter_mut().zip(rows.chunks_exact(8)) {
+                        *number = row[k];
+                    }
+                }
+            }
+        }
     }
 
     /// The same number in each lane, of the kind of this one.
@@ -104,16 +163,51 @@ impl<S: Simd, const R: usize> Num<S, R> {
         self.compare(other, |simd, a, b| simd.less_than_or_equal_f64s(a, b))
     }
 
-    /// The greater one; `other` where this is not a number.
+    /// The greater one; `other` where either is not a number, or where they are equal.
     #[inline(always)]
-    pub fn or_above(self, other: Self) -> Self {
-        other.less(self).select(self, other)
+    pub fn or_above(self, other: impl Operand<S, R>) -> Self {
+        let other = other.in_lanes(self.simd);
+        if S::F64_LANES == 1 {
+            return other.less(self).select(self, other);
+        }
+        // of the vector registers in use the same is one instruction
+        self.with(other, |simd, a, b| simd.max_f64s(a, b))
     }
 
-    /// The lesser one; `other` where this is not a number.
+    /// The lesser one; `other` where either is not a number, or where they are equal.
     #[inline(always)]
-    pub fn or_below(self, other: Self) -> Self {
-        self.less(other).select(self, other)
+    pub fn or_below(self, other: impl Operand<S, R>) -> Self {
+        let other = other.in_lanes(self.simd);
+        if S::F64_LANES == 1 {
+            return self.less(other).select(self, other);
+        }
+        self.with(other, |simd, a, b| simd.min_f64s(a, b))
+    }
+
+    /// `self by + plus`, rounded once.
+    #[inline(always)]
+    pub fn times_plus(self, by: impl Operand<S, R>, plus: impl Operand<S, R>) -> Self {
+        self.fused(by, plus, |simd, a, b, c| simd.mul_add_f64s(a, b, c))
+    }
+
+    /// `from - self by`, rounded once.
+    #[inline(always)]
+    pub fn times_from(self, by: impl Operand<S, R>, from: impl Operand<S, R>) -> Self {
+        self.fused(by, from, |simd, a, b, c| simd.negate_mul_add_f64s(a, b, c))
+    }
+
+    #[inline(always)]
+    fn fused(
+        mut self,
+        by: impl Operand<S, R>,
+        plus: impl Operand<S, R>,
+        of: impl Fn(S, S::f64s, S::f64s, S::f64s) -> S::f64s,
+    ) -> Self {
+        let (by, plus) = (by.in_lanes(self.simd), plus.in_lanes(self.simd));
+        for k in 0..R {
+            self.lanes[k] = of(self.simd, self.lanes[k], by.lanes[k], plus.lanes[k]);
+        }
+        self
     }
 
     /// Magnitude.
@@ -134,28 +228,30 @@ impl<S: Simd, const R: usize> Num<S, R> {
         (self + WHOLE) - WHOLE
     }
 
-    /// A polynomial, its coefficients from the lowest power on: even and odd powers in two chains,
-    /// in four where it is long, since each chain waits for itself.
+    /// A polynomial, its coefficients from the lowest power on, by Estrin's rule: pairs, pairs of
+    /// pairs and so on, so that little waits for each other.
     #[inline(always)]
     pub fn polynomial<const N: usize>(self, coefficients: &[f64; N]) -> Self {
-        const LONG: usize = 16;
-        let square = self * self;
-        if N >= LONG {
-            let fourth = square * square;
-            let mut chains = [self.constant(0.0); 4];
-            for power in (0..N).rev() {
-                let chain = &mut chains[power % 4];
-                *chain = *chain * fourth + coefficients[power];
+        let mut terms = [self; N];
+        for k in 0..N / 2 {
+            let odd = self.constant(coefficients[2 * k + 1]);
+            terms[k] = odd.times_plus(self, coefficients[2 * k]);
+        }
+        if N % 2 == 1 {
+            terms[N / 2] = self.constant(coefficients[N - 1]);
+        }
+        let (mut power, mut left) = (self, N.div_ceil(2));
+        while left > 1 {
+            power = power * power;
+            for k in 0..left / 2 {
+                terms[k] = terms[2 * k + 1].times_plus(power, terms[2 * k]);
             }
-            let [first, second, third, last] = chains;
-            return (first + third * square) + (second + last * square) * self;
+            if left % 2 == 1 {
+                terms[left / 2] = terms[left - 1];
+            }
+            left = left.div_ceil(2);
         }
-        let (mut even, mut odd) = (self.constant(0.0), self.constant(0.0));
-        for power in (0..N).rev() {
-            let chain = if power % 2 == 0 { &mut even } else { &mut odd };
-            *chain = *chain * square + coefficients[power];
-        }
-        even + odd * self
+        terms[0]
     }
 
     /// Sine of angles of a few turns at most, to 3e-16.
@@ -165,12 +261,18 @@ impl<S: Simd, const R: usize> Num<S, R> {
         const PI_HIGH: f64 = 3.141_592_502_593_994;
         const PI_LOW: f64 = 1.509_957_990_978_376_5e-7;
         let half_turns = (self * std::f64::consts::FRAC_1_PI).round();
-        let x = (self - half_turns * PI_HIGH) - half_turns * PI_LOW;
+        let x = half_turns.times_from(PI_LOW, half_turns.times_from(PI_HIGH, self));
         let pairs = (half_turns * 0.5).round();
-        let odd = (half_turns - pairs * 2.0).abs();
+        let odd = pairs.times_from(2.0, half_turns).abs();
+        x.sin_near() * odd.times_plus(-2.0, 1.0)
+    }
+
+    /// Sine of angles up to [`NEAR`], to 3e-16; of others that of the limit.
+    #[inline(always)]
+    pub fn sin_near(self) -> Self {
+        let x = self.or_above(-NEAR).or_below(NEAR);
         let square = x * x;
-        let sine = x + x * square * square.polynomial(&SINE);
-        sine * (odd * -2.0 + 1.0)
+        (x * square).times_plus(square.polynomial(&SINE), x)
     }
 
     /// Natural logarithm of positive, normal numbers, to 4e-16 of it or absolutely.
@@ -188,18 +290,19 @@ impl<S: Simd, const R: usize> Num<S, R> {
         }
         let s = (rest - 1.0) / (rest + 1.0);
         let logarithm = s * (s * s).polynomial(&ARTANH);
-        whole * LN_2_HIGH + (logarithm + whole * LN_2_LOW)
+        whole.times_plus(LN_2_HIGH, whole.times_plus(LN_2_LOW, logarithm))
     }
 
     /// Natural logarithm of this over some unit, that of a number near it being known.
     #[inline(always)]
     pub fn ln_near(self, near: Self, log: Self, unit: f64) -> Self {
         /// Up to here the next term of the series, `2 s^7/7`, is below 1e-21.
-        const NEAR: f64 = 1e-3;
+        const BESIDE: f64 = 1e-3;
         let s = (self - near) / (self + near);
         let square = s * s;
-        let short = log + s * ((square * (2.0 / 5.0) + 2.0 / 3.0) * square + 2.0);
-        let far = self.constant(NEAR).at_most(s.abs());
+        let series = square.times_plus(2.0 / 5.0, 2.0 / 3.0).times_plus(square, 2.0);
+        let short = s.times_plus(series, log);
+        let far = self.constant(BESIDE).at_most(s.abs());
         if far.nowhere() {
             return short;
         }
@@ -209,15 +312,15 @@ impl<S: Simd, const R: usize> Num<S, R> {
     /// Hyperbolic tangent of numbers, to 1e-14 absolutely; what is not a number counts as positive.
     #[inline(always)]
     pub fn tanh(self) -> Self {
-        // (1 - E)/(1 + E) with E = exp(-2 |x|), the 64th power of exp(-|x|/32); 1 from 20 on.
+        // (1 - E)/(1 + E) with E = exp(-2 |x|), the 32nd power of exp(-|x|/16); 1 from 20 on.
         let flat = self.constant(20.0);
         let negative = self.less(self.constant(0.0));
         if self.abs().less(flat).nowhere() {
             return negative.select(self.constant(-1.0), self.constant(1.0));
         }
         let size = self.abs().or_below(flat);
-        let mut power = (size * (-1.0 / 32.0)).polynomial(&EXPONENTIAL);
-        for _ in 0..6 {
+        let mut power = (size * (-1.0 / 16.0)).polynomial(&EXPONENTIAL);
+        for _ in 0..5 {
             power = power * power;
         }
         let share = (-power + 1.0) / (power + 1.0);
@@ -228,17 +331,21 @@ impl<S: Simd, const R: usize> Num<S, R> {
 /// Adding it leaves no place for a fraction.
 pub(super) const WHOLE: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
-/// `(sin x - x)/x^3` in powers of `x^2`, Taylor's: up to a quarter turn the rest is below 1e-16.
+/// As far as the sine's polynomial reaches [rad].
+pub(super) const NEAR: f64 = 2.75;
+
+/// `(sin x - x)/x^3` in powers of `x^2`, through Chebyshev's points up to [`NEAR`]: the rest is
+/// below 1e-16.
 const SINE: [f64; 9] = [
-    -1.0 / 6.0,
-    1.0 / 120.0,
-    -1.0 / 5_040.0,
-    1.0 / 362_880.0,
-    -1.0 / 39_916_800.0,
-    1.0 / 6_227_020_800.0,
-    -1.0 / 1_307_674_368_000.0,
-    1.0 / 355_687_428_096_000.0,
-    -1.0 / 121_645_100_408_832_000.0,
+    -0.166_666_666_666_666_66,
+    0.008_333_333_333_333_092,
+    -0.000_198_412_698_411_844_7,
+    2.755_731_921_238_567_5e-06,
+    -2.505_210_759_541_541_7e-08,
+    1.605_901_358_843_968_2e-10,
+    -7.646_482_482_856_561e-13,
+    2.802_491_066_280_274e-15,
+    -7.580_026_535_339_908e-18,
 ];
 
 /// `2 artanh(s)/s` in powers of `s^2`: below `s^2` = 0.03 the rest is below 1e-17.
@@ -252,11 +359,11 @@ const ARTANH: [f64; 11] = {
     terms
 };
 
-/// Taylor's series of the exponential: from -0.625 to 0 the rest is below 1e-16.
-const EXPONENTIAL: [f64; 14] = {
-    let mut terms = [1.0; 14];
+/// Taylor's series of the exponential: from -20/16 to 0 its 32nd power is right to 1e-15.
+const EXPONENTIAL: [f64; 11] = {
+    let mut terms = [1.0; 11];
     let mut k = 1;
-    while k < 14 {
+    while k < 11 {
         terms[k] = terms[k - 1] / k as f64;
         k += 1;
     }

@@ -1,7 +1,7 @@
 //! The state equation of several plants side by side: that of [`crate::plant::rates`] for rigs
 //! without effects.
 
-use super::blocks::{Body, Supply, Tube};
+use super::blocks::{Body, Supply, Tube, Turns};
 use super::num::{side_by_side, Mask, Num, MOST_LANES};
 use super::rk4::Slopes;
 use super::Plan;
@@ -13,8 +13,8 @@ use pulp::Simd;
 struct Valve<S: Simd, const R: usize> {
     from: Node,
     to: usize,
-    /// Discharge area of the opening that is open [m2].
-    area: Num<S, R>,
+    /// Of the opening that is open, see [`super::blocks::Orifice::conductance`].
+    conductance: Num<S, R>,
     /// Lanes in which the chamber is filled.
     fills: Mask<S, R>,
     /// In some lane the chamber is filled.
@@ -33,22 +33,31 @@ enum Passage<S: Simd, const R: usize> {
 pub(super) struct Shape {
     layout: Layout,
     sums: bool,
-    /// It is [`Self::SMALL`], and the compiler is to know it.
+    /// It is as [`Self::small`], and the compiler is to know it.
     small: bool,
 }
 
 impl Shape {
-    /// One supply and one gas with sums. Where the compiler knows it, every place of the state is
-    /// known too: a plant alone would spend more on finding them than on its equations.
-    pub const SMALL: Self = Self {
-        layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
-        sums: true,
-        small: true,
-    };
+    /// One supply and one gas. Where the compiler knows it, every place of the state is known too:
+    /// a plant alone would spend more on finding them than on its equations.
+    #[inline(always)]
+    pub fn small(sums: bool) -> Self {
+        Self {
+            layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
+            sums,
+            small: true,
+        }
+    }
 
-    /// Whether there are as many blocks as in [`Self::SMALL`].
+    /// Whether there are as many blocks as in [`Self::small`].
     pub fn is_small(self) -> bool {
-        Self { small: true, ..self } == Self::SMALL
+        self.layout == Self::small(true).layout
+    }
+
+    /// Whether masses and sums of the balance are wanted.
+    #[inline(always)]
+    pub fn sums(self) -> bool {
+        self.sums
     }
 
     /// The same where the compiler is to know nothing.
@@ -94,6 +103,7 @@ struct Plants<'a, S: Simd, const R: usize> {
     supplies: Vec<Supply<S, R>>,
     set_pressure: Vec<Num<S, R>>,
     fixed_volume: Vec<Num<S, R>>,
+    /// Those of inflow and outflow times the gas constant and the temperature, that of the volume.
     alphas: Vec<[Num<S, R>; 3]>,
     valves: Vec<Valve<S, R>>,
     lines: Vec<Passage<S, R>>,
@@ -142,20 +152,21 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
         let supplies =
             (0..first_plant.supplies.len()).map(|k| supply(k, first_plant, &each)).collect();
         let lines: Vec<_> =
-            (0..first_plant.lines.len()).map(|k| passage(k, first_plant, &each)).collect();
+            (0..first_plant.lines.len()).map(|k| passage(k, plan, first_plant, &each)).collect();
         let wiring = &rig.wiring;
         let valves = wiring.valves.iter().map(|valve| Valve {
             from: valve.from,
             to: valve.to,
-            area: zero,
+            conductance: zero,
             fills: zero.less(zero),
             some_fill: false,
             some_vent: false,
         });
+        let rt = rig.gas.gas_constant * rig.gas.temperature;
         let alphas = (0..first_plant.alphas.len()).map(|k| {
             [
-                each(&|p| p.alphas[k].inflow),
-                each(&|p| p.alphas[k].outflow),
+                each(&|p| p.alphas[k].inflow * rt),
+                each(&|p| p.alphas[k].outflow * rt),
                 each(&|p| p.alphas[k].volume),
             ]
         });
@@ -184,7 +195,7 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
             lines,
             scales: (0..wiring.groups.len()).map(|k| each(&|p| p.scales[k])).collect(),
             first: first.collect(),
-            body: body(first_plant, &each),
+            body: body(plan, first_plant, &each),
             simd,
             rig,
             plan,
@@ -196,10 +207,10 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
     /// Openings of a valve over the sample that comes [m2], above zero where the chamber is filled,
     /// below where it is vented.
     pub fn open(&mut self, valve: usize, areas: &[f64]) {
-        let signed = Num::load(self.plants.simd, areas);
+        let (signed, plan) = (Num::load(self.plants.simd, areas), self.plants.plan);
         let valve = &mut self.plants.valves[valve];
         valve.fills = signed.constant(0.0).less(signed);
-        valve.area = signed.abs();
+        valve.conductance = plan.orifice.conductance(signed.abs());
         valve.some_fill = areas.iter().any(|a| *a > 0.0);
         valve.some_vent = areas.iter().any(|a| *a < 0.0);
         let lines = !self.plants.lines.is_empty();
@@ -305,18 +316,19 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
             let (gas, scale) = (shape.gas(group.chamber), *scale);
             let gauge = state[shape.layout.pressure(gas)] - ambient;
             let [pull, elastic, offset, volume, slope, pull_work, elastic_work, offset_work] =
-                curves.eval(wide, angle, shape.sums);
-            torque += gauge * pull + scale * (gauge * elastic + offset);
+                curves.eval(wide, self.simd, angle);
+            let wall = gauge.times_plus(elastic, offset);
+            torque = scale.times_plus(wall, gauge.times_plus(pull, torque));
             if shape.sums {
-                let pull = gauge * pull_work + scale * (gauge * elastic_work + offset_work);
-                work += pull * rate;
+                let wall = gauge.times_plus(elastic_work, offset_work);
+                work = scale.times_plus(wall, gauge * pull_work).times_plus(rate, work);
             }
             let (before, moved) = match first {
                 true => (self.fixed_volume[gas], zero),
                 false => (here.volume[gas], here.volume_rate[gas]),
             };
             here.volume[gas] = before + volume;
-            here.volume_rate[gas] = moved + slope * rate;
+            here.volume_rate[gas] = slope.times_plus(rate, moved);
         }
         (torque, work)
     }
@@ -328,20 +340,27 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         let zero = Num::splat(self.simd, 0.0);
         let mut vented = zero;
         let ambient = Num::splat(self.simd, self.rig.gas.ambient_pressure);
-        for Valve { from, to, area, fills, some_fill, some_vent } in &self.valves {
+        for Valve { from, to, conductance, fills, some_fill, some_vent } in &self.valves {
             if !(*some_fill || *some_vent) {
                 continue;
             }
             let chamber = state[shape.layout.pressure(shape.gas(*to))];
-            let upstream = fills.select(self.pressure_at(shape, *from, state), chamber);
-            let downstream = fills.select(chamber, ambient);
-            let flow = self.plan.orifice.mass_flow(*area, upstream, downstream);
+            // A lane that is closed passes nothing, whatever it lies between.
+            let feed = self.pressure_at(shape, *from, state);
+            let (upstream, downstream) = match (*some_fill, *some_vent) {
+                (true, true) => (fills.select(feed, chamber), fills.select(chamber, ambient)),
+                (true, false) => (feed, chamber),
+                (false, _) => (chamber, ambient),
+            };
+            let flow = self.plan.orifice.mass_flow(*conductance, upstream, downstream);
+            let (filling, venting) = match (*some_fill, *some_vent) {
+                (true, true) => (fills.select(flow, zero), fills.select(zero, flow)),
+                _ => (flow, flow),
+            };
             if *some_fill {
-                let filling = fills.select(flow, zero);
                 here.pass(shape, *from, Node::Gas(*to), filling, &mut vented);
             }
             if *some_vent {
-                let venting = fills.select(zero, flow);
                 here.pass(shape, Node::Gas(*to), Node::Ambient, venting, &mut vented);
             }
         }
@@ -349,7 +368,9 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
             let from = self.pressure_at(shape, unit.from, state);
             let to = self.pressure_at(shape, unit.to, state);
             let flow = match line {
-                Passage::Orifice(area) => self.plan.orifice.mass_flow(*area, from, to),
+                Passage::Orifice(conductance) => {
+                    self.plan.orifice.mass_flow(*conductance, from, to)
+                }
                 Passage::Tube(tube) => tube.mass_flow(from, to),
             };
             here.pass(shape, unit.from, unit.to, flow, &mut vented);
@@ -366,9 +387,8 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
         here: &mut Here<'_, S, R>,
         out: &mut Slopes<'_, S, R>,
     ) {
-        let (gas, layout) = (&self.rig.gas, shape.layout);
+        let layout = shape.layout;
         let zero = Num::splat(self.simd, 0.0);
-        let rt = gas.gas_constant * gas.temperature;
         for k in 0..layout.supplies {
             let pressure = state[layout.supply(k)];
             here.given[k] = std::mem::replace(&mut here.drawn[k], zero);
@@ -384,10 +404,9 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
             out.gather(layout.mass(k), inflow - outflow);
             // The volume is known before the flows.
             let per_volume = here.volume[k].constant(1.0) / here.volume[k];
-            let rate = ((alpha_in * inflow - alpha_out * outflow) * rt
-                - alpha * pressure * here.volume_rate[k])
-                * per_volume;
-            out.set(layout.pressure(k), rate);
+            let squeezed = (alpha * pressure) * here.volume_rate[k];
+            let filled = alpha_in.times_plus(inflow, -squeezed);
+            out.set(layout.pressure(k), alpha_out.times_from(outflow, filled) * per_volume);
         }
     }
 
@@ -427,7 +446,7 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
                 true => log,
                 false => pressure.ln_near(before, log, gas.ambient_pressure),
             };
-            exergy += log * taken * rt;
+            exergy = (log * taken).times_plus(rt, exergy);
         }
         let sums = [drawn, vented, drawn * rt, exergy, muscle_work, work];
         for (k, sum) in sums.into_iter().enumerate() {
@@ -504,15 +523,16 @@ fn supply<'a, S: Simd, const R: usize>(
 
 fn passage<'a, S: Simd, const R: usize>(
     k: usize,
+    plan: &Plan,
     first: &Plant<'a, f64>,
     each: Each<'_, 'a, S, R>,
 ) -> Passage<S, R> {
     let of = |number: fn(&Line<f64>) -> f64| each(&|p| number(&p.lines[k]));
     match first.lines[k] {
-        Line::Orifice(_) => Passage::Orifice(of(|line| match line {
+        Line::Orifice(_) => Passage::Orifice(plan.orifice.conductance(of(|line| match line {
             Line::Orifice(area) => *area,
             Line::Tube(_) => f64::NAN,
-        })),
+        }))),
         Line::Tube(_) => Passage::Tube(Tube {
             flow_factor: of(|line| match line {
                 Line::Tube(tube) => tube.flow_factor(),
@@ -528,13 +548,14 @@ fn passage<'a, S: Simd, const R: usize>(
 
 /// One coordinate. A plan is for no other bodies: in their place stands what is no number.
 fn body<'a, S: Simd, const R: usize>(
+    plan: &Plan,
     first: &Plant<'a, f64>,
     each: Each<'_, 'a, S, R>,
 ) -> Body<S, R> {
     let (turns, coulomb_speed, stops) = match &first.body {
-        OneBody::OneLink(arm, stops) => (true, arm.coulomb_speed, *stops),
-        OneBody::Mass(load, stops) => (false, load.coulomb_speed, *stops),
-        _ => (false, f64::NAN, None),
+        OneBody::OneLink(arm, stops) => (plan.turns(), arm.coulomb_speed, *stops),
+        OneBody::Mass(load, stops) => (Turns::Not, load.coulomb_speed, *stops),
+        _ => (Turns::Not, f64::NAN, None),
     };
     let of = |number: fn(&OneBody<f64>) -> [f64; 4], k: usize| each(&|p| number(&p.body)[k]);
     let numbers = |body: &OneBody<f64>| match body {

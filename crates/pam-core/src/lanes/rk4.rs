@@ -19,6 +19,12 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
         Self { stage: zeros(), next: zeros(), sum: zeros(), evaluations: 0 }
     }
 
+    /// The state before the last step.
+    #[inline(always)]
+    pub fn before(&self) -> &[Num<S, R>] {
+        &self.stage
+    }
+
     #[inline(always)]
     pub fn step<W: Simd>(
         &mut self,
@@ -87,8 +93,11 @@ impl<S: Simd, const R: usize> Slopes<'_, S, R> {
     #[inline(always)]
     pub fn set(&mut self, place: usize, slope: Num<S, R>) {
         let sum = self.summed(place, slope);
-        let change = if self.last { sum * self.whole } else { slope * self.ahead };
-        self.next[place] = self.start[place] + change;
+        let start = self.start[place];
+        self.next[place] = match self.last {
+            true => sum.times_plus(self.whole, start),
+            false => slope.times_plus(self.ahead, start),
+        };
     }
 
     /// The same where no slope depends on that state.
@@ -96,7 +105,7 @@ impl<S: Simd, const R: usize> Slopes<'_, S, R> {
     pub fn gather(&mut self, place: usize, slope: Num<S, R>) {
         let sum = self.summed(place, slope);
         if self.last {
-            self.next[place] = self.start[place] + sum * self.whole;
+            self.next[place] = sum.times_plus(self.whole, self.start[place]);
         }
     }
 
@@ -104,7 +113,7 @@ impl<S: Simd, const R: usize> Slopes<'_, S, R> {
     fn summed(&mut self, place: usize, slope: Num<S, R>) -> Num<S, R> {
         // Nothing is left of the last step: it may have been no number.
         let before = if self.first { slope.constant(0.0) } else { self.sum[place] };
-        let sum = before + slope * self.weight;
+        let sum = slope.times_plus(self.weight, before);
         self.sum[place] = sum;
         sum
     }

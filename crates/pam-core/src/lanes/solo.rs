@@ -42,8 +42,8 @@ impl<'a> Solo<'a> {
         Some(Self { plan, lanes, method: Rk4::new(&state), state })
     }
 
-    /// Advance a state by some steps of a length [s] under held controls. `look` sees it after each
-    /// of them, place by place, with the number of the step. Whether it stayed where the lanes' curves, and the
+    /// Advance a state by some steps of a length [s] under held controls. `look` sees what it was
+    /// before each of them and what it is then, place by place, with the number of the step. Whether it stayed where the lanes' curves, and the
     /// model, hold; where it did not, it has to be advanced in another way.
     pub fn advance(
         &mut self,
@@ -51,7 +51,7 @@ impl<'a> Solo<'a> {
         state: &mut [f64],
         controls: &Controls<f64>,
         steps: (usize, f64),
-        look: impl FnMut(usize, Seen<'_>),
+        look: impl FnMut(usize, Seen<'_>, Seen<'_>),
     ) -> bool {
         if !self.holds(plant, state) {
             return false;
@@ -85,20 +85,21 @@ struct Advance<'s, 'p, 'a, L> {
     look: L,
 }
 
-impl<L: FnMut(usize, Seen<'_>)> WithSimd for Advance<'_, '_, '_, L> {
+impl<L: FnMut(usize, Seen<'_>, Seen<'_>)> WithSimd for Advance<'_, '_, '_, L> {
     type Output = bool;
 
     #[inline(always)]
     fn with_simd<W: Simd>(self, wide: W) -> bool {
         // Compiled once for the shape of most rigs, and once for all others.
         match self.solo.lanes.shape {
-            shape if shape.is_small() => self.steps(wide, Shape::SMALL),
+            shape if shape.is_small() && shape.sums() => self.steps(wide, Shape::small(true)),
+            shape if shape.is_small() => self.steps(wide, Shape::small(false)),
             shape => self.steps(wide, shape.of_any_size()),
         }
     }
 }
 
-impl<L: FnMut(usize, Seen<'_>)> Advance<'_, '_, '_, L> {
+impl<L: FnMut(usize, Seen<'_>, Seen<'_>)> Advance<'_, '_, '_, L> {
     #[inline(always)]
     fn steps<W: Simd>(self, wide: W, shape: Shape) -> bool {
         let Self { solo, plant, state, steps: (count, step), mut look } = self;
@@ -113,7 +114,7 @@ impl<L: FnMut(usize, Seen<'_>)> Advance<'_, '_, '_, L> {
             if !solo.plan.contains(seen.at(angle)) {
                 return false;
             }
-            look(k, seen);
+            look(k, Seen(solo.method.before()), seen);
         }
         for (value, own) in state.iter_mut().zip(&solo.state) {
             *value = own.numbers()[0];

@@ -89,6 +89,29 @@ impl Condition {
     }
 }
 
+/// How far from its edge a ratio of pressures is told from it without a division.
+const CLEAR: f64 = 1e-9;
+
+impl Condition {
+    /// Whether the margin is positive.
+    #[inline]
+    fn holds(self, at: &impl Fn(usize) -> f64) -> bool {
+        if let Self::Flow(one, other, critical) = self {
+            let pressure = |pressure: Pressure| match pressure {
+                Pressure::At(place) => at(place),
+                Pressure::Held(value) => value,
+            };
+            let (a, b) = (pressure(one), pressure(other));
+            let (low, high) = if a < b { (a, b) } else { (b, a) };
+            let off = critical * high - low;
+            if off.abs() > CLEAR * high {
+                return off > 0.0;
+            }
+        }
+        self.margin(at) > 0.0
+    }
+}
+
 /// The conditions of events under some controls: both stops of each coordinate, both limits of each
 /// chamber's pressure, then each flow.
 #[derive(Debug, Clone, Default)]
@@ -98,12 +121,24 @@ pub(crate) struct Conditions {
     stops: usize,
     /// How many of them are of stops and of pressures.
     limits: usize,
+    /// Spool positions that they are for.
+    spools: Vec<f64>,
 }
 
 impl Conditions {
-    /// Those of a plant under other controls.
+    /// Whether one of them is not what `flags` say, by a state, place by place.
+    #[inline]
+    pub fn differ(&self, flags: &[bool], at: impl Fn(usize) -> f64) -> bool {
+        self.each.iter().zip(flags).any(|(condition, flag)| condition.holds(&at) != *flag)
+    }
+
+    /// Those of the plant that they are of under other controls.
     pub fn set(&mut self, plant: &Plant<'_, f64>, controls: &Controls<f64>) {
+        if !self.each.is_empty() && self.spools == controls.spool {
+            return;
+        }
         let rig = plant.rig();
+        self.spools.clone_from(&controls.spool);
         self.each.clear();
         for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let place = rig.layout.angle(k);

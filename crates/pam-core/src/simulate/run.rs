@@ -117,11 +117,13 @@ impl<'a> Run<'a> {
         let (Some(solo), plant) = (solo, &stepper.plant) else { return false };
         let Progress { state, flags, .. } = next;
         let dt = timing.step();
-        solo.advance(plant, state, controls, (steps.len(), dt), |sub, seen| {
-            after.look(conditions, |place| seen.at(place));
-            let time = began + (steps.start + sub + 1) as f64 * dt;
-            after.report(plant.rig(), Some((before, dt)), time, flags, events);
-            std::mem::swap(before, after);
+        solo.advance(plant, state, controls, (steps.len(), dt), |sub, was, seen| {
+            if conditions.differ(flags, |place| seen.at(place)) {
+                before.look(conditions, |place| was.at(place));
+                after.look(conditions, |place| seen.at(place));
+                let time = began + (steps.start + sub + 1) as f64 * dt;
+                after.report(plant.rig(), Some((before, dt)), time, flags, events);
+            }
         })
     }
 
