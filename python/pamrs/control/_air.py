@@ -128,8 +128,10 @@ class AirModel:
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
         self.supply_pressure = _supply_pressure(rig)
+        # a chamber with an energy balance lies between the isothermal and the adiabatic: (3.17)
+        usual = {"alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2}
         self.alpha_in, self.alpha_out, self.alpha = (
-            float(chamber[name]) for name in ("alpha_in", "alpha_out", "alpha")
+            float(chamber.get(name, value)) for name, value in usual.items()
         )
         self._rt = float(gas["gas_constant"]) * float(gas["temperature"])
         low, high = float(table["min_angle"]), float(table["max_angle"])

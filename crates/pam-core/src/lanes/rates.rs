@@ -41,7 +41,14 @@ impl Shape {
     /// One supply and one gas with sums. Where the compiler knows it, every place of the state is
     /// known too: a plant alone would spend more on finding them than on its equations.
     pub const SMALL: Self = Self {
-        layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
+        layout: Layout {
+            supplies: 1,
+            gases: 1,
+            coordinates: 1,
+            chambers: 1,
+            effects: 0,
+            sums: BALANCE.len(),
+        },
         sums: true,
         small: true,
     };
