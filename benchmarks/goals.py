@@ -83,27 +83,33 @@ def missing(work: str, peer: str, module: str, least: float | None) -> Goal:
 
 
 def single(repeats: int) -> list[Goal]:
-    """One run beside Numba's, and beside SciPy's at two tolerances."""
+    """One run beside Numba's, and beside SciPy's, which chooses its own steps: with the steps of
+    the other peers, and with the longest that give the same angle.
+    """
     shoulder = Shoulder()
-    ours = shoulder.ours()
-    works: dict[str, Callable[[], object]] = {"ours": shoulder.ours}
-    shown = [
-        ("shoulder_numba", "Numba scalar, fastmath", {}, 1.0),
-        ("shoulder_scipy", "SciPy solve_ivp, RK45, rtol 1e-6", {"rtol": 1e-6}, 300.0),
-        ("shoulder_scipy", "SciPy solve_ivp, RK45, rtol 1e-8", {"rtol": 1e-8}, None),
+    own = {"ours": shoulder.ours, "long": shoulder.in_long_steps}
+    works: dict[str, Callable[[], object]] = {**own}
+    runs = {"ours": f"one run, {RUN}", "long": f"one run, {RUN}, in the longest stable steps"}
+    scipy = "SciPy solve_ivp, RK45, rtol 1e-6"
+    shown: list[tuple[str, str, str, dict[str, float], float | None]] = [
+        ("ours", "shoulder_numba", "Numba scalar, fastmath", {}, 1.0),
+        ("ours", "shoulder_scipy", scipy, {"rtol": 1e-6}, None),
+        ("long", "shoulder_scipy", scipy, {"rtol": 1e-6}, 300.0),
+        ("ours", "shoulder_scipy", "SciPy solve_ivp, RK45, rtol 1e-8", {"rtol": 1e-8}, None),
     ]
-    off = {}
-    for name, title, settings, _ in shown:
+    ends = {}
+    for _, name, title, settings, _ in shown:
         module = peers.installed(name)
         if not isinstance(module, str):
-            off[title] = apart(shoulder.peer(module, **settings)[-1:], ours[-1:])
+            ends[title] = shoulder.peer(module, **settings)[-1:]
             works[title] = partial(shoulder.peer, module, **settings)
+    angles = {key: run()[-1:] for key, run in own.items()}
     times = race(works, repeats)
     return [
-        line(f"one run, {RUN}", title, times, ("ours", title), off[title], least)
+        line(runs[key], title, times, (key, title), apart(ends[title], angles[key]), least)
         if title in times
-        else missing(f"one run, {RUN}", title, name, least)
-        for name, title, _, least in shown
+        else missing(runs[key], title, name, least)
+        for key, name, title, _, least in shown
     ]
 
 

@@ -39,6 +39,12 @@ class Shoulder:
         run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=STEP)
         return run["joint_angle"]
 
+    def in_long_steps(self) -> Array:
+        """The same in the longest steps that the rig bears within a sample."""
+        longest = peers.SAMPLE_TIME
+        run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=longest)
+        return run["joint_angle"]
+
     def peer(self, module: ModuleType, **settings: float) -> Array:
         """The same by a peer."""
         rows: Array = module.single(*self.given, self.payload, **settings)[:, 2]

@@ -32,6 +32,9 @@ UNITS: Final[dict[str, str]] = {
     "mass_vented": "kg",
     "energy_supplied": "J",
     "exergy_supplied": "J",
+    "enthalpy_gained": "J",
+    "heat_gained": "J",
+    "gas_work": "J",
     "muscle_work": "J",
     "joint_work": "J",
 }

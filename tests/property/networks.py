@@ -88,6 +88,15 @@ def transmissions(draw: st.DrawFn, side: float = 1.0) -> dict[str, Any]:
 
 
 @st.composite
+def gas_laws(draw: st.DrawFn) -> dict[str, Any]:
+    """Coefficients of a chamber, or an energy balance with some wall."""
+    if draw(st.booleans()):
+        wall = draw(st.sampled_from([0.0, 30.0, 400.0]))
+        return {"gas": "energy_balance", "heat_transfer_coefficient": wall}
+    return {key: draw(st.floats(1.0, 1.4)) for key in ("alpha_in", "alpha_out", "alpha")}
+
+
+@st.composite
 def sources(draw: st.DrawFn) -> tuple[Blocks, str]:
     """A supply of any kind, with or without a manifold behind it; the port that valves are to be
     fed from.
@@ -117,6 +126,7 @@ def sources(draw: st.DrawFn) -> tuple[Blocks, str]:
     blocks["chamber.manifold"] = {
         "dead_volume": draw(st.floats(2e-4, 5e-4)),
         "initial_pressure": pressure - 5e4,
+        **draw(gas_laws()),
     }
     return blocks, "chamber.manifold"
 
@@ -124,13 +134,13 @@ def sources(draw: st.DrawFn) -> tuple[Blocks, str]:
 @st.composite
 def pulls(draw: st.DrawFn, name: str, joint: str, feed: str, friction: bool) -> Blocks:
     """A muscle with its chamber and valve, and a tube between the two or not."""
-    alphas = {key: draw(st.floats(1.0, 1.4)) for key in ("alpha_in", "alpha_out", "alpha")}
+    law = draw(gas_laws())
     blocks: Blocks = {
         f"valve.{name}": valve(draw(st.floats(0.5e-6, 3e-6)), **{"from": feed}),
         f"chamber.{name}": {
             "dead_volume": draw(st.floats(2e-5, 1e-4)),
             "initial_pressure": draw(st.floats(1.5e5, 3e5)),
-            **alphas,
+            **law,
         },
         f"muscle.{name}": {"joint": joint, **MUSCLE, "count": draw(st.integers(1, 2))},
     }

@@ -48,6 +48,8 @@ BOOKS = (
     "muscle_work",
     "joint_work",
 )
+#: Sums of the chambers with an energy balance: enthalpy by flows, heat from walls, work of the gas.
+HEAT_BOOKS = ("enthalpy_gained", "heat_gained", "gas_work")
 SUPPLIES = ("tank", "constant", "regulator")
 
 
@@ -286,6 +288,8 @@ class Node:
     dead_time: float = 0.0
     rise_limit: float = math.inf
     fall_limit: float = math.inf
+    #: Heat transfer coefficient (W/(m^2 K)) of a chamber with an energy balance.
+    heat_transfer: float | None = None
 
 
 @dataclass(frozen=True)
@@ -408,7 +412,10 @@ class Network:
             )
         for chamber in model["chambers"]:
             own = _port("chamber", chamber["name"])
-            alphas = {key: chamber[key] for key in ("alpha_in", "alpha_out", "alpha")}
+            if chamber.get("gas") == "energy_balance":
+                law = {"heat_transfer": chamber["heat_transfer_coefficient"]}
+            else:
+                law = {key: chamber[key] for key in ("alpha_in", "alpha_out", "alpha")}
             volume = chamber["dead_volume"] + halves.get(own, 0.0)
             self._add(
                 own,
@@ -417,7 +424,7 @@ class Network:
                     chamber["name"],
                     volume,
                     ambient + chamber["initial_pressure"],
-                    **alphas,
+                    **law,
                 ),
             )
         for line in model["lines"]:
@@ -531,6 +538,7 @@ class Network:
                 *mass[:-1],
                 *(0.0 for _ in BOOKS[:-1]),
                 *(0.0 for _ in position),
+                *(0.0 for _ in HEAT_BOOKS),
             ]
         )
 
@@ -548,20 +556,20 @@ class Network:
         return volume
 
     def split(self, state: Array) -> tuple[Array, ...]:
-        """Pressures (absolute), positions, rates, masses and books of states (..., m), the last of
-        these the work at each joint.
+        """Pressures (absolute), positions, rates, masses, books and heat books of states (..., m),
+        the last of the books the work at each joint.
         """
         n, c = len(self.nodes) - 1, len(self.coordinates)
-        parts = np.split(state, np.cumsum([n, c, c, n]), axis=-1)
+        parts = np.split(state, np.cumsum([n, c, c, n, len(BOOKS) - 1 + c]), axis=-1)
         return tuple(parts)
 
     def tolerances(self, state: Array, rtol: float) -> Array:
         """Absolute tolerances of a state."""
-        pressure, position, rate, mass, books = self.split(state)
+        pressure, position, rate, mass, books, heat = self.split(state)
         air = max(
             self.gas.ambient_pressure * sum(self.volumes(position.tolist())[:-1]) / self.rt, 1e-9
         )
-        works = [air, air, *(air * self.rt,) * (books.size - 2)]
+        works = [air, air, *(air * self.rt,) * (books.size - 2 + heat.size)]
         return rtol * np.array(
             [
                 *(1e5,) * pressure.size,
@@ -602,14 +610,8 @@ class Network:
         rate = values[count - 1 + size : count - 1 + 2 * size]
         if min(pressure) <= 0.0:
             raise ValueError("absolute pressure not above zero")
-        inflow, outflow = [0.0] * count, [0.0] * count
-        for flow, i, j in ways:
-            mass_flow = flow(pressure[i], pressure[j])
-            source, target = (i, j) if mass_flow > 0.0 else (j, i)
-            outflow[source] += abs(mass_flow)
-            inflow[target] += abs(mass_flow)
         volume = [node.volume for node in self.nodes]
-        volume_rate = [0.0] * count
+        volume_rate, wall = [0.0] * count, [0.0] * count
         force = [0.0] * size
         work = 0.0
         for pull in self.pulls:
@@ -620,9 +622,25 @@ class Network:
             one = pull.held(one)
             volume[pull.chamber] += n * air
             volume_rate[pull.chamber] += n * slope * moment_arm * rate[k] / rest
+            wall[pull.chamber] += n * 2.0 * math.sqrt(math.pi * air * rest * (1.0 - e))
             force[k] += n * one * moment_arm
             work += n * one * moment_arm * rate[k]
+        mass = values[count - 1 + 2 * size : 2 * (count - 1 + size)]
+        warmth = [gas.temperature] * count
+        for i, node in enumerate(self.nodes[:-1]):
+            if node.heat_transfer is not None:
+                warmth[i] = pressure[i] * volume[i] / (mass[i] * gas.gas_constant)
+        inflow, outflow, carried = [0.0] * count, [0.0] * count, [0.0] * count
+        for flow, i, j in ways:
+            mass_flow = flow(pressure[i], pressure[j])
+            source, target = (i, j) if mass_flow > 0.0 else (j, i)
+            # the density of what comes falls with its temperature, the speed of sound rises
+            moved = abs(mass_flow) * math.sqrt(gas.temperature / warmth[source])
+            outflow[source] += moved
+            inflow[target] += moved
+            carried[target] += moved * warmth[source]
         supplied = exergy = relieved = 0.0
+        heats = [0.0, 0.0, 0.0]
         pressure_rate = []
         for i, node in enumerate(self.nodes[:-1]):
             net_out = outflow[i] - inflow[i]
@@ -636,6 +654,18 @@ class Network:
             elif node.kind == "regulator":
                 wanted = (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
                 pressure_rate.append(min(max(wanted, -node.fall_limit), node.rise_limit))
+            elif node.heat_transfer is not None:
+                area = wall[i] or 6.0 * volume[i] ** (2.0 / 3.0)
+                level = math.sqrt(pressure[i] * warmth[i] / (1e5 * gas.temperature))
+                heat = node.heat_transfer * level * area * (gas.temperature - warmth[i])
+                kappa = gas.heat_capacity_ratio
+                capacity = kappa * gas.gas_constant / (kappa - 1.0)
+                enthalpy = capacity * (carried[i] - outflow[i] * warmth[i])
+                power = pressure[i] * volume_rate[i]
+                heats = [s + x for s, x in zip(heats, (enthalpy, heat, power), strict=True)]
+                # d(p V)/(kappa - 1) is what comes in less the work
+                inner = (kappa - 1.0) * (enthalpy + heat - power)
+                pressure_rate.append((inner - power) / volume[i])
             else:  # a tank is isothermal: its coefficients are one
                 moved = self.rt * (node.alpha_in * inflow[i] - node.alpha_out * outflow[i])
                 pressure_rate.append(
@@ -652,13 +682,14 @@ class Network:
             *(inflow[i] - outflow[i] for i in range(count - 1)),
             supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work,
             *(f * v for f, v in zip(force, rate, strict=True)),
+            *heats,
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:
         """Channels of states (n, m): gauge pressures, positions, rates and books but the positive
         work at the joints.
         """
-        pressure, position, rate, mass, books = self.split(states)
+        pressure, position, rate, mass, books, heat = self.split(states)
         ambient = self.gas.ambient_pressure
         words = {
             "chamber": ("muscle_pressure", "air_mass"),
@@ -676,6 +707,8 @@ class Network:
                 out[suffix("joint_rate", coordinate.name)] = rate[:, k]
             else:
                 out["length"], out["length_rate"] = self.rest_length - position[:, k], -rate[:, k]
+        if any(node.heat_transfer is not None for node in self.nodes):
+            out |= {name: heat[:, k] for k, name in enumerate(HEAT_BOOKS)}
         return out | {name: books[:, k] for k, name in enumerate(BOOKS[:-1])}
 
 
@@ -794,7 +827,7 @@ def simulate(
                     f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
                 )
             state = solution.y[:, -1]
-            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-1][:, len(BOOKS) - 1 :]
+            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-2][:, len(BOOKS) - 1 :]
             positive[k + 1] += np.maximum(np.diff(work, axis=0), 0.0).sum()
             first = min(float(np.diff(solution.t).max()), sample_time)
         states[k + 1] = state

@@ -57,9 +57,13 @@ def test_packaged_rigs_read_back_to_the_last_bit(name: str, tmp_path: Path) -> N
     assert same(
         rig, rig.with_parameters({name: given.value for name, given in rig.parameters.items()})
     )
-    renamed = parse_rig(rigs.template(name, "mine"))
+    renamed = parse_rig(rigs.template(name, "mine", "coefficients"))
     assert renamed.name == "mine"
     assert renamed.parameters == rig.parameters
+    anew = parse_rig(rigs.template(name))
+    assert all(chamber["gas"] == "energy_balance" for chamber in anew.tables("chamber").values())
+    kept = {key: given for key, given in rig.parameters.items() if ".alpha" not in key}
+    assert {key: anew.parameters[key] for key in kept} == kept
     assert any(0.0 < given.tol < math.inf for given in rig.parameters.values())
 
 

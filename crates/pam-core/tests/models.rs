@@ -27,9 +27,14 @@ fn muscle(spec: &MuscleSpec) -> Muscle {
     Muscle::new(spec).unwrap()
 }
 
+/// Models that have equations; a map is a table of forces.
+fn names() -> impl Iterator<Item = &'static str> {
+    ForceModel::NAMES.into_iter().map(|(name, _)| name).filter(|name| *name != "map")
+}
+
 #[test]
 fn tables_agree_with_the_exact_force_in_both_directions() {
-    for (model, _) in ForceModel::NAMES {
+    for model in names() {
         for geometry in GEOMETRIES {
             let exact = muscle(&spec(model, geometry));
             let compiled = CompiledMuscle::new(exact.clone()).unwrap();
@@ -53,7 +58,7 @@ fn tables_agree_with_the_exact_force_in_both_directions() {
 
 #[test]
 fn force_is_linear_in_the_elastic_parameters() {
-    for (model, _) in ForceModel::NAMES {
+    for model in names() {
         let muscle = muscle(&spec(model, "elliptic"));
         for e in [-0.01, 0.0, 0.07, 0.25] {
             let (at, basis) = (muscle.coefficients(e).unwrap(), muscle.elastic_basis(e).unwrap());

@@ -22,6 +22,8 @@ fn gas(chambers: &[(&str, f64, f64)], lines: Vec<LineSpec>) -> RigSpec {
             name: (*name).into(),
             dead_volume: *volume,
             initial_pressure: *pressure,
+            gas: "coefficients".into(),
+            heat_transfer_coefficient: 0.0,
             alpha_in: 1.0,
             alpha_out: 1.0,
             alpha: 1.0,

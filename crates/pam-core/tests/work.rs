@@ -75,7 +75,8 @@ fn root_solves_of_the_geometry() {
 #[test]
 fn cells_of_the_tables() {
     let mut table = String::from("# force model, geometry: cells of the table\n");
-    for (model, _) in ForceModel::NAMES {
+    // a map is a table of forces, not of solves
+    for model in ForceModel::NAMES.iter().map(|(name, _)| *name).filter(|name| *name != "map") {
         for geometry in GEOMETRIES {
             let compiled =
                 CompiledMuscle::new(Muscle::new(&spec(model, geometry)).unwrap()).unwrap();

@@ -86,7 +86,7 @@ def import_command(
         if not beside.exists():
             from pamrs import rigs
 
-            contents[beside] = rigs.template(str(rig), str(rig))
+            contents[beside] = rigs.template(str(rig), str(rig), "coefficients")
     contents[file] = text
     write(contents)
     used = [*log, *([rig] if rig is not None and rig.exists() else [])]

@@ -53,6 +53,12 @@ def _rig_new(
             help="What to call the rig; by default as the file, or its folder if that is rig.toml."
         ),
     ] = None,
+    gas: Annotated[
+        str,
+        typer.Option(
+            help="Law of the chambers: energy_balance, or coefficients as the packaged rig has it."
+        ),
+    ] = "energy_balance",
 ) -> None:
     """Write a rig file to begin with, every key explained in comments."""
     from pamrs._writing import write_atomically
@@ -61,5 +67,6 @@ def _rig_new(
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
     called = file.resolve().parent.name if file.stem == "rig" else file.stem
-    write_atomically(file, rigs.template(like, (called or file.stem) if name is None else name))
+    called = (called or file.stem) if name is None else name
+    write_atomically(file, rigs.template(like, called, gas))
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

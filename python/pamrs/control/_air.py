@@ -124,8 +124,10 @@ class AirModel:
         self.ambient = float(gas["ambient_pressure"])
         supply = rig.tables("supply")[group.feed.supply or ""]
         self.supply_pressure = float(supply["initial_pressure"])
+        # a chamber with an energy balance lies between the isothermal and the adiabatic: (3.17)
+        usual = {"alpha_in": 1.4, "alpha_out": 1.0, "alpha": 1.2}
         self.alpha_in, self.alpha_out, self.alpha = (
-            float(table[name]) for name in ("alpha_in", "alpha_out", "alpha")
+            float(table.get(name, value)) for name, value in usual.items()
         )
         self._rt = float(gas["gas_constant"]) * float(gas["temperature"])
         volume = np.full(1025, float(table["dead_volume"]))

@@ -120,6 +120,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         last_only=told["last_only"],
         on_loads=told["on_loads"],
         supplies=tuple(told["supplies"]),
+        frees_mass=told["frees_mass"],
         dry_friction=told["dry_friction"],
         kink=None
         if kink is None

@@ -254,6 +254,9 @@ class EffectInfo:
         Whether it acts on a linear load too.
     supplies : tuple of str
         Kinds of supply that it acts on; empty for all.
+    frees_mass : bool
+        Whether the mass of a chamber's gas is a state of its own with it, in place of the chamber's
+        coefficients.
     dry_friction : bool
         Whether a motion that does not turn round does not feel it as damping.
     kink : (names, why, of_supplies) or None
@@ -284,6 +287,7 @@ class EffectInfo:
     last_only: bool = False
     on_loads: bool = False
     supplies: tuple[str, ...] = ()
+    frees_mass: bool = False
     dry_friction: bool = False
     kink: tuple[tuple[str, ...], str, bool] | None = None
     at_rest: tuple[tuple[str, str, float], ...] = ()
@@ -329,6 +333,8 @@ class EffectInfo:
         """
         if self.on_loads:
             return (("load", "mass"), ("joint", ""))
+        if self.frees_mass:
+            return (("chamber", "coefficients"),)
         return tuple(("supply", kind) for kind in self.supplies)
 
     @property

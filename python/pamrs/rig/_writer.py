@@ -178,7 +178,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
         ],
         "lines": [_line(name, table, ports) for name, table in tables_of(model, "line").items()],
         "chambers": [
-            {"name": name, **table} for name, table in tables_of(model, "chamber").items()
+            {"name": name, **_chamber(table)} for name, table in tables_of(model, "chamber").items()
         ],
         "muscles": [
             {
@@ -219,6 +219,12 @@ def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
     values = {key: value for key, value in table.items() if key != "kind"}
     ends = ports["line"][name]
     return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}
+
+
+def _chamber(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A chamber; coefficients are what the core takes where no law is given."""
+    usual = table.get("gas") == "coefficients"
+    return {key: value for key, value in table.items() if not (usual and key == "gas")}
 
 
 def _valve(table: Mapping[str, Any]) -> dict[str, Any]:

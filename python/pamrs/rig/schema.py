@@ -109,12 +109,14 @@ _TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
 _ONE_LINK = ("one_link",)
 _ISO = ("iso_6358",)
 _MAP = ("map",)
+_COEFFICIENTS = ("coefficients",)
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
 _KINDS: Final = {
     "supply": ("kind", "tank"),
     "valve": ("flow", "orifice"),
     "line": ("kind", "tube"),
+    "chamber": ("gas", "coefficients"),
     "muscle": ("model", "robinson"),
     "transmission": ("kind", "tendon"),
     "joint": ("kind", "tendon"),
@@ -223,9 +225,25 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
     "chamber": (
         Key("dead_volume", "m3", 1e-10, 1e2),
         Key("initial_pressure", "Pa", -1e5, 1e8, 0.0),
-        Key("alpha_in", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.4),
-        Key("alpha_out", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.0),
-        Key("alpha", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.2),
+        Key(
+            "gas",
+            default="coefficients",
+            kind="choice",
+            choices=("coefficients", "energy_balance"),
+            note="published coefficients, or an energy balance that keeps mass",
+        ),
+        Key("alpha_in", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.4, only=_COEFFICIENTS),
+        Key("alpha_out", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.0, only=_COEFFICIENTS),
+        Key("alpha", "1", _POLYTROPIC_LOW, _POLYTROPIC_HIGH, 1.2, only=_COEFFICIENTS),
+        Key(
+            "heat_transfer_coefficient",
+            "W/(m2 K)",
+            0.0,
+            1e5,
+            50.0,
+            only=("energy_balance",),
+            note="of the wall, at 1 bar and gas.temperature",
+        ),
     ),
     "muscle": (
         Key("model", default="robinson", kind="choice", choices=ALL_MODELS),
@@ -414,8 +432,8 @@ def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
 
 
 def kind_of(block: str, content: Mapping[str, Any]) -> Any:
-    """Force model of a muscle, kind of a supply, line, joint, transmission, arm or load, None for
-    the other blocks.
+    """Force model of a muscle, flow of a valve, gas of a chamber, kind of a supply, line, joint,
+    transmission, arm or load, None for the other blocks.
     """
     name, default = _KINDS.get(block, ("", None))
     return content.get(name, default)

@@ -63,7 +63,8 @@ class Balance:
         Gain by the gas law at the rest temperature, ``P V/(R T)`` [kg]. The constant coefficients
         of filling, emptying and volume change are no energy balance, so that it differs from
         ``stored`` where they are not 1; with the effect ``heat_transfer`` the two differ by the
-        gas's temperature alone.
+        gas's temperature alone. A chamber with an energy balance has a temperature of its own, and
+        the two are one.
     energy : float
         ``R T`` times the mass supplied, what section 6 of the dissertation calls ``E_in``:
         ``(P_initial - P_final) V`` of a tank [J].
@@ -74,6 +75,10 @@ class Balance:
         Work of the muscles, ``F dd`` [J].
     joint_work : float
         Work at the joints where torque and motion go the same way, ``tau dtheta > 0`` [J].
+    enthalpy, heat, gas_work : float or None
+        Of the chambers with an energy balance: enthalpy that flows brought less what they took,
+        heat from the walls, work of the gas ``p dV`` [J]; their internal energy ``p V/(kappa - 1)``
+        grew by the first two less the third. None where no chamber has one.
     """
 
     supplied: float
@@ -84,6 +89,9 @@ class Balance:
     exergy: float
     muscle_work: float
     joint_work: float
+    enthalpy: float | None = None
+    heat: float | None = None
+    gas_work: float | None = None
 
     @property
     def residual(self) -> float:
@@ -113,15 +121,20 @@ class Balance:
         )
         if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
             reason = (
-                "the constant gas coefficients, which are no energy balance; the effect "
-                "heat_transfer is"
+                "the constant gas coefficients, which are no energy balance; gas = "
+                '"energy_balance" of a chamber is'
             )
             air += f" ({1e3 * self.created:+.4g} g by {reason})"
         share = (
             f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
         )
+        walls = (
+            ""
+            if self.heat is None or self.gas_work is None
+            else f"\nheat from the walls {self.heat:.4g} J, work of the gas {self.gas_work:.4g} J"
+        )
         return (
-            f"{air}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
+            f"{air}{walls}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
             f"net work of the muscles {self.muscle_work:.4g} J"
             f"{share}, lifting work {self.joint_work:.4g} J"
         )
@@ -197,6 +210,11 @@ class Simulation(Mapping[str, Array]):
             exergy=gain["exergy_supplied"],
             muscle_work=gain["muscle_work"],
             joint_work=gain["joint_work"],
+            **{
+                name.removesuffix("_gained"): float(channels[name][-1] - channels[name][0])
+                for name in _HEAT_BALANCES
+                if name in channels
+            },
         )
 
     def _implied(self) -> float:
@@ -208,6 +226,10 @@ class Simulation(Mapping[str, Array]):
             absolute = (
                 self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
             )
+            if self.rig.tables("chamber")[name]["gas"] == "energy_balance":
+                mass = self._channels[dotted("air_mass", name)]
+                total += float(mass[-1] - mass[0])
+                continue
             total += float(absolute[-1] * volume[-1] - absolute[0] * volume[0]) / (
                 gas["gas_constant"] * gas["temperature"]
             )
@@ -566,6 +588,7 @@ MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
 _TELLING_DEGREES = 1.0
 #: Channels of the core that are sums since the start.
+_HEAT_BALANCES = ("enthalpy_gained", "heat_gained", "gas_work")
 _BALANCES = (
     "mass_supplied",
     "mass_vented",

@@ -86,6 +86,7 @@ impl RigSpec {
         }
         for chamber in &self.chambers {
             let block = Block { kind: "chamber", name: &chamber.name };
+            block.choice("gas", &chamber.gas, &["coefficients", "energy_balance"])?;
             block.range("initial_pressure", chamber.initial_pressure, vacuum, 1e8, "Pa")?;
         }
         Ok(())

@@ -106,8 +106,8 @@ pub struct LineSpec {
     pub inlet_volume: f64,
 }
 
-/// Chamber: dead (or, without a muscle, total) volume and polytropic coefficients; initial pressure
-/// gauge [Pa].
+/// Chamber: dead (or, without a muscle, total) volume; polytropic coefficients, or an energy balance
+/// with heat from the wall; initial pressure gauge [Pa].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -117,9 +117,25 @@ pub struct ChamberSpec {
     pub dead_volume: f64,
     #[serde(default)]
     pub initial_pressure: f64,
+    /// `coefficients` or `energy_balance`.
+    #[serde(default = "default_gas")]
+    pub gas: String,
+    #[serde(default = "one")]
     pub alpha_in: f64,
+    #[serde(default = "one")]
     pub alpha_out: f64,
+    #[serde(default = "one")]
     pub alpha: f64,
+    #[serde(default)]
+    pub heat_transfer_coefficient: f64,
+}
+
+fn default_gas() -> String {
+    "coefficients".into()
+}
+
+fn one() -> f64 {
+    1.0
 }
 
 /// How a muscle pulls on a joint; the lengths are those of its kind, see

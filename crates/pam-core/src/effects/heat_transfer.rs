@@ -1,9 +1,7 @@
 //! `heat_transfer`: gas temperature from an energy balance with heat exchange at the wall.
 //!
-//! `dp/dt = (kappa R/V)(m_in Ts - m_out T) - kappa p V'/V + ((kappa-1)/V) h A (Tw - T)` with
-//! `T = p V/(m R)`, `dm/dt = m_in - m_out` and `h = h0 sqrt(p T/(p0 T0))`, in place of the constant
-//! polytropic coefficients. The wall stays at the rest temperature. The gas mass is the state, so
-//! that the temperature cannot drift. Wall area: the cylinder of each muscle's volume and length;
+//! The balance of [`crate::blocks::chamber`], all that comes in at rest temperature, in place of the
+//! constant polytropic coefficients. The gas mass is the state, so that the temperature cannot drift. Wall area: the cylinder of each muscle's volume and length;
 //! the cube of the chamber's volume when it is rigid. Only a `share` of the gas may follow the
 //! balance, while the rest keeps the coefficients: a nominal model whose coefficients are nearly
 //! right is left by a little, not by all. The mass then is the one that the gas temperature stands
@@ -11,7 +9,7 @@
 //! the wall by an initial rise. Carneiro & de Almeida (2006); Al-Ibrahim & Otis (1992).
 
 use super::{AtRest, Effect, EffectInfo, EffectParameter, Form, Port, Use};
-use crate::blocks::chamber::{gas_temperature, ChamberState};
+use crate::blocks::chamber::{energy_rate, gas_temperature, wall_heat, wall_rate, ChamberState};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::Scalar;
@@ -46,8 +44,6 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-const REFERENCE_PRESSURE: f64 = 1e5;
-
 /// Rate of the absolute pressure [Pa/s].
 #[inline]
 pub fn pressure_rate<S: Scalar>(
@@ -57,11 +53,8 @@ pub fn pressure_rate<S: Scalar>(
     area: S,
     coefficient: S,
 ) -> S {
-    let (kappa, r) = (gas.gamma, gas.gas_constant);
-    let relative = c.pressure * temperature / (REFERENCE_PRESSURE * gas.temperature);
-    let wall = coefficient * relative.sqrt() * area * (-temperature + gas.temperature);
-    let flow = (c.inflow * gas.temperature - c.outflow * temperature) * (kappa * r);
-    (flow - c.pressure * c.volume_rate * kappa + wall * (kappa - 1.0)) / c.volume
+    let heat = wall_heat(gas, c.pressure, temperature, area, coefficient);
+    energy_rate(gas, c, c.inflow * gas.temperature, temperature, heat)
 }
 
 /// Heat exchange of a chamber with its wall.
@@ -91,8 +84,7 @@ impl<S: Scalar> Effect<S> for Heat<S> {
     }
 
     fn wall_rate(&self, gas: &Gas, volume: f64, wall: f64) -> f64 {
-        (gas.gamma - 1.0) * self.coefficient.re() * wall * gas.temperature
-            / (gas.ambient_pressure * volume)
+        wall_rate(gas, self.coefficient.re(), volume, wall)
     }
 }
 

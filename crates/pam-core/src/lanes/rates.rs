@@ -43,7 +43,14 @@ impl Shape {
     #[inline(always)]
     pub fn small(sums: bool) -> Self {
         Self {
-            layout: Layout { supplies: 1, gases: 1, coordinates: 1, chambers: 1, effects: 0 },
+            layout: Layout {
+                supplies: 1,
+                gases: 1,
+                coordinates: 1,
+                chambers: 1,
+                effects: 0,
+                sums: BALANCE.len(),
+            },
             sums,
             small: true,
         }

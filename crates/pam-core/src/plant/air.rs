@@ -1,9 +1,12 @@
 //! Flows between the nodes of a rig, what they do to the pressures, and how fast.
 
 use super::ports::{Flow, Place};
-use super::rates::{Controls, Line, Plant, Scratch};
+use super::rates::{Controls, Line, Plant, Scratch, Simulated, Warm};
 use super::units::Node;
-use crate::blocks::chamber::{cube_area, cylinder_area, pressure_rate, ChamberState};
+use crate::blocks::chamber::{
+    cube_area, cylinder_area, energy_rate, gas_temperature, pressure_rate, wall_heat, wall_rate,
+    ChamberState,
+};
 use crate::blocks::supply::SetPressure;
 use crate::blocks::valve::Opening;
 use crate::effects::Extremes;
@@ -24,6 +27,48 @@ impl<S: Scalar> Plant<'_, S> {
             Node::Supply(k) => state[self.layout.supply(k)],
             Node::Gas(k) => state[self.layout.pressure(k)],
         }
+    }
+
+    /// A gas at rest temperature.
+    pub(super) fn cold(&self) -> Warm<S> {
+        let (one, zero) = (constant(1.0), constant(0.0));
+        Warm {
+            temperature: constant(self.rig.gas.temperature),
+            share: one,
+            carried: zero,
+            heat: zero,
+        }
+    }
+
+    /// Temperatures of all gases, written to the scratch: that of an energy balance where mass and
+    /// pressure are integrated, else that of the room.
+    #[inline(never)]
+    pub(super) fn temperatures(&self, state: &[S], simulated: &Simulated, here: &mut Scratch<S>) {
+        let (gas, layout) = (&self.rig.gas, &self.layout);
+        for k in 0..layout.gases {
+            here.warm[k] = self.cold();
+            let (pressure, mass) = (layout.pressure(k), layout.mass(k));
+            if self.walls[k].is_some() && simulated.moves(pressure) && simulated.moves(mass) {
+                let temperature =
+                    gas_temperature(gas, state[pressure], here.volume[k], state[mass]);
+                here.warm[k].temperature = temperature;
+                here.warm[k].share = (temperature.recip() * gas.temperature).sqrt();
+            }
+        }
+    }
+
+    /// Rates of the sums of [`super::layout::HEAT_BALANCE`] [W].
+    #[inline(never)]
+    pub(super) fn heat_sums(&self, state: &[S], here: &Scratch<S>) -> [S; 3] {
+        let gas = &self.rig.gas;
+        let heat_capacity = gas.gamma / (gas.gamma - 1.0) * gas.gas_constant;
+        let mut sums = [constant(0.0); 3];
+        for (k, warm) in here.warm.iter().enumerate().filter(|(k, _)| self.walls[*k].is_some()) {
+            sums[0] += (warm.carried - here.outflow[k] * warm.temperature) * heat_capacity;
+            sums[1] += warm.heat;
+            sums[2] += state[self.layout.pressure(k)] * here.volume_rate[k];
+        }
+        sums
     }
 
     /// Mass flows between all nodes, written to the scratch.
@@ -125,6 +170,7 @@ impl<S: Scalar> Plant<'_, S> {
             match *flow {
                 Flow::Leak(node) => {
                     let lost = effect.leak(gas, self.pressure_at(node, state));
+                    let lost = here.of_temperature(node, lost);
                     here.take(node, lost);
                     here.vented += lost;
                 }
@@ -189,6 +235,13 @@ impl<S: Scalar> Plant<'_, S> {
                 outflow: here.outflow[k],
             };
             out[layout.mass(k)] = chamber.inflow - chamber.outflow;
+            if let Some(coefficient) = self.walls[k] {
+                let Warm { temperature, carried, .. } = here.warm[k];
+                let heat = wall_heat(gas, chamber.pressure, temperature, here.wall[k], coefficient);
+                here.warm[k].heat = heat;
+                out[layout.pressure(k)] = energy_rate(gas, &chamber, carried, temperature, heat);
+                continue;
+            }
             let fixed = pressure_rate(&chamber, &self.alphas[k], rt);
             let balance =
                 if self.altered.balances { self.wiring.ports.balance[k].as_ref() } else { None };
@@ -213,8 +266,37 @@ impl<S: Scalar> Scratch<S> {
     pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
         let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
         let (giver, taker, flow) = if along { (from, to, flow) } else { (to, from, -flow) };
+        if self.warm.is_empty() {
+            self.take(giver, flow);
+            self.give(taker, flow);
+        } else {
+            self.pass_heat(giver, taker, flow);
+        }
+    }
+
+    /// The same with the temperature of what flows.
+    #[inline(never)]
+    fn pass_heat(&mut self, giver: Node, taker: Node, flow: S) {
+        let flow = self.of_temperature(giver, flow);
         self.take(giver, flow);
         self.give(taker, flow);
+        if let Node::Gas(k) = taker {
+            let temperature = match giver {
+                Node::Gas(from) => self.warm[from].temperature,
+                _ => constant(self.rest_temperature),
+            };
+            self.warm[k].carried += flow * temperature;
+        }
+    }
+
+    /// Mass flow out of a node where it would be so much [kg/s] at rest temperature: the same
+    /// pressures move less of a warmer gas.
+    #[inline]
+    fn of_temperature(&self, giver: Node, flow: S) -> S {
+        match giver {
+            Node::Gas(k) if !self.warm.is_empty() => flow * self.warm[k].share,
+            _ => flow,
+        }
     }
 
     #[inline(always)]
@@ -346,6 +428,9 @@ impl Plant<'_, f64> {
     /// Rate at which a gas takes the temperature of its wall [1/s], with the least of it: at
     /// ambient pressure.
     fn wall_rate(&self, gas: usize, volume: f64, wall: f64) -> f64 {
+        if let Some(coefficient) = self.walls[gas] {
+            return wall_rate(&self.rig.gas, coefficient, volume, wall);
+        }
         let balance = self.wiring.ports.balance[gas].as_ref();
         balance.map_or(0.0, |acting| self.effect(acting).wall_rate(&self.rig.gas, volume, wall))
     }

@@ -20,6 +20,11 @@ pub const BALANCE: [&str; BALANCE_COUNT] = [
     "joint_work",
 ];
 
+/// Channels of further sums where chambers have an energy balance, over all of these: enthalpy that
+/// flows brought (less what they took), heat from the walls, work of the gas [J]. Their internal
+/// energy `p V/(kappa - 1)` grows by the first two less the third.
+pub const HEAT_BALANCE: [&str; 3] = ["enthalpy_gained", "heat_gained", "gas_work"];
+
 /// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their
 /// rates, what effects need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,6 +39,8 @@ pub struct Layout {
     pub chambers: usize,
     /// States of effects, behind the motion.
     pub effects: usize,
+    /// Sums of the balance: those of [`BALANCE`], and of [`HEAT_BALANCE`] where they are kept.
+    pub sums: usize,
 }
 
 impl Layout {
@@ -205,7 +212,7 @@ impl Names {
         let chambers = spec.chambers.iter().map(|c| dotted("chamber", &c.name));
         let inlets = wiring.inlets.iter().map(|(line, _)| dotted("line", &spec.lines[*line].name));
         Self {
-            channels: channels(spec, wiring, &joints),
+            channels: channels(spec, wiring, &joints, layout.sums),
             initial: initial(spec, wiring, layout, &joints),
             inputs: (spec.valves.iter().map(|v| dotted("valve_command", &v.name)))
                 .chain(regulators.map(|s| dotted("supply_command", &s.name)))
@@ -221,7 +228,12 @@ impl Names {
 }
 
 /// Every simulated channel of a rig, in the order of its columns.
-fn channels(spec: &RigSpec, wiring: &Wiring, joints: &[String]) -> Vec<(String, Channel)> {
+fn channels(
+    spec: &RigSpec,
+    wiring: &Wiring,
+    joints: &[String],
+    sums: usize,
+) -> Vec<(String, Channel)> {
     let mut found = Vec::new();
     let mut add = |kind: &str, name: &str, channel| found.push((dotted(kind, name), channel));
     let inlets = wiring.inlets.iter().map(|(line, _)| spec.lines[*line].name.as_str());
@@ -265,7 +277,7 @@ fn channels(spec: &RigSpec, wiring: &Wiring, joints: &[String]) -> Vec<(String, 
     for (k, name) in inlets.enumerate() {
         add("line_mass", name, Channel::Mass(wiring.chambers + k));
     }
-    for (k, name) in BALANCE.iter().enumerate() {
+    for (k, name) in BALANCE.iter().chain(&HEAT_BALANCE).take(sums).enumerate() {
         add(name, "", Channel::Balance(k));
     }
     found

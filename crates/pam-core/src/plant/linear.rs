@@ -88,8 +88,8 @@ impl Side {
 /// `x' = A x + B u, y = C x`, in SI; matrices row by row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LinearModel {
-    /// States: first those that an initial value can be given for, then what effects move, in the
-    /// order in which the effects were given.
+    /// States: first those that an initial value can be given for, then masses of gases with an
+    /// energy balance, then what effects move, in the order in which the effects were given.
     pub states: Vec<String>,
     /// Commands of the valves.
     pub inputs: Vec<String>,
@@ -189,16 +189,20 @@ impl Rig {
             sign: if load && *place >= layout.angle(0) { -1.0 } else { 1.0 },
             opens: false,
         });
-        let mut extra: Vec<(usize, Moving)> = Vec::new();
+        let mut extra: Vec<(Option<usize>, Moving)> = Vec::new();
         for (place, state) in self.state_map().into_iter().enumerate() {
             let opens = state.role == StateRole::Effect(Role::Opens);
             let found = match state.role {
                 StateRole::FreeMass => {
                     let gas = place - layout.mass(0);
                     let block = state.name.split_once('.').map_or("", |(_, block)| block);
-                    ports.balance[gas].map(|acting| {
-                        let id = ports.effects[acting.effect].info.id;
-                        (acting.effect, dotted(&format!("{id}.air_mass"), block))
+                    Some(match ports.balance[gas] {
+                        Some(acting) => {
+                            let id = ports.effects[acting.effect].info.id;
+                            (Some(acting.effect), dotted(&format!("{id}.air_mass"), block))
+                        }
+                        // of an energy balance of its own
+                        None => (None, dotted("air_mass", block)),
                     })
                 }
                 StateRole::Effect(Role::Moves | Role::Opens) => {
@@ -208,7 +212,7 @@ impl Rig {
                     };
                     let acting =
                         ports.all.iter().map(|(_, acting)| acting).find(|acting| here(acting));
-                    acting.map(|acting| (acting.effect, state.name))
+                    acting.map(|acting| (Some(acting.effect), state.name))
                 }
                 _ => None,
             };

@@ -20,7 +20,7 @@ mod wiring_motion;
 
 pub(crate) use air::Pressure;
 pub(crate) use body::Body as OneBody;
-pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE};
+pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE, HEAT_BALANCE};
 pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
@@ -101,6 +101,7 @@ impl Rig {
             coordinates: wiring.coordinates.len(),
             chambers: wiring.chambers,
             effects: wiring.ports.states,
+            sums: BALANCE.len() + if wiring.heated() { HEAT_BALANCE.len() } else { 0 },
         };
         let names = Arc::new(Names::new(&spec, &wiring, &layout));
         let endless = f64::INFINITY;
@@ -341,7 +342,7 @@ impl Rig {
             add(named(place), StateRole::Pressure);
         }
         for (k, gas) in self.names.gases.iter().enumerate() {
-            let free = wiring.ports.frees_mass(k);
+            let free = wiring.ports.frees_mass(k) || wiring.gases[k].has_energy();
             add(gas, if free { StateRole::FreeMass } else { StateRole::Mass });
         }
         for place in layout.angle(0)..layout.effect(0) {
@@ -351,7 +352,7 @@ impl Rig {
         for (name, role) in wiring.ports.state_names(&self.spec, wiring) {
             add(&name, StateRole::Effect(role));
         }
-        for name in BALANCE {
+        for name in BALANCE.iter().chain(&HEAT_BALANCE).take(layout.sums) {
             add(name, StateRole::Balance);
         }
         for muscle in &self.spec.muscles {

@@ -310,8 +310,19 @@ fn acted_on(
     let chosen = (0..blocks).filter(|k| names.is_empty() || here(k));
     let fits =
         |k: &usize| info.supplies.is_empty() || fits_supply(&wiring.supplies[*k], info.supplies);
-    let places: Vec<Place> =
-        chosen.filter(|k| info.at != "supply" || fits(k)).map(|k| place(info.at, k)).collect();
+    let own_energy = |k: &usize| info.frees_mass && wiring.gases[*k].has_energy();
+    let places: Vec<Place> = chosen
+        .filter(|k| info.at != "supply" || fits(k))
+        .filter(|k| !own_energy(k))
+        .map(|k| place(info.at, k))
+        .collect();
+    if places.is_empty() && info.frees_mass {
+        return model(format!(
+            "effect '{}' acts on a chamber of the kind coefficients, and what it would act on has \
+            an energy balance of its own: its heat_transfer_coefficient is a parameter",
+            effect.id
+        ));
+    }
     if places.is_empty() {
         return model(other_supplies(spec, wiring, info, &effect.at));
     }

@@ -6,10 +6,10 @@
 //! that is where the rig is cut.
 
 use super::body::Body;
-use super::layout::{Channel, Layout, BALANCE_COUNT};
+use super::layout::{Channel, Layout};
 use super::memory::Memory;
 use super::ports::{Acting, Place, Ports};
-use super::units::{LineUnit, Passes, Path, SupplyUnit, ValveUnit, Wiring};
+use super::units::{GasLaw, LineUnit, Passes, Path, SupplyUnit, ValveUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
@@ -140,6 +140,8 @@ pub struct Plant<'a, S> {
     /// Fixed volume of each gas, halves of tubes included [m3].
     pub(crate) fixed_volume: Vec<S>,
     pub(crate) alphas: Vec<Polytropic<S>>,
+    /// Heat transfer coefficient of each gas that has an energy balance [W/(m2 K)].
+    pub(super) walls: Vec<Option<S>>,
     pub(crate) valves: Vec<Valve<S>>,
     pub(crate) lines: Vec<Line<S>>,
     pub(crate) scales: Vec<S>,
@@ -157,14 +159,18 @@ pub(super) struct Altered {
     pub passages: bool,
     pub flows: bool,
     pub balances: bool,
+    /// Some gas has an energy balance.
+    pub heats: bool,
     pub muscles: bool,
     pub motion: bool,
 }
 
 impl Altered {
-    /// As the effects are plugged into the ports of a rig.
-    fn at(ports: &Ports) -> Self {
+    /// As a rig is wired, and effects are plugged into its ports.
+    fn at(wiring: &Wiring) -> Self {
+        let ports: &Ports = &wiring.ports;
         Self {
+            heats: wiring.heated(),
             supplies: ports.on_supplies(),
             areas: ports.area.iter().any(Option::is_some),
             passages: ports.passage.iter().any(Option::is_some),
@@ -174,6 +180,15 @@ impl Altered {
             motion: ports.on_motion(),
         }
     }
+}
+
+/// What an energy balance needs of a gas.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Warm<S> {
+    pub temperature: S,
+    pub share: S,
+    pub carried: S,
+    pub heat: S,
 }
 
 /// What the equations need to write down on the way.
@@ -187,6 +202,12 @@ pub struct Scratch<S> {
     pub(super) drawn: Vec<S>,
     pub(super) torque: Vec<S>,
     pub(super) vented: S,
+    /// Of each gas, where some have an energy balance: its temperature [K], the share of a flow at
+    /// rest temperature that leaves it, what the flows into it carry [kg K/s], and heat from its
+    /// wall [W].
+    pub(super) warm: Vec<Warm<S>>,
+    /// [K]
+    pub(super) rest_temperature: f64,
     /// A flow that is none goes against its arrow, and not along it.
     pub(super) backwards: bool,
     pub(super) muscle_work: S,
@@ -248,8 +269,11 @@ impl<'a, S: Number> Plant<'a, S> {
                 Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
             }),
         };
-        let isothermal =
-            Polytropic { inflow: constant(1.0), outflow: constant(1.0), volume: constant(1.0) };
+        let alike = |alpha: f64| Polytropic {
+            inflow: constant(alpha),
+            outflow: constant(alpha),
+            volume: constant(alpha),
+        };
         Ok(Self {
             layout: rig.layout,
             balanced,
@@ -260,13 +284,20 @@ impl<'a, S: Number> Plant<'a, S> {
                 })
                 .collect(),
             alphas: (wiring.gases.iter())
-                .map(|gas| match gas.alphas {
-                    Some([inflow, outflow, volume]) => Polytropic {
+                .map(|gas| match gas.law {
+                    GasLaw::Coefficients([inflow, outflow, volume]) => Polytropic {
                         inflow: values[inflow],
                         outflow: values[outflow],
                         volume: values[volume],
                     },
-                    None => isothermal,
+                    GasLaw::Isothermal => alike(1.0),
+                    GasLaw::Energy(_) => alike(rig.gas.gamma),
+                })
+                .collect(),
+            walls: (wiring.gases.iter())
+                .map(|gas| match gas.law {
+                    GasLaw::Energy(coefficient) => Some(values[coefficient]),
+                    _ => None,
                 })
                 .collect(),
             valves: (wiring.valves.iter())
@@ -275,7 +306,7 @@ impl<'a, S: Number> Plant<'a, S> {
             lines,
             scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
-            altered: Altered::at(&wiring.ports),
+            altered: Altered::at(wiring),
             wiring,
             effects: (wiring.ports.effects.iter())
                 .map(|effect| {
@@ -322,7 +353,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
 
     /// Length of the state, the sums of the balance included.
     pub fn states(&self) -> usize {
-        self.layout.states() + if self.balanced { BALANCE_COUNT } else { 0 }
+        self.layout.states() + if self.balanced { self.layout.sums } else { 0 }
     }
 
     /// Room for the equations.
@@ -338,6 +369,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
             drawn: zeros(supplies),
             torque: zeros(coordinates),
             vented: constant(0.0),
+            rest_temperature: self.rig.gas.temperature,
+            warm: if self.altered.heats { vec![self.cold(); gases] } else { Vec::new() },
             backwards: false,
             muscle_work: constant(0.0),
             arm: std::array::from_fn(|_| zeros(coordinates)),
@@ -369,7 +402,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
         if loads {
             here.load.fill(zero);
         }
-        let heat = self.altered.balances;
+        let heat = self.altered.balances || self.altered.heats;
         if heat {
             here.wall.fill(zero);
         }
@@ -435,7 +468,8 @@ impl<'a, S: Scalar> Plant<'a, S> {
     /// Wall area of the gases without muscles [m2]: the cube of their volume.
     fn cubes(&self, here: &mut Scratch<S>) {
         for (k, balance) in self.wiring.ports.balance.iter().enumerate() {
-            if balance.is_some() && self.wiring.groups.iter().all(|g| g.chamber != k) {
+            let walled = balance.is_some() || self.walls[k].is_some();
+            if walled && self.wiring.groups.iter().all(|g| g.chamber != k) {
                 here.wall[k] = cube_area(here.volume[k]);
             }
         }
@@ -487,6 +521,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
             self.mechanics(state, memory, start, forces, here);
         }
         if simulated.gas {
+            if self.altered.heats {
+                self.temperatures(state, simulated, here);
+            }
             self.flows(state, controls, here);
             self.gas_rates(state, controls, here, out);
         } else {
@@ -543,7 +580,11 @@ impl<'a, S: Scalar> Plant<'a, S> {
             }
         }
         let sums = [drawn, vented, drawn * rt, exergy, here.muscle_work, work];
-        out[layout.states()..].copy_from_slice(&sums);
+        out[layout.states()..layout.balance(sums.len())].copy_from_slice(&sums);
+        if self.altered.heats {
+            let sums = self.heat_sums(state, here);
+            out[layout.balance(layout.sums - sums.len())..].copy_from_slice(&sums);
+        }
     }
 }
 
@@ -590,12 +631,16 @@ impl Plant<'_, f64> {
                 Channel::Torque(k) => here.torque[k],
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
-                Channel::Temperature(k) if wiring.ports.balance[k].is_some() => gas_temperature(
-                    &self.rig.gas,
-                    state[layout.pressure(k)],
-                    here.volume[k],
-                    state[layout.mass(k)],
-                ),
+                Channel::Temperature(k)
+                    if wiring.ports.balance[k].is_some() || self.walls[k].is_some() =>
+                {
+                    gas_temperature(
+                        &self.rig.gas,
+                        state[layout.pressure(k)],
+                        here.volume[k],
+                        state[layout.mass(k)],
+                    )
+                }
                 Channel::Temperature(_) => self.rig.gas.temperature,
                 Channel::Balance(k) => state.get(layout.balance(k)).copied().unwrap_or(f64::NAN),
             });

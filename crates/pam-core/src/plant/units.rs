@@ -75,6 +75,17 @@ pub(crate) struct LineUnit {
     pub path: Path,
 }
 
+/// What gives the pressure of a gas.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum GasLaw {
+    /// Coefficients of inflow, outflow and volume change.
+    Coefficients([ParameterId; 3]),
+    /// All wall, as an inlet.
+    Isothermal,
+    /// An energy balance with a heat transfer coefficient.
+    Energy(ParameterId),
+}
+
 /// Volume of gas: a chamber, or the rigid inlet of a line.
 #[derive(Debug, Clone)]
 pub(crate) struct GasUnit {
@@ -82,8 +93,7 @@ pub(crate) struct GasUnit {
     pub volume: ParameterId,
     /// Lines of which half the tube's volume is here.
     pub tubes: Vec<usize>,
-    /// Inflow, outflow, volume change; an inlet, all wall, is isothermal.
-    pub alphas: Option<[ParameterId; 3]>,
+    pub law: GasLaw,
     pub pressure_zero: Option<ParameterId>,
     /// Gauge [Pa]; an inlet begins at the pressure of the line's end.
     pub initial_pressure: f64,
@@ -165,4 +175,18 @@ pub(crate) struct Wiring {
     pub body: BodyUnit,
     /// Effects at the ports of the blocks.
     pub ports: Ports,
+}
+
+impl GasUnit {
+    /// Whether an energy balance gives its pressure.
+    pub fn has_energy(&self) -> bool {
+        matches!(self.law, GasLaw::Energy(_))
+    }
+}
+
+impl Wiring {
+    /// Whether some gas has an energy balance.
+    pub fn heated(&self) -> bool {
+        self.gases.iter().any(GasUnit::has_energy)
+    }
 }

@@ -4,7 +4,7 @@
 use super::parameters::Parameters;
 use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{
-    Coordinate, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, Wiring,
+    Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, Wiring,
 };
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::supply::FASTEST;
@@ -283,9 +283,9 @@ fn lines(
 
 fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Result<Vec<GasUnit>> {
     let mut units = Vec::new();
-    let plain = |volume, alphas, initial_pressure| GasUnit {
+    let plain = |volume, law, initial_pressure| GasUnit {
         volume,
-        alphas,
+        law,
         initial_pressure,
         tubes: Vec::new(),
         pressure_zero: None,
@@ -295,13 +295,19 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Re
         let filled = spec.muscles.iter().any(|m| m.chamber == dotted("chamber", &chamber.name));
         let least = if filled { 0.0 } else { 1e-9 };
         let volume = table.add(name("dead_volume"), chamber.dead_volume, (least, 1e4, "m3"))?;
-        let polytropic = (0.2, 3.0, "");
-        let alphas = [
-            table.add(name("alpha_in"), chamber.alpha_in, polytropic)?,
-            table.add(name("alpha_out"), chamber.alpha_out, polytropic)?,
-            table.add(name("alpha"), chamber.alpha, polytropic)?,
-        ];
-        units.push(plain(volume, Some(alphas), chamber.initial_pressure));
+        let law = if chamber.gas == "energy_balance" {
+            let (name, value) =
+                (name("heat_transfer_coefficient"), chamber.heat_transfer_coefficient);
+            GasLaw::Energy(table.add(name, value, (0.0, 1e5, "W/(m2 K)"))?)
+        } else {
+            let polytropic = (0.2, 3.0, "");
+            GasLaw::Coefficients([
+                table.add(name("alpha_in"), chamber.alpha_in, polytropic)?,
+                table.add(name("alpha_out"), chamber.alpha_out, polytropic)?,
+                table.add(name("alpha"), chamber.alpha, polytropic)?,
+            ])
+        };
+        units.push(plain(volume, law, chamber.initial_pressure));
     }
     for (k, end) in inlets {
         let line = &spec.lines[*k];
@@ -312,7 +318,7 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Re
             Node::Supply(supply) => spec.supplies[*supply].initial_pressure,
             Node::Ambient => 0.0,
         };
-        units.push(plain(volume, None, pressure));
+        units.push(plain(volume, GasLaw::Isothermal, pressure));
     }
     Ok(units)
 }

@@ -665,7 +665,7 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFou
         value, std = candidate.fit.values[name], candidate.fit.std[name]
         volume = chamber["dead_volume"]
         rt = gas["gas_constant"] * gas["temperature"]
-        tau = volume / (value * _REFERENCE_DENSITY * rt * chamber["alpha_out"])
+        tau = volume / (value * _REFERENCE_DENSITY * rt * chamber.get("alpha_out", 1.0))
         out["time_constant"] = _entry(tau, tau * std / value, "s", std < value)
         out["conductance_per_volume"] = _entry(
             value / volume, std / volume, "1/(s Pa)", std < value

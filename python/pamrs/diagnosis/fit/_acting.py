@@ -5,6 +5,7 @@ from __future__ import annotations
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import EFFECTS
 from pamrs.rig import Rig
+from pamrs.rig.schema import kind_of
 
 __all__ = ["ACTS", "acts_in", "depends", "fits"]
 
@@ -47,7 +48,7 @@ def fits(rig: Rig, effect: str) -> bool:
     info = EFFECTS[effect]
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
-        kind in ("", table.get("kind", ""))
+        kind in ("", kind_of(block, table))
         for block, kind in info.needs or ((usual, ""),)
         for table in rig.tables(block).values()
     )

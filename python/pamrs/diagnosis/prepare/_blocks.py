@@ -80,7 +80,7 @@ _VALVE = (
     "null_voltage",
 )
 _LINE = ("length", "diameter", "discharge_area")
-_CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha")
+_CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _MUSCLE = ("modulus_scale",)
 _ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
 _LOAD = ("mass", "viscous", "coulomb")
