@@ -210,7 +210,7 @@ def test_help_loads_nothing_heavy():
 @pytest.mark.parametrize("like", pamrs.rigs.names())
 def test_a_new_rig_file_can_be_read_as_it_stands(capsys, tmp_path, like):
     file = tmp_path / "my arm.toml"
-    assert cli.main(["rig", "new", str(file), "--like", like]) == 0
+    assert cli.main(["rig", "new", str(file), "--like", like, "--gas", "coefficients"]) == 0
     rig = pamrs.load_rig(file)
     assert rig.name == "my arm"
     assert rig.parameters == pamrs.rigs.named(like).parameters

@@ -232,6 +232,7 @@ def test_levels_by_pressure():
 
 def fake_muscle(limits=(-0.1, 0.15), area=1e-3, rest_length=REST):
     return SimpleNamespace(
+        model="robinson",
         parameters={"rest_length": rest_length},
         contraction_limits=limits,
         gas_area=lambda e: np.full_like(e, area),

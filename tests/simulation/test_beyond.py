@@ -51,7 +51,7 @@ def test_a_sealed_muscle_that_is_shortened_by_others_has_a_vacuum() -> None:
 
 
 def test_a_stop_that_gives_way_is_told_with_how_far() -> None:
-    soft = SHOULDER.to_toml_text().replace(
+    soft = SHOULDER.to_toml_text(comments=False).replace(
         "stop_stiffness = { value = 20000.0", "stop_stiffness = { value = 200.0"
     )
     rig = parse_rig(soft)

@@ -38,6 +38,9 @@ struct Piece {
     cells_per_unit: f64,
     /// Number of the middle of the first cell, less that of zero.
     offset: f64,
+    /// Numbers of its first and of its last cell, in the last digits.
+    first: f64,
+    last: f64,
 }
 
 /// All columns of one group over a range of its coordinate.
@@ -64,8 +67,10 @@ impl Curves {
             let fitted = refined(group, pair[0], pair[1], &scales)?;
             let cells_per_unit = fitted.len() as f64 / (pair[1] - pair[0]);
             let offset = cells.len() as f64 - 0.5 - pair[0] * cells_per_unit;
-            pieces.push(Piece { start: pair[0], cells_per_unit, offset });
+            let first = cells.len() as f64 + WHOLE;
             cells.extend(fitted.iter().map(stored));
+            let last = cells.len() as f64 - 1.0 + WHOLE;
+            pieces.push(Piece { start: pair[0], cells_per_unit, offset, first, last });
         }
         // what rounds beyond the last cell's end finds the same curve
         cells.push(after(cells.last()?));
@@ -134,7 +139,17 @@ impl Curves {
             offset = here.select(at.constant(piece.offset), offset);
         }
         let position = at.times_plus(scale, offset);
-        let cell = position + WHOLE;
+        let mut cell = position + WHOLE;
+        if self.pieces.len() > 1 {
+            // on a kink, rounding would find the cell on its other side
+            let (mut least, mut most) = (at.constant(first.first), at.constant(first.last));
+            for piece in &self.pieces[1..] {
+                let here = at.constant(piece.start).at_most(at);
+                least = here.select(at.constant(piece.first), least);
+                most = here.select(at.constant(piece.last), most);
+            }
+            cell = cell.or_above(least).or_below(most);
+        }
         (cell, position - (cell - WHOLE))
     }
 }

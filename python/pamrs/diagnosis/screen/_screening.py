@@ -175,17 +175,12 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     if jacobian is None or jacobian.shape[1] == 0:
         none = np.zeros((rows.size, 0))
         return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
-    names = list(fitted.values)
-    free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
-    moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
-    scaled = jacobian * np.array([fitted.scales[name] for name in names])
-    ends = _ends(scaled, rows, moved, free, problem.settings.fit.most_tolerances)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
-    stays = np.isnan(ends)
-    at_ends = rows + scaled[:, ~stays] @ (ends - moved)[~stays]
-    scaled, moved, free = scaled[:, stays], moved[stays], free[stays]
-    if not moved.size:
-        return Stand(rows, at_ends, scaled, moved, free, scaled)
+    walls = problem.settings.fit.most_tolerances
+    names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
+    scales = np.array([fitted.scales[name] for name in names])
+    scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
+    free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
     # J (J'J + prior)^-1 J' is the projector that a prior leaves; its square root's columns are the
     # basis
     values, vectors = np.linalg.eigh(scaled.T @ scaled)
@@ -196,32 +191,9 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     shrunk = inner @ np.linalg.solve(normal, inner.T)
     weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
+    moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
     pull = u @ (inner @ np.linalg.solve(normal, moved))
-    return Stand(rows, at_ends - basis @ (basis.T @ at_ends) - pull, scaled, moved, free, basis)
-
-
-def _ends(scaled: Array, rows: Array, moved: Array, free: Array, walls: float) -> Array:
-    """Where parameters are at the end of their range once the rest of the model is best for it, in
-    tolerances; NaN for the others.
-
-    A fit under other weights of the noise may have left one far from its end that goes there under
-    these.
-    """
-    normal, slope = scaled.T @ scaled + np.diag(free), scaled.T @ rows
-    ends = np.where((free > 0.0) & (np.abs(moved) > walls - 1e-3), moved, np.nan)
-    while True:
-        stays = np.isnan(ends)
-        shift = np.where(stays, 0.0, ends - moved)
-        gradient = (slope + free * moved + normal @ shift)[stays]
-        steps = np.linalg.lstsq(normal[np.ix_(stays, stays)], -gradient, rcond=1e-12)[0]
-        to = moved.copy()
-        to[stays] += steps
-        beyond = np.where(stays & (free > 0.0), np.abs(to) - walls, 0.0)
-        # where one ends, the others may come back
-        farthest = int(np.argmax(beyond))
-        if beyond[farthest] <= 0.0:
-            return ends
-        ends[farthest] = math.copysign(walls, to[farthest])
+    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 
 
 def screen(
