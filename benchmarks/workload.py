@@ -34,16 +34,14 @@ class Shoulder:
         self.payload = float(self.rig.model["arm"]["payload"])
         self.steps = (samples - 1) * peers.STEPS
 
-    def ours(self) -> Array:
-        """Joint angle of one run, by the package [rad]."""
-        run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=STEP)
+    def ours(self, step: float = STEP) -> Array:
+        """Joint angle of one run in steps no longer than one [s], by the package [rad]."""
+        run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=step)
         return run["joint_angle"]
 
     def in_long_steps(self) -> Array:
         """The same in the longest steps that the rig bears within a sample."""
-        longest = peers.SAMPLE_TIME
-        run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=longest)
-        return run["joint_angle"]
+        return self.ours(peers.SAMPLE_TIME)
 
     def peer(self, module: ModuleType, **settings: float) -> Array:
         """The same by a peer."""

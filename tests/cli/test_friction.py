@@ -22,9 +22,9 @@ def cycle(count):
     return np.concatenate([e, e[::-1]]), np.repeat([-1, 1], count)
 
 
-def rows(count, noise):
-    """Length [mm], pressure [kPa], force [N] and direction of one loop at every level."""
-    muscle = Muscle(
+def frictional():
+    """The muscle whose friction is to be found."""
+    return Muscle(
         rest_length=REST,
         rest_diameter=0.0254,
         braid_angle=np.radians(73.5),
@@ -35,6 +35,11 @@ def rows(count, noise):
         friction_pressure_slope=C1,
         friction_floor=0.01,
     )
+
+
+def rows(count, noise):
+    """Length [mm], pressure [kPa], force [N] and direction of one loop at every level."""
+    muscle = frictional()
     rng = np.random.default_rng(3)
     e, way = cycle(count)
     loops = [
@@ -225,17 +230,7 @@ def test_missing_files_and_folders_are_named(capsys, table):
 
 
 def test_isometric_loops_without_a_direction_are_fitted_and_drawn(capsys, tmp_path):
-    muscle = Muscle(
-        rest_length=REST,
-        rest_diameter=0.0254,
-        braid_angle=np.radians(73.5),
-        wall_thickness=0.003175,
-        modulus_slope=[3.0, -0.35],
-        modulus_offset=[1.15e6, -0.15e6],
-        friction_coefficient=C0,
-        friction_pressure_slope=C1,
-        friction_floor=0.01,
-    )
+    muscle = frictional()
     t = np.arange(0.0, 120.0, 0.02)
     p = 3.5e5 - 2.8e5 * np.cos(2 * np.pi * t / 20.0)
     way = np.where(np.sin(2 * np.pi * t / 20.0) > 0.0, -1.0, 1.0)
