@@ -43,15 +43,22 @@ struct Piece {
     last: f64,
 }
 
+impl Piece {
+    /// What its cells are found by.
+    #[inline(always)]
+    fn numbers(&self) -> [f64; 4] {
+        [self.cells_per_unit, self.offset, self.first, self.last]
+    }
+}
+
 /// All columns of one group over a range of its coordinate.
 #[derive(Debug, Clone)]
 pub(super) struct Curves {
     pub low: f64,
     pub high: f64,
-    pieces: Vec<Piece>,
+    first: Piece,
+    others: Vec<Piece>,
     cells: Vec<Cell>,
-    /// In the place of a cell that is not there.
-    none: Cell,
 }
 
 impl Curves {
@@ -72,9 +79,8 @@ impl Curves {
             let last = cells.len() as f64 - 1.0 + WHOLE;
             pieces.push(Piece { start: pair[0], cells_per_unit, offset, first, last });
         }
-        // what rounds beyond the last cell's end finds the same curve
-        cells.push(after(cells.last()?));
-        Some(Self { low, high, pieces, cells, none: [0.0; NODES * COLUMNS] })
+        let mut pieces = pieces.into_iter();
+        Some(Self { low, high, first: pieces.next()?, others: pieces.collect(), cells })
     }
 
     /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
@@ -114,7 +120,9 @@ impl Curves {
     #[inline(always)]
     fn row<W: Simd>(&self, wide: W, cell: f64, [x, square]: [f64; 2], row: &mut [f64]) {
         let per_row = COLUMNS / W::F64_LANES;
-        let cell = self.cells.get(cell.to_bits() as u32 as usize).unwrap_or(&self.none);
+        // no number finds none; its place in it is no number either
+        let number = cell.to_bits() as u32 as usize;
+        let cell = self.cells.get(number).unwrap_or(&self.cells[0]);
         let powers = W::as_simd_f64s(cell).0;
         let (x, square) = (wide.splat_f64s(x), wide.splat_f64s(square));
         for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
@@ -130,26 +138,32 @@ impl Curves {
     /// Cell of each lane, in the last digits of a number, and the place in it from -1/2 to 1/2.
     #[inline(always)]
     fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
-        let first = &self.pieces[0];
-        let (mut scale, mut offset) =
-            (at.constant(first.cells_per_unit), at.constant(first.offset));
-        for piece in &self.pieces[1..] {
-            let here = at.constant(piece.start).at_most(at);
-            scale = here.select(at.constant(piece.cells_per_unit), scale);
-            offset = here.select(at.constant(piece.offset), offset);
+        let [mut scale, mut offset, mut first, mut last] =
+            self.first.numbers().map(|n| at.constant(n));
+        if side_by_side::<S, R>() == 1 {
+            // a plant alone goes where it is
+            let mut own = &self.first;
+            for piece in &self.others {
+                if at.numbers()[0] < piece.start {
+                    break;
+                }
+                own = piece;
+            }
+            [scale, offset, first, last] = own.numbers().map(|n| at.constant(n));
+        } else {
+            for piece in &self.others {
+                let here = at.constant(piece.start).at_most(at);
+                let chosen = |number: f64, before| here.select(at.constant(number), before);
+                let [of_scale, of_offset, of_first, of_last] = piece.numbers();
+                scale = chosen(of_scale, scale);
+                offset = chosen(of_offset, offset);
+                first = chosen(of_first, first);
+                last = chosen(of_last, last);
+            }
         }
         let position = at.times_plus(scale, offset);
-        let mut cell = position + WHOLE;
-        if self.pieces.len() > 1 {
-            // on a kink, rounding would find the cell on its other side
-            let (mut least, mut most) = (at.constant(first.first), at.constant(first.last));
-            for piece in &self.pieces[1..] {
-                let here = at.constant(piece.start).at_most(at);
-                least = here.select(at.constant(piece.first), least);
-                most = here.select(at.constant(piece.last), most);
-            }
-            cell = cell.or_above(least).or_below(most);
-        }
+        // on a kink, rounding alone would find the cell on its other side
+        let cell = (position + WHOLE).or_above(first).or_below(last);
         (cell, position - (cell - WHOLE))
     }
 }
@@ -160,20 +174,6 @@ fn stored(powers: &[[f64; COLUMNS]; NODES]) -> Cell {
         let (power, column) = (k / COLUMNS, k % COLUMNS);
         powers[power][column] * f64::from(1 << power)
     })
-}
-
-/// The same curve as in a cell, about the middle of the cell that would come after it.
-fn after(cell: &Cell) -> Cell {
-    let mut shifted = *cell;
-    // Horner's rule about -1, power by power
-    for done in 0..DEGREE {
-        for power in (done..DEGREE).rev() {
-            for column in 0..COLUMNS {
-                shifted[power * COLUMNS + column] += shifted[(power + 1) * COLUMNS + column];
-            }
-        }
-    }
-    shifted
 }
 
 /// The columns at an angle, the slope (zero here) left to the volume's polynomial.

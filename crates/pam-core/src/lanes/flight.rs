@@ -3,7 +3,7 @@
 //! depends on its own state and commands only.
 
 use super::group::{Group, Rigs, Row, Runs, Spent};
-use super::num::{side_by_side, Num, MOST_LANES, PAIR};
+use super::num::{in_fours, side_by_side, Num, MOST_LANES, PAIR};
 use super::rates::{Lanes, Shape};
 use super::reads::Reads;
 use super::rk4::Rk4;
@@ -15,8 +15,8 @@ use crate::simulate::{Failure, Progress, Timing, Trajectory};
 use crate::Result;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 
-/// Rows that run faster two by two than in wide registers.
-const FEW: usize = 4;
+/// Rows for which registers of four are enough.
+const FEW: usize = 4 * PAIR;
 
 /// Rows of one structure and step in as many flights as they fill.
 ///
@@ -31,7 +31,7 @@ pub(super) fn flights<'a>(
     // A few rows have no use for wide registers.
     match rows.len() {
         1 => Fill::<1> { plan, rows, rigs, wanted }.with_simd(Scalar),
-        ..=FEW => Fill::<PAIR> { plan, rows, rigs, wanted }.with_simd(Scalar),
+        ..=FEW => in_fours(Fill::<PAIR> { plan, rows, rigs, wanted }),
         _ => Arch::new().dispatch(Fill::<PAIR> { plan, rows, rigs, wanted }),
     }
 }
@@ -216,9 +216,7 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     #[inline(always)]
     fn sample<W: Simd>(&mut self, wide: W) {
         match self.lanes.shape {
-            shape if S::F64_LANES == 1 || !shape.is_small() => {
-                self.steps(wide, shape.of_any_size());
-            }
+            shape if !shape.is_small() => self.steps(wide, shape.of_any_size()),
             shape if shape.sums() => self.steps(wide, Shape::small(true)),
             _ => self.steps(wide, Shape::small(false)),
         }
@@ -306,8 +304,8 @@ impl<S: Simd, const R: usize> Group for Flight<'_, S, R> {
     fn advance(&mut self, samples: usize, drive: &Drive<'_>) {
         let simd = self.simd;
         let advance = Advance { flight: self, samples, drive };
-        if S::F64_LANES == 1 {
-            Arch::new().dispatch(advance); // the columns of a plant stand side by side
+        if side_by_side::<S, R>() == 1 {
+            in_fours(advance); // the columns of a plant stand side by side
         } else {
             simd.vectorize(advance);
         }

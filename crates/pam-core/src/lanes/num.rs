@@ -7,7 +7,7 @@
 //! such an instruction finds the same number with many others.
 
 use pulp::bytemuck;
-use pulp::Simd;
+use pulp::{Scalar, Simd, WithSimd};
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Vector registers that hold a number of many plants: while one waits for a result the other is
@@ -15,6 +15,19 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 pub(super) const PAIR: usize = 2;
 /// Lanes at most.
 pub(super) const MOST_LANES: usize = 8 * PAIR;
+
+/// Do something with registers of four numbers where there are such: the columns of a plant alone,
+/// or a few plants, do not fill wider ones, and each width is compiled anew.
+#[inline(always)]
+pub(super) fn in_fours<W: WithSimd>(work: W) -> W::Output {
+    #[cfg(target_arch = "x86_64")]
+    return match pulp::x86::V3::try_new() {
+        Some(simd) => Simd::vectorize(simd, work),
+        None => work.with_simd(Scalar),
+    };
+    #[cfg(not(target_arch = "x86_64"))]
+    pulp::Arch::new().dispatch(work)
+}
 
 /// How many plants there are side by side.
 #[inline(always)]
@@ -128,16 +141,16 @@ impl<S: Simd, const R: usize> Num<S, R> {
 
     #[inline(always)]
     fn map(mut self, of: impl Fn(S, S::f64s) -> S::f64s) -> Self {
-        for lanes in &mut self.lanes {
-            *lanes = of(self.simd, *lanes);
+        for k in 0..R {
+            self.lanes[k] = of(self.simd, self.lanes[k]);
         }
         self
     }
 
     #[inline(always)]
     fn with(mut self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::f64s) -> Self {
-        for (lanes, other) in self.lanes.iter_mut().zip(other.lanes) {
-            *lanes = of(self.simd, *lanes, other);
+        for k in 0..R {
+            self.lanes[k] = of(self.simd, self.lanes[k], other.lanes[k]);
         }
         self
     }
@@ -145,8 +158,8 @@ impl<S: Simd, const R: usize> Num<S, R> {
     #[inline(always)]
     fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S, R> {
         let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); R];
-        for (mask, (mine, other)) in lanes.iter_mut().zip(self.lanes.into_iter().zip(other.lanes)) {
-            *mask = of(self.simd, mine, other);
+        for k in 1..R {
+            lanes[k] = of(self.simd, self.lanes[k], other.lanes[k]);
         }
         Mask { simd: self.simd, lanes }
     }
@@ -240,18 +253,29 @@ impl<S: Simd, const R: usize> Num<S, R> {
         if N % 2 == 1 {
             terms[N / 2] = self.constant(coefficients[N - 1]);
         }
-        let (mut power, mut left) = (self, N.div_ceil(2));
-        while left > 1 {
-            power = power * power;
-            for k in 0..left / 2 {
-                terms[k] = terms[2 * k + 1].times_plus(power, terms[2 * k]);
-            }
-            if left % 2 == 1 {
-                terms[left / 2] = terms[left - 1];
-            }
-            left = left.div_ceil(2);
-        }
+        // Level by level, so that the compiler knows each place.
+        let power = self.paired(&mut terms, N.div_ceil(2));
+        let power = power.paired(&mut terms, N.div_ceil(4));
+        let power = power.paired(&mut terms, N.div_ceil(8));
+        power.paired(&mut terms, N.div_ceil(16));
+        const { assert!(N <= 32) }
         terms[0]
+    }
+
+    /// The first `left` terms two by two, by the square of this power, which comes back.
+    #[inline(always)]
+    fn paired<const N: usize>(self, terms: &mut [Self; N], left: usize) -> Self {
+        if left < 2 {
+            return self;
+        }
+        let power = self * self;
+        for k in 0..left / 2 {
+            terms[k] = terms[2 * k + 1].times_plus(power, terms[2 * k]);
+        }
+        if left % 2 == 1 {
+            terms[left / 2] = terms[left - 1];
+        }
+        power
     }
 
     /// Sine of angles of a few turns at most, to 3e-16.
@@ -434,7 +458,7 @@ impl<S: Simd, const R: usize> AddAssign for Num<S, R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use pulp::{Arch, WithSimd};
+    use pulp::Arch;
 
     /// Largest distance of sine, tangent and logarithm from those of the standard library.
     struct Furthest;

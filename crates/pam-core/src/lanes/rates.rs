@@ -28,6 +28,9 @@ enum Passage<S: Simd, const R: usize> {
     Tube(Tube<S, R>),
 }
 
+/// Length of the state of [`Shape::small`] at most.
+pub(super) const SMALL: usize = 5 + BALANCE.len();
+
 /// How many blocks the equations are for, and whether masses and sums of the balance are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shape {
@@ -65,6 +68,12 @@ impl Shape {
     #[inline(always)]
     pub fn sums(self) -> bool {
         self.sums
+    }
+
+    /// Whether the compiler knows every place of the state.
+    #[inline(always)]
+    pub fn is_known(self) -> bool {
+        self.small
     }
 
     /// The same where the compiler is to know nothing.
@@ -408,7 +417,9 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
             let pressure = state[layout.pressure(k)];
             let inflow = std::mem::replace(&mut here.inflow[k], zero);
             let outflow = std::mem::replace(&mut here.outflow[k], zero);
-            out.gather(layout.mass(k), inflow - outflow);
+            if shape.sums {
+                out.gather(layout.mass(k), inflow - outflow);
+            }
             // The volume is known before the flows.
             let per_volume = here.volume[k].constant(1.0) / here.volume[k];
             let squeezed = (alpha * pressure) * here.volume_rate[k];

@@ -1,11 +1,12 @@
 //! Fixed-step integration of several plants side by side, as [`crate::simulate::integrate`].
 
 use super::num::Num;
-use super::rates::{Lanes, Shape};
+use super::rates::{Lanes, Shape, SMALL};
 use pulp::Simd;
 
 /// The classical Runge-Kutta method over lanes.
 pub(super) struct Rk4<S: Simd, const R: usize> {
+    before: Vec<Num<S, R>>,
     stage: Vec<Num<S, R>>,
     next: Vec<Num<S, R>>,
     sum: Vec<Num<S, R>>,
@@ -16,13 +17,13 @@ pub(super) struct Rk4<S: Simd, const R: usize> {
 impl<S: Simd, const R: usize> Rk4<S, R> {
     pub fn new(state: &[Num<S, R>]) -> Self {
         let zeros = || state.iter().map(|value| value.constant(0.0)).collect::<Vec<_>>();
-        Self { stage: zeros(), next: zeros(), sum: zeros(), evaluations: 0 }
+        Self { before: zeros(), stage: zeros(), next: zeros(), sum: zeros(), evaluations: 0 }
     }
 
     /// The state before the last step.
     #[inline(always)]
     pub fn before(&self) -> &[Num<S, R>] {
-        &self.stage
+        &self.before
     }
 
     #[inline(always)]
@@ -34,40 +35,69 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
         state: &mut Vec<Num<S, R>>,
         step: f64,
     ) {
-        // The rates stand here once: they are much code, compiled for each kind of register.
-        for k in 0..4 {
-            self.stage(wide, shape, lanes, state, step, k);
+        std::mem::swap(state, &mut self.before);
+        self.evaluations += 4;
+        let states = shape.states();
+        let Self { before, stage, next, sum, .. } = self;
+        if shape.is_known() {
+            // Numbers whose places are known stay in registers.
+            let zero = before[0].constant(0.0);
+            let mut known = [[zero; SMALL]; 4];
+            let [start, stage, next, sum] = &mut known;
+            for place in 0..states {
+                start[place] = before[place];
+            }
+            let room = Stages { start, stage, next, sum };
+            room.step(wide, shape, lanes, &mut state[..states], step);
+        } else {
+            let room = Stages {
+                start: &before[..states],
+                stage: &mut stage[..states],
+                next: &mut next[..states],
+                sum: &mut sum[..states],
+            };
+            room.step(wide, shape, lanes, &mut state[..states], step);
         }
-        std::mem::swap(state, &mut self.stage);
     }
+}
 
-    /// One stage of four; the last one leaves the next state in [`Self::stage`].
+/// A step on its way, place by place of the state.
+struct Stages<'s, S: Simd, const R: usize> {
+    start: &'s [Num<S, R>],
+    stage: &'s mut [Num<S, R>],
+    next: &'s mut [Num<S, R>],
+    sum: &'s mut [Num<S, R>],
+}
+
+impl<S: Simd, const R: usize> Stages<'_, S, R> {
     #[inline(always)]
-    fn stage<W: Simd>(
-        &mut self,
+    fn step<W: Simd>(
+        self,
         wide: W,
         shape: Shape,
         lanes: &mut Lanes<'_, S, R>,
-        state: &[Num<S, R>],
+        out: &mut [Num<S, R>],
         step: f64,
-        k: usize,
     ) {
-        let Self { stage, next, sum, evaluations } = self;
-        let states = shape.states();
-        let slopes = Slopes {
-            start: &state[..states],
-            sum: &mut sum[..states],
-            next: &mut next[..states],
-            weight: if k == 0 || k == 3 { 1.0 } else { 2.0 },
-            ahead: if k == 2 { step } else { 0.5 * step },
-            whole: step / 6.0,
-            first: k == 0,
-            last: k == 3,
-        };
-        let here = if k == 0 { &state[..states] } else { &stage[..states] };
-        lanes.rates(wide, shape, here, slopes);
-        *evaluations += 1;
-        std::mem::swap(stage, next);
+        let Self { start, stage, next, sum } = self;
+        let zero = start[0].constant(0.0);
+        for place in 0..shape.states() {
+            // Nothing is left of the last step: it may have been no number.
+            (stage[place], next[place], sum[place]) = (start[place], start[place], zero);
+        }
+        // The rates stand here once: they are much code, compiled for each kind of register.
+        for (k, (weight, ahead)) in
+            [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
+        {
+            let slopes = Slopes { start, sum, next, weight, ahead: ahead * step, first: k == 0 };
+            lanes.rates(wide, shape, stage, slopes);
+            for place in 0..shape.states() {
+                stage[place] = next[place];
+            }
+        }
+        for place in 0..shape.states() {
+            out[place] = sum[place].times_plus(step / 6.0, start[place]);
+        }
     }
 }
 
@@ -80,41 +110,21 @@ pub(super) struct Slopes<'s, S: Simd, const R: usize> {
     weight: f64,
     /// From the start of the step to the next stage [s].
     ahead: f64,
-    /// Step by the sum of all weights [s].
-    whole: f64,
     /// Of the first stage.
     pub first: bool,
-    /// Of the last one.
-    last: bool,
 }
 
 impl<S: Simd, const R: usize> Slopes<'_, S, R> {
     /// The slope of the state at a place.
     #[inline(always)]
     pub fn set(&mut self, place: usize, slope: Num<S, R>) {
-        let sum = self.summed(place, slope);
-        let start = self.start[place];
-        self.next[place] = match self.last {
-            true => sum.times_plus(self.whole, start),
-            false => slope.times_plus(self.ahead, start),
-        };
+        self.gather(place, slope);
+        self.next[place] = slope.times_plus(self.ahead, self.start[place]);
     }
 
     /// The same where no slope depends on that state.
     #[inline(always)]
     pub fn gather(&mut self, place: usize, slope: Num<S, R>) {
-        let sum = self.summed(place, slope);
-        if self.last {
-            self.next[place] = sum.times_plus(self.whole, self.start[place]);
-        }
-    }
-
-    #[inline(always)]
-    fn summed(&mut self, place: usize, slope: Num<S, R>) -> Num<S, R> {
-        // Nothing is left of the last step: it may have been no number.
-        let before = if self.first { slope.constant(0.0) } else { self.sum[place] };
-        let sum = slope.times_plus(self.weight, before);
-        self.sum[place] = sum;
-        sum
+        self.sum[place] = slope.times_plus(self.weight, self.sum[place]);
     }
 }

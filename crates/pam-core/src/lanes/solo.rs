@@ -2,12 +2,12 @@
 //! bits are those of the same plant in a flight.
 
 use super::flight::opening;
-use super::num::Num;
+use super::num::{in_fours, Num};
 use super::rates::{Lanes, Shape};
 use super::rk4::Rk4;
 use super::Plan;
 use crate::plant::{Controls, Plant};
-use pulp::{Arch, Scalar, Simd, WithSimd};
+use pulp::{Scalar, Simd, WithSimd};
 
 type One = Num<Scalar, 1>;
 
@@ -62,7 +62,7 @@ impl<'a> Solo<'a> {
         for (k, set) in controls.set_pressure.iter().enumerate() {
             self.lanes.set(k, &[set.now]);
         }
-        let stayed = Arch::new().dispatch(Advance { solo: self, plant, state, steps, look });
+        let stayed = in_fours(Advance { solo: self, plant, state, steps, look });
         stayed && self.holds(plant, state)
     }
 
