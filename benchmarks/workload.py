@@ -35,8 +35,16 @@ class Shoulder:
         self.steps = (samples - 1) * peers.STEPS
 
     def ours(self, step: float = STEP) -> Array:
-        """Joint angle of one run in steps no longer than one [s], by the package [rad]."""
-        run = pamrs.simulate(self.rig, self.command, sample_time=peers.SAMPLE_TIME, step=step)
+        """Joint angle of one run in steps no longer than one [s], by the package [rad]; it keeps the
+        four states that the peers keep.
+        """
+        run = pamrs.simulate(
+            self.rig,
+            self.command,
+            sample_time=peers.SAMPLE_TIME,
+            step=step,
+            record=("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate"),
+        )
         return run["joint_angle"]
 
     def in_long_steps(self) -> Array:

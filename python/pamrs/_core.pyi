@@ -126,6 +126,7 @@ class Rig:
         sample_time: float,
         step: float,
         start: dict[str, float],
+        record: list[str] | None = None,
         stepwise: bool = False,
     ) -> tuple[dict[str, _Array], list[_Event]]: ...
     def linearise(

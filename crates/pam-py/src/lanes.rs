@@ -83,14 +83,7 @@ fn request<'a>(
     record: &[String],
     reduce: &Reduced<'_>,
 ) -> pam_core::Result<Request<'a>> {
-    let names = &rig.names().channels;
-    let channel = |name: &String| {
-        names.iter().position(|(known, _)| known == name).ok_or_else(|| {
-            let known: Vec<_> = names.iter().map(|(known, _)| known.as_str()).collect();
-            let known = known.join(", ");
-            pam_core::Error::Model(format!("'{name}' is not a channel; there are: {known}"))
-        })
-    };
+    let channel = |name: &String| rig.names().channel(name);
     let plain =
         |owned: &'a Owned| owned.iter().map(|(n, v, _)| (n.as_str(), v.as_slice())).collect();
     let signal = |(name, values, each): &'a (String, Vec<f64>, bool)| {

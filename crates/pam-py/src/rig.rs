@@ -165,8 +165,9 @@ impl Rig {
     }
 
     /// Simulate a number of rows under held signals; channels by name, and what happened on the
-    /// way. `stepwise` is without the equations of the lanes.
-    #[pyo3(signature = (rows, signals, sample_time, step, start, stepwise=false))]
+    /// way. `record` names the channels that are kept, all where it is none; `stepwise` is without
+    /// the equations of the lanes.
+    #[pyo3(signature = (rows, signals, sample_time, step, start, record=None, stepwise=false))]
     #[allow(clippy::too_many_arguments)]
     fn simulate<'py>(
         &self,
@@ -176,24 +177,40 @@ impl Rig {
         sample_time: f64,
         step: f64,
         start: BTreeMap<String, f64>,
+        record: Option<Vec<String>>,
         stepwise: bool,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
         let rig = &*self.inner;
         let signals = owned(&signals);
-        let mut out = Trajectory::new(rig, rows);
         let begun = Timing::new(sample_time, step).and_then(|timing| {
             let timing = timing.stable(rig);
-            let progress = Progress::start(rig, &initial(rig, &start)?)?;
+            let numbers =
+                |names: &Vec<String>| names.iter().map(|n| rig.names().channel(n)).collect();
+            let wanted: Option<Vec<usize>> = record.as_ref().map(numbers).transpose()?;
             let drive = Drive::new(rig, rows, &borrowed(&signals))?;
-            let mut run = if stepwise { Run::new(rig) } else { Run::alone(rig) }?;
+            let mut run = match &wanted {
+                _ if stepwise => Run::new(rig)?,
+                Some(wanted) => Run::alone_for(rig, wanted)?,
+                None => Run::alone(rig)?,
+            };
+            let mut out = match &wanted {
+                Some(wanted) => Trajectory::of_some(&run, rows, wanted),
+                None => Trajectory::new(rig, rows),
+            };
+            let progress = run.start(&initial(rig, &start)?);
             progress.observe_in(&mut run, timing, &mut out)?;
-            Ok((timing, progress, drive, run))
+            Ok((timing, progress, drive, run, out))
         });
-        let (timing, mut progress, drive, mut run) = begun.map_err(|e| error(py, &e))?;
+        let (timing, mut progress, drive, mut run, mut out) = begun.map_err(|e| error(py, &e))?;
         let held = 0..rows.saturating_sub(1);
         watched(py, |look| progress.advance_in(&mut run, timing, &drive, held, &mut out, look))?;
         let happened = events(&out);
-        Ok((channels(py, rig, out)?, happened))
+        let Some(names) = record else { return Ok((channels(py, rig, out)?, happened)) };
+        let kept = PyDict::new(py);
+        for (name, values) in names.iter().zip(out.channels) {
+            kept.set_item(name, array(py, values))?;
+        }
+        Ok((kept, happened))
     }
 
     /// Linear model about a start with every valve at its null: names of states, inputs and

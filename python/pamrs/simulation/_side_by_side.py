@@ -14,7 +14,13 @@ from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
 from pamrs.simulation._driving import initial_values, inputs_of
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
-from pamrs.simulation._simulation import MOST_NUMBERS, check_run, chosen_step, core_rig
+from pamrs.simulation._simulation import (
+    MOST_NUMBERS,
+    check_run,
+    chosen_step,
+    core_rig,
+    names_of,
+)
 
 __all__ = ["REDUCTIONS", "simulate_batch"]
 
@@ -138,7 +144,7 @@ def simulate_batch(
         chosen_step(sample_time, step),
         {name: rowwise(name, values, count) for name, values in (parameters or {}).items()},
         begin,
-        _channels(record),
+        names_of("record", record),
         every,
         [_reduction(name, asked, rows) for name, asked in reduced.items()],
         thread_count(threads),
@@ -224,17 +230,11 @@ def _checked_every(every: int) -> int:
     return int(every)
 
 
-def _channels(record: Iterable[str]) -> list[str]:
-    if isinstance(record, str):
-        raise ParameterError(f"record = {record!r} is not allowed: a sequence of names is needed")
-    return [str(name) for name in record]
-
-
 def _check_size(
     plants: int, kept: int, record: Sequence[str], reduced: Mapping[str, Reduction]
 ) -> None:
     """Refuse results that would not fit in memory, before anything runs."""
-    numbers = plants * (kept * len(_channels(record)) + len(reduced))
+    numbers = plants * (kept * len(names_of("record", record)) + len(reduced))
     if numbers > MOST_NUMBERS:
         raise ParameterError(
             f"{plants} plants with {kept} rows of {len(record)} channels are not allowed: at most "

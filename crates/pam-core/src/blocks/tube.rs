@@ -16,7 +16,7 @@ const HIGHEST_RATIO: f64 = 0.9;
 pub const MOST_TOLD: f64 = 0.99;
 
 /// A tube at one gas temperature.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tube<S> {
     /// Choked mass flow per upstream pressure [kg/(s Pa)].
     flow_factor: S,

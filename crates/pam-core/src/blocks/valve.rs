@@ -11,7 +11,7 @@ use crate::error::{Error, Result};
 use crate::scalar::{constant, Scalar};
 
 /// What air passes through between two pressures.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Opening<S> {
     /// Discharge area `Cd A` [m2] of an orifice.
     Area(S),

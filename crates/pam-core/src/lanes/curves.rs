@@ -44,10 +44,11 @@ struct Piece {
 }
 
 impl Piece {
-    /// What its cells are found by.
+    /// What its cells are found by: cells per unit, offset, the first and the last one.
     #[inline(always)]
-    fn numbers(&self) -> [f64; 4] {
-        [self.cells_per_unit, self.offset, self.first, self.last]
+    fn numbers<S: Simd, const R: usize>(&self, of: Num<S, R>) -> [Num<S, R>; 4] {
+        let Self { cells_per_unit, offset, first, last, .. } = *self;
+        [of.constant(cells_per_unit), of.constant(offset), of.constant(first), of.constant(last)]
     }
 }
 
@@ -59,6 +60,8 @@ pub(super) struct Curves {
     first: Piece,
     others: Vec<Piece>,
     cells: Vec<Cell>,
+    /// In the place of a cell that is not there: no number finds none.
+    none: Cell,
 }
 
 impl Curves {
@@ -80,7 +83,8 @@ impl Curves {
             pieces.push(Piece { start: pair[0], cells_per_unit, offset, first, last });
         }
         let mut pieces = pieces.into_iter();
-        Some(Self { low, high, first: pieces.next()?, others: pieces.collect(), cells })
+        let (first, others) = (pieces.next()?, pieces.collect());
+        Some(Self { low, high, first, others, cells, none: [0.0; NODES * COLUMNS] })
     }
 
     /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
@@ -120,9 +124,8 @@ impl Curves {
     #[inline(always)]
     fn row<W: Simd>(&self, wide: W, cell: f64, [x, square]: [f64; 2], row: &mut [f64]) {
         let per_row = COLUMNS / W::F64_LANES;
-        // no number finds none; its place in it is no number either
         let number = cell.to_bits() as u32 as usize;
-        let cell = self.cells.get(number).unwrap_or(&self.cells[0]);
+        let cell = self.cells.get(number).unwrap_or(&self.none);
         let powers = W::as_simd_f64s(cell).0;
         let (x, square) = (wide.splat_f64s(x), wide.splat_f64s(square));
         for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
@@ -138,8 +141,8 @@ impl Curves {
     /// Cell of each lane, in the last digits of a number, and the place in it from -1/2 to 1/2.
     #[inline(always)]
     fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
-        let [mut scale, mut offset, mut first, mut last] =
-            self.first.numbers().map(|n| at.constant(n));
+        let of = |piece: &Piece| piece.numbers(at);
+        let [mut scale, mut offset, mut first, mut last] = of(&self.first);
         if side_by_side::<S, R>() == 1 {
             // a plant alone goes where it is
             let mut own = &self.first;
@@ -149,16 +152,15 @@ impl Curves {
                 }
                 own = piece;
             }
-            [scale, offset, first, last] = own.numbers().map(|n| at.constant(n));
+            [scale, offset, first, last] = of(own);
         } else {
             for piece in &self.others {
                 let here = at.constant(piece.start).at_most(at);
-                let chosen = |number: f64, before| here.select(at.constant(number), before);
-                let [of_scale, of_offset, of_first, of_last] = piece.numbers();
-                scale = chosen(of_scale, scale);
-                offset = chosen(of_offset, offset);
-                first = chosen(of_first, first);
-                last = chosen(of_last, last);
+                let [its_scale, its_offset, its_first, its_last] = of(piece);
+                scale = here.select(its_scale, scale);
+                offset = here.select(its_offset, offset);
+                first = here.select(its_first, first);
+                last = here.select(its_last, last);
             }
         }
         let position = at.times_plus(scale, offset);

@@ -74,6 +74,8 @@ struct Flight<'a, S: Simd, const R: usize> {
     reads: Reads,
     /// Commands that are held: an input of all rows, then the next input.
     held: Vec<f64>,
+    /// The valves of all rows have the same null and areas.
+    alike: bool,
     /// Lanes that are beyond the curves.
     away: [bool; MOST_LANES],
     /// Rows whose progress is not that of their lane.
@@ -99,15 +101,17 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
         let states = plants[0].states();
         let lanes = Lanes::new(simd, plan, &plants, states > rig.layout.states());
         let reads = Reads::new(rig, &plants, wanted);
+        let alike = plants.iter().all(|plant| plant.valves == plants[0].valves);
         let state = vec![Num::splat(simd, 0.0); states];
         let mut flight = Self {
             held: vec![0.0; rig.names().inputs.len() * rows.len()],
             before: state.clone(),
             method: Rk4::new(&state),
             timing: rows[0].timing,
+            alike,
             away: [false; MOST_LANES],
             stale: [false; MOST_LANES],
-            blind: Trajectory { channels: Vec::new(), events: Vec::new() },
+            blind: Trajectory::blind(),
             spent: Spent::default(),
             simd,
             plan,
@@ -134,16 +138,28 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     /// Which lanes are beyond the range in which the model, or the curves, hold.
     #[inline(always)]
     fn beyond(&self) -> [bool; MOST_LANES] {
+        let angle = self.runs.runs[0].stepper.plant.rig().layout.angle(0);
+        self.beyond_with(self.state[angle], self.state[angle])
+    }
+
+    /// The same where the angle was as far as two others on the way.
+    #[inline(always)]
+    fn beyond_with(&self, lowest: Num<S, R>, highest: Num<S, R>) -> [bool; MOST_LANES] {
         let layout = self.runs.runs[0].stepper.plant.rig().layout;
-        let mut beyond = [false; MOST_LANES];
+        let number = |value: f64| Num::splat(self.simd, value);
+        let (zero, one) = (number(0.0), number(1.0));
+        let mut inside = one;
         for (place, value) in self.state.iter().enumerate().take(layout.states()) {
-            let pressure = place < layout.mass(0);
-            let angle = place >= layout.angle(0) && place < layout.rate(0);
-            for (beyond, value) in beyond.iter_mut().zip(value.numbers()) {
-                *beyond |= !value.is_finite()
-                    || (pressure && *value < 0.0)
-                    || (angle && !self.plan.contains(*value));
-            }
+            let least = if place < layout.mass(0) { 0.0 } else { f64::MIN };
+            inside = value.inside(number(least), number(f64::MAX), inside, zero);
+        }
+        let (low, high) = self.plan.range();
+        for angle in [lowest, highest] {
+            inside = angle.inside(number(low), number(high), inside, zero);
+        }
+        let mut beyond = [false; MOST_LANES];
+        for (beyond, inside) in beyond.iter_mut().zip(inside.numbers()) {
+            *beyond = *inside == 0.0;
         }
         beyond
     }
@@ -162,6 +178,14 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
         let mut values = [0.0; MOST_LANES];
         let values = &mut values[..side_by_side::<S, R>()];
         for (k, unit) in rig.wiring.valves.iter().enumerate() {
+            let commands = &self.held[k * rows..(k + 1) * rows];
+            if self.alike && commands.iter().all(|command| *command == commands[0]) {
+                let plant = &self.runs.runs[0].stepper.plant;
+                let spool = spool_position(commands[0], plant.valves[k].null, unit.half_range);
+                values.fill(opening(plant, k, spool));
+                self.lanes.open(k, values);
+                continue;
+            }
             for (lane, value) in values.iter_mut().enumerate() {
                 let row = lane.min(rows - 1);
                 let plant = &self.runs.of(row).stepper.plant;
@@ -232,11 +256,7 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
             low = self.state[angle].or_below(low);
             high = self.state[angle].or_above(high);
         }
-        self.away = self.beyond();
-        for (lane, away) in self.away.iter_mut().enumerate().take(side_by_side::<S, R>()) {
-            let (low, high) = (low.numbers()[lane], high.numbers()[lane]);
-            *away |= !(self.plan.contains(low) && self.plan.contains(high));
-        }
+        self.away = self.beyond_with(low, high);
     }
 
     /// The rows after a sample: those that did not fly it, `was`, or not well, run it alone; those

@@ -22,6 +22,7 @@ mod solo;
 mod steps;
 
 pub use group::Spent;
+pub(crate) use reads::{needs_sums, Wanted};
 pub use reduce::{Reduce, Reduction};
 pub use request::{Outcome, Request, Signal};
 pub use run::simulate;
@@ -71,6 +72,13 @@ impl Plan {
             true => Turns::Near,
             false => Turns::Far,
         }
+    }
+
+    /// Coordinates between which all curves hold.
+    fn range(&self) -> (f64, f64) {
+        let low = self.curves.iter().map(|curves| curves.low).fold(f64::NEG_INFINITY, f64::max);
+        let high = self.curves.iter().map(|curves| curves.high).fold(f64::INFINITY, f64::min);
+        (low, high)
     }
 
     /// Whether a coordinate is inside all curves.

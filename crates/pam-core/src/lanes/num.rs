@@ -164,6 +164,15 @@ impl<S: Simd, const R: usize> Num<S, R> {
         Mask { simd: self.simd, lanes }
     }
 
+    /// One number where this one is finite and between two others, another where it is not.
+    #[inline(always)]
+    pub fn inside(self, low: Self, high: Self, yes: Self, no: Self) -> Self {
+        // what is no number, or infinite, has no difference to itself
+        let finite = (self - self).at_most(self.constant(0.0));
+        let above = low.at_most(self).select(yes, no);
+        finite.select(self.at_most(high).select(above, no), no)
+    }
+
     /// Where this is less.
     #[inline(always)]
     pub fn less(self, other: Self) -> Mask<S, R> {

@@ -19,7 +19,7 @@ impl<'a> Queue<'a> {
     /// # Errors
     /// As [`crate::simulate::run::Run::new`].
     pub fn new(rows: Vec<Row>, rigs: &dyn Rigs<'a>, wanted: &[usize]) -> Result<Self> {
-        let blind = Trajectory { channels: Vec::new(), events: Vec::new() };
+        let blind = Trajectory::blind();
         let seen =
             rows.first().map_or_else(|| blind.clone(), |row| Trajectory::new(rigs.rig(row.rig), 1));
         let runs = Runs::new(&rows, rigs)?;

@@ -6,6 +6,7 @@ use crate::plant::{Channel, Memory, Plant, Rig};
 use pulp::Simd;
 
 /// How a channel is read.
+#[derive(Debug, Clone, PartialEq)]
 enum Read {
     /// A state times a sign, and for each plant what is added.
     State { place: usize, sign: f64, more: Vec<f64> },
@@ -69,8 +70,50 @@ impl Reads {
     }
 }
 
+/// The channels that are wanted of one plant.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Wanted {
+    reads: Vec<Read>,
+    /// Room for one sample of every channel, where some are no states.
+    all: Vec<Vec<f64>>,
+}
+
+impl Wanted {
+    /// Channels by number.
+    pub fn new(plant: &Plant<'_, f64>, wanted: &[usize]) -> Self {
+        let rig = plant.rig();
+        // what effects do to a reading is known to those who observe it
+        let of = |k: &usize| match rig.lanes() {
+            Some(_) => read(rig, &[plant], *k),
+            None => Read::Observed(*k),
+        };
+        let reads: Vec<Read> = wanted.iter().map(of).collect();
+        let observes = reads.iter().any(|read| matches!(read, Read::Observed(_)));
+        let channels = if observes { rig.names().channels.len() } else { 0 };
+        Self { reads, all: vec![Vec::new(); channels] }
+    }
+
+    /// Room for a sample of every channel, which has to be observed first; empty where states are
+    /// enough.
+    pub fn room(&mut self) -> &mut [Vec<f64>] {
+        self.all.iter_mut().for_each(Vec::clear);
+        &mut self.all
+    }
+
+    /// Append a sample to each channel.
+    #[inline]
+    pub fn append(&self, state: &[f64], out: &mut [Vec<f64>]) {
+        for (read, out) in self.reads.iter().zip(out) {
+            out.push(match read {
+                Read::State { place, sign, more } => sign * state[*place] + more[0],
+                Read::Observed(channel) => self.all[*channel][0],
+            });
+        }
+    }
+}
+
 /// Whether a channel is of the masses or of the sums of the balance.
-pub(super) fn needs_sums(rig: &Rig, channel: usize) -> bool {
+pub(crate) fn needs_sums(rig: &Rig, channel: usize) -> bool {
     let (_, channel) = &rig.names().channels[channel];
     matches!(channel, Channel::Mass(_) | Channel::Balance(_) | Channel::Temperature(_))
 }

@@ -61,6 +61,9 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
     }
 }
 
+/// Weight of each stage's slopes, and how far ahead the next stage is, in steps.
+const STAGES: [(f64, f64); 4] = [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)];
+
 /// A step on its way, place by place of the state.
 struct Stages<'s, S: Simd, const R: usize> {
     start: &'s [Num<S, R>],
@@ -86,9 +89,8 @@ impl<S: Simd, const R: usize> Stages<'_, S, R> {
             (stage[place], next[place], sum[place]) = (start[place], start[place], zero);
         }
         // The rates stand here once: they are much code, compiled for each kind of register.
-        for (k, (weight, ahead)) in
-            [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)].into_iter().enumerate()
-        {
+        for k in 0..STAGES.len() {
+            let (weight, ahead) = STAGES[k];
             let slopes = Slopes { start, sum, next, weight, ahead: ahead * step, first: k == 0 };
             lanes.rates(wide, shape, stage, slopes);
             for place in 0..shape.states() {

@@ -2,7 +2,8 @@
 
 use super::group::{grouped, Group, Rigs, Row, Spent};
 use super::reads::needs_sums;
-use super::request::{Checked, Outcome, Request};
+use super::reduce::Reduction;
+use super::request::{Checked, Outcome, Request, Signal};
 use super::steps::Steps;
 use crate::plant::{Plant, Rig};
 use crate::simulate::drive::Drive;
@@ -11,8 +12,8 @@ use crate::simulate::team::Team;
 use crate::simulate::{Failure, Progress, Timing};
 use crate::{Error, Result};
 
-/// Rows of a block: some milliseconds of work.
-const BLOCK: usize = 64;
+/// Rows of a block: a millisecond or more of work, so that no thread waits long for the last one.
+const BLOCK: usize = 32;
 /// RK4 steps of all rows between two looks outside.
 const STEPS_UNSEEN: usize = 4_000_000;
 /// RK4 steps that are worth a second thread.
@@ -138,12 +139,16 @@ impl<'w, 'r> Work<'w, 'r> {
     fn block(&self, block: &mut Block<'_>) -> Result<Spent> {
         let request = self.checked.request;
         let (mut rows, mut drives) = (Vec::new(), Vec::new());
+        // one drive for all of them where no signal is a plant's own
+        let common = request.signals.iter().all(|(_, signal)| matches!(signal, Signal::Common(_)));
         for place in 0..block.failures.len() {
             let plant = block.first + place;
-            let signals: Vec<(&str, &[f64])> = (request.signals.iter())
-                .map(|(name, signal)| (*name, signal.of(plant, request.rows)))
-                .collect();
-            drives.push(Drive::new(self.checked.rig, request.rows, &signals)?);
+            if !common || place == 0 {
+                let signals: Vec<(&str, &[f64])> = (request.signals.iter())
+                    .map(|(name, signal)| (*name, signal.of(plant, request.rows)))
+                    .collect();
+                drives.push(Drive::new(self.checked.rig, request.rows, &signals)?);
+            }
             match self.row(place, plant)? {
                 Row { failure: Some(failure), .. } => block.without(place, failure),
                 row => rows.push(row),
@@ -178,18 +183,25 @@ impl<'w, 'r> Work<'w, 'r> {
     /// Run a group to its end.
     fn run(&self, group: &mut dyn Group, drives: &[Drive<'_>], block: &mut Block<'_>) {
         let request = self.checked.request;
-        let mut drive = drives[0].of_rows(drives.len());
+        let mut drive = drives[0].of_rows(block.failures.len());
+        // a last sample is all that some reductions look at
+        let all = request.reduce.iter().any(|reduce| reduce.reduction != Reduction::Final);
         let mut sample = vec![0.0; self.wanted.len() * group.rows().len()];
         let mut sums: Vec<Vec<f64>> =
             request.reduce.iter().map(|r| vec![r.start(); group.rows().len()]).collect();
         for k in 0..request.rows {
             if k > 0 {
-                for row in group.rows() {
-                    drive.set(row.place, &drives[row.place], k - 1);
+                match drives {
+                    [common] => drive.set_all(common, k - 1),
+                    _ => group.rows().iter().for_each(|row| {
+                        drive.set(row.place, &drives[row.place], k - 1);
+                    }),
                 }
                 group.advance(1, &drive);
             }
-            if k.is_multiple_of(request.every) || !request.reduce.is_empty() {
+            let reduces = all || (k + 1 == request.rows && !request.reduce.is_empty());
+            let keeps = k.is_multiple_of(request.every) && !request.record.is_empty();
+            if keeps || reduces {
                 group.read(&mut sample);
                 self.note(k, group.rows(), &sample, &mut sums, block);
             }

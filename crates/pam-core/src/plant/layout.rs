@@ -4,6 +4,7 @@ use super::units::Wiring;
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, RigSpec};
 use crate::effects::Role;
+use crate::{Error, Result};
 
 /// Number of sums that are kept beside the states: see [`BALANCE`].
 pub const BALANCE_COUNT: usize = 6;
@@ -205,6 +206,17 @@ pub struct Names {
 }
 
 impl Names {
+    /// Number of a channel.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for an unknown name; it lists those that there are.
+    pub fn channel(&self, name: &str) -> Result<usize> {
+        self.channels.iter().position(|(known, _)| known == name).ok_or_else(|| {
+            let known: Vec<_> = self.channels.iter().map(|(known, _)| known.as_str()).collect();
+            Error::Model(format!("'{name}' is not a channel; there are: {}", known.join(", ")))
+        })
+    }
+
     /// The names of a rig.
     pub(crate) fn new(spec: &RigSpec, wiring: &Wiring, layout: &Layout) -> Self {
         let joints = coordinate_names(spec);

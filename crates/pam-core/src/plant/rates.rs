@@ -115,7 +115,7 @@ pub struct Controls<S> {
     pub(crate) time: f64,
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Valve<S> {
     /// Wide open, where it fills and where it vents.
     pub paths: [Opening<S>; 2],

@@ -121,6 +121,16 @@ impl<'a> Drive<'a> {
         }
     }
 
+    /// Drive all rows as a sample of another drive does.
+    pub(crate) fn set_all(&mut self, other: &Drive<'_>, sample: usize) {
+        for (own, values) in self.commands.iter_mut().zip(&other.commands) {
+            own.to_mut().fill(values[sample]);
+        }
+        for ((_, own), (_, values)) in self.prescribed.iter_mut().zip(&other.prescribed) {
+            own.to_mut().fill(values[sample]);
+        }
+    }
+
     /// Whether anything is prescribed.
     pub(crate) fn prescribes(&self) -> bool {
         !self.prescribed.is_empty()

@@ -17,6 +17,7 @@ use self::run::Run;
 use crate::clock::late;
 use crate::description::dotted;
 use crate::error::check_range;
+use crate::lanes::Wanted;
 use crate::plant::{Channel, LinearModel, Memory, Rig, Side};
 use crate::plant::{Controls, Plant, Scratch, Simulated};
 use crate::scalar::{constant, Scalar};
@@ -230,23 +231,42 @@ pub struct Trajectory {
     pub channels: Vec<Vec<f64>>,
     /// In the order of time.
     pub events: Vec<Event>,
+    /// The channels that are kept; all where it is not said.
+    wanted: Option<Wanted>,
 }
 
 impl Trajectory {
     /// Without rows.
     #[must_use]
     pub fn new(rig: &Rig, rows: usize) -> Self {
-        let room = rows.min(MOST_ROOM);
-        let channels = rig.names.channels.iter().map(|_| Vec::with_capacity(room)).collect();
-        Self { channels, events: Vec::new() }
+        let channels = rig.names.channels.iter().map(|_| room(rows)).collect();
+        Self { channels, ..Self::blind() }
     }
 
-    /// The channel of a name.
+    /// Without rows, for some channels by number, in their order.
+    #[must_use]
+    pub fn of_some(run: &Run<'_>, rows: usize, wanted: &[usize]) -> Self {
+        let channels = wanted.iter().map(|_| room(rows)).collect();
+        Self { channels, wanted: Some(Wanted::new(&run.stepper.plant, wanted)), ..Self::blind() }
+    }
+
+    /// Without channels: events alone.
+    #[must_use]
+    pub fn blind() -> Self {
+        Self { channels: Vec::new(), events: Vec::new(), wanted: None }
+    }
+
+    /// The channel of a name, where all are kept.
     #[must_use]
     pub fn get(&self, rig: &Rig, name: &str) -> Option<&[f64]> {
         let k = rig.names.channels.iter().position(|(n, _)| n == name)?;
         self.channels.get(k).map(Vec::as_slice)
     }
+}
+
+/// Room for the rows of a channel.
+fn room(rows: usize) -> Vec<f64> {
+    Vec::with_capacity(rows.min(MOST_ROOM))
 }
 
 /// A running simulation at a sample: all that its future depends on.
@@ -448,14 +468,32 @@ impl Progress {
         timing: Timing,
         out: &mut Trajectory,
     ) {
-        plant.observe(&self.state, &self.memory, scratch, &mut out.channels);
+        match &mut out.wanted {
+            None => self.observe_all(plant, scratch, timing, &mut out.channels),
+            Some(wanted) => {
+                self.observe_all(plant, scratch, timing, wanted.room());
+                wanted.append(&self.state, &mut out.channels);
+            }
+        }
+    }
+
+    /// Append this sample to every channel.
+    #[inline]
+    fn observe_all(
+        &self,
+        plant: &Plant<'_, f64>,
+        scratch: &mut Scratch<f64>,
+        timing: Timing,
+        out: &mut [Vec<f64>],
+    ) {
+        plant.observe(&self.state, &self.memory, scratch, out);
         if self.keeps_readings(plant) {
             let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
             let later = (pressures.max(0.0) - angles.max(0.0)) / timing.sample_time;
             let first = plant.rig().names.inputs.len();
             for (column, channel) in gauges(plant.rig()).enumerate() {
                 let rows = || self.past.chunks(self.kept).rev();
-                let seen = out.channels.get_mut(channel).and_then(|samples| samples.last_mut());
+                let seen = out.get_mut(channel).and_then(|samples| samples.last_mut());
                 if let Some(reading) = seen {
                     *reading =
                         late(|ago| rows().nth(ago).map(|r| r[first + column]), *reading, later);
@@ -679,6 +717,9 @@ fn held_mass(plant: &Plant<'_, f64>, place: usize, state: &mut [f64]) {
     let air = &plant.rig().gas;
     let rt = air.gas_constant * air.temperature;
     state[layout.mass(gas)] = mass;
+    if state.len() == layout.states() {
+        return; // without sums
+    }
     if more > 0.0 {
         state[layout.balance(0)] += more;
         state[layout.balance(2)] += more * rt;

@@ -1,11 +1,11 @@
 //! What the samples of one rig need on the way, kept from one to the next.
 
-use crate::lanes::Solo;
+use crate::lanes::{needs_sums, Solo};
 use crate::plant::Rig;
 use crate::plant::{Controls, Plant, Simulated};
 use crate::simulate::drive::Drive;
 use crate::simulate::events::{Conditions, Event, Watch};
-use crate::simulate::{Progress, Stepper, Timing, STEPS_UNSEEN};
+use crate::simulate::{Initial, Progress, Stepper, Timing, STEPS_UNSEEN};
 use crate::Result;
 use self_cell::self_cell;
 use std::ops::Range;
@@ -44,9 +44,28 @@ impl<'a> Run<'a> {
     /// # Errors
     /// As [`Plant::new`].
     pub fn alone(rig: &'a Rig) -> Result<Self> {
-        let mut run = Self::new(rig)?;
-        run.solo = Solo::new(&run.stepper.plant);
-        Ok(run)
+        Ok(Self::alone_of(Plant::new(rig, rig.parameters().lift(), true)?))
+    }
+
+    /// The same where only some channels are wanted, by number: without the sums that none of them
+    /// needs.
+    ///
+    /// # Errors
+    /// As [`Plant::new`].
+    pub fn alone_for(rig: &'a Rig, wanted: &[usize]) -> Result<Self> {
+        let sums = wanted.iter().any(|channel| needs_sums(rig, *channel));
+        Ok(Self::alone_of(Plant::new(rig, rig.parameters().lift(), sums)?))
+    }
+
+    fn alone_of(plant: Plant<'a, f64>) -> Self {
+        let solo = Solo::new(&plant);
+        Self { solo, ..Self::of(plant) }
+    }
+
+    /// The start of a simulation.
+    #[must_use]
+    pub fn start(&self, initial: &Initial) -> Progress {
+        Progress::of(&self.stepper.plant, initial)
     }
 
     /// Room for a plant.

@@ -1,0 +1,73 @@
+"""The channels that a run keeps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.simulation._simulation import core_rig
+
+ROWS, SAMPLE = 60, 0.01
+STATES = ("supply_pressure", "muscle_pressure", "joint_angle", "joint_rate")
+#: Rigs that lanes take, that they do not, and whose readings are no states.
+RIGS = {
+    "shoulder": pamrs.rigs.shoulder,
+    "antagonistic_joint": pamrs.rigs.antagonistic_joint,
+    "blow_down_tank": pamrs.rigs.blow_down_tank,
+    "hanging_mass": pamrs.rigs.hanging_mass,
+    "late pressures": lambda: pamrs.rigs.shoulder().with_effect("clock_skew", {"offset": 0.02}),
+}
+
+
+def signals(rig: pamrs.Rig) -> dict[str, np.ndarray]:
+    wave = np.sin(8.0 * SAMPLE * np.arange(ROWS))
+    valves = list(rig.tables("valve").values())
+    return {
+        name: valves[k]["null_voltage"] + 0.6 * valves[k]["half_range"] * wave
+        if k < len(valves)
+        else 4e5 + 1e5 * wave
+        for k, name in enumerate(core_rig(rig).inputs)
+    }
+
+
+@pytest.mark.parametrize("name", RIGS)
+def test_what_is_kept_is_what_a_whole_run_has(name):
+    core = core_rig(RIGS[name]())
+    given = signals(RIGS[name]())
+    whole, events = core.simulate(ROWS, given, SAMPLE, 1e-3, {})
+    # each channel alone, and all in another order
+    for record in [*([channel] for channel in core.channels), list(core.channels)[::-1]]:
+        kept, seen = core.simulate(ROWS, given, SAMPLE, 1e-3, {}, record)
+        assert list(kept) == record
+        assert seen == events
+        for channel in record:
+            np.testing.assert_array_equal(kept[channel], whole[channel], err_msg=channel)
+
+
+def test_a_prescribed_pressure_needs_no_sums():
+    rig = pamrs.rigs.bench("pam_a")
+    pressure = 2e5 + 1e5 * np.sin(8.0 * SAMPLE * np.arange(ROWS))
+    length = np.full(ROWS, rig.model["muscle"]["rest_length"])
+    drive = {"sample_time": SAMPLE, "pressure": pressure, "length": length}
+    whole, kept = pamrs.simulate(rig, **drive), pamrs.simulate(rig, **drive, record=["force"])
+    np.testing.assert_array_equal(kept["force"], whole["force"])
+
+
+def test_a_run_of_some_channels_says_what_it_lacks():
+    run = pamrs.simulate(
+        pamrs.rigs.shoulder(), np.full(ROWS, 6.0), sample_time=SAMPLE, record=STATES
+    )
+    assert list(run) == ["time", "valve_command", *STATES]
+    for ask in (lambda: run.balance, run.summary):
+        with pytest.raises(pamrs.ParameterError, match="record left out .*joint_torque"):
+            ask()
+
+
+@pytest.mark.parametrize(
+    ("record", "message"),
+    [("joint_angle", "record = 'joint_angle'"), (["angle"], "'angle' is not a channel; there are")],
+)
+def test_what_is_no_channel_is_refused(record, message):
+    with pytest.raises(pamrs.PamrsError, match=message):
+        pamrs.simulate(pamrs.rigs.shoulder(), [5.0, 5.0], sample_time=SAMPLE, record=record)
