@@ -488,8 +488,10 @@ def simulate(
     True
     """
     check_run(rig, sample_time)
+    wanted = None if record is None else names_of("record", record)
+    kept = len(core_rig(rig).channels) if wanted is None else len(wanted)
     rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
-    check_rows(rig, rows or 0)
+    check_rows(kept, rows or 0)
     signals, count = signals_of(
         rig,
         valve_command=valve_command,
@@ -503,7 +505,7 @@ def simulate(
             "duration is missing: a finite time >= 0 s is needed (or give valve_command)"
         )
     if count != rows:
-        check_rows(rig, count)
+        check_rows(kept, count)
     start = initial_values(initial, rig)
     held = {
         name: signal
@@ -524,7 +526,6 @@ def simulate(
         driven[name] = np.ascontiguousarray(
             np.append(signal[1:], signal[-1])
         )  # for the end of each sample; the last is not run
-    wanted = None if record is None else names_of("record", record)
     channels, events = core_rig(rig).simulate(
         count, driven, sample_time, chosen_step(sample_time, step), start, wanted
     )
@@ -558,9 +559,8 @@ def check_run(rig: Rig, sample_time: float) -> None:
         )
 
 
-def check_rows(rig: Rig, rows: int) -> None:
+def check_rows(channels: int, rows: int) -> None:
     """Refuse a simulation whose channels would not fit in memory, before it starts."""
-    channels = len(core_rig(rig).channels)
     if rows * channels > MOST_NUMBERS:
         raise ParameterError(
             f"{rows} rows of {channels} channels are not allowed: at most "

@@ -132,14 +132,9 @@ impl Conditions {
         self.each.iter().zip(flags).any(|(condition, flag)| condition.holds(&at) != *flag)
     }
 
-    /// Those of the plant that they are of under other controls.
-    pub fn set(&mut self, plant: &Plant<'_, f64>, controls: &Controls<f64>) {
-        if !self.each.is_empty() && self.spools == controls.spool {
-            return;
-        }
+    /// Those of stops and pressures, which no control changes.
+    fn set_limits(&mut self, plant: &Plant<'_, f64>) {
         let rig = plant.rig();
-        self.spools.clone_from(&controls.spool);
-        self.each.clear();
         for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
             let place = rig.layout.angle(k);
             match coordinate.stops {
@@ -161,6 +156,18 @@ impl Conditions {
             });
         }
         self.limits = self.each.len();
+    }
+
+    /// Those of the plant that they are of under other controls.
+    pub fn set(&mut self, plant: &Plant<'_, f64>, controls: &Controls<f64>) {
+        if !self.each.is_empty() && self.spools == controls.spool {
+            return;
+        }
+        self.spools.clone_from(&controls.spool);
+        if self.each.is_empty() {
+            self.set_limits(plant);
+        }
+        self.each.truncate(self.limits);
         self.each.extend(plant.passages(controls).map(|(ends, critical)| match ends {
             Some((one, other)) => Condition::Flow(one, other, critical),
             None => Condition::Still(critical - 1.0),

@@ -652,7 +652,7 @@ impl Progress {
         }
         run.next.clone_from(self);
         let began = self.samples as f64 * timing.sample_time;
-        run.begin(began, &mut out.events);
+        run.begin(began, true, &mut out.events);
         for from in (0..timing.substeps).step_by(STEPS_UNSEEN) {
             let steps = from..timing.substeps.min(from + STEPS_UNSEEN);
             let taken = steps.len();
@@ -681,7 +681,7 @@ impl Progress {
             run.next.remember(&run.stepper.plant, &mut run.stepper.scratch, drive, k, timing);
             run.controls = run.next.delayed(&run.stepper.plant, began, timing);
         }
-        run.begin(began, &mut out.events);
+        run.begin(began, false, &mut out.events);
         for sub in 0..timing.substeps {
             if self.kept > 0 {
                 let from = began + sub as f64 * timing.step();
