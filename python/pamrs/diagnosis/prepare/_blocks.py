@@ -476,7 +476,9 @@ def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     return there
 
 
-def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
+def predicted(
+    block: Block, core: _core.Rig, prepared: Prepared, outlets: dict[str, float] | None = None
+) -> Array:
     """A block's output over a recording, every window from its measured start.
 
     Parameters
@@ -487,6 +489,9 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
         The compiled model.
     prepared : Prepared
         The recording.
+    outlets : dict of str to float, optional
+        Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
+        what they feed by default.
 
     Returns
     -------
@@ -504,6 +509,7 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
         [],
         begun(block, prepared, starts),
         prepared.n,
+        outlets,
     )
     return prediction
 

@@ -154,6 +154,15 @@ class PrepareSettings(SettingsGroup):
         ),
         origin="judgement",
     )
+    outlet_noises: float = setting(
+        0.3,
+        unit="noise levels",
+        above=0.0,
+        reason="how far the beginning of a regulator without a gauge, at the pressure of what it "
+        "feeds or at what it is set to, may move a sample that is judged; less than the noise, "
+        "since all samples of a beginning move the same way",
+        origin="docs/decisions/0092",
+    )
     arm_window: float = setting(
         2.5,
         unit="s",
