@@ -1,4 +1,4 @@
-"""A gauge between valve and line: the valve is a block of its own."""
+"""A gauge between valve and line: the valve is a block of its own, beside the chamber."""
 
 from __future__ import annotations
 
@@ -36,16 +36,27 @@ def test_every_gauge_is_a_boundary() -> None:
     assert list(blocks) == ["supply", "line", "chamber"]
     assert set(blocks["supply"].drives) == {"line_pressure", "valve_command"}
     assert set(blocks["line"].drives) == {"supply_pressure", "muscle_pressure", "valve_command"}
-    assert blocks["chamber"].drives == ("line_pressure",)
+    assert set(blocks["chamber"].drives) == {"supply_pressure", "valve_command"}
     assert blocks["line"].covers == "valve and line inlet"
-    assert blocks["chamber"].covers == "line and chamber"
+    assert blocks["chamber"].covers == "valve, line and chamber"
     assert "valve.vent_conductance" in blocks["line"].parameters
     assert "line.inlet_volume" in blocks["line"].parameters
-    assert "valve.vent_conductance" not in blocks["chamber"].parameters
+    assert "valve.vent_conductance" in blocks["chamber"].parameters
     assert "line.diameter" in blocks["line"].parameters & blocks["chamber"].parameters
     assert "chamber.dead_volume" not in blocks["line"].parameters
     assert acts_in("valve_dead_zone", blocks["line"])
     assert not acts_in("muscle_hysteresis", blocks["line"])
+
+
+def test_the_inlet_drives_the_chamber_where_the_valve_cannot() -> None:
+    lacking = ("valve_command", "line_pressure", "muscle_pressure")  # a tank without a gauge
+    (chamber,) = available_blocks(RIG, lacking, SETTINGS.prepare)
+    assert (chamber.name, chamber.drives) == ("chamber", ("line_pressure",))
+    assert chamber.covers == "line and chamber"
+    assert "valve.vent_conductance" not in chamber.parameters
+    prepared = prepare(recorded(RIG, "fit", 0), RIG, SETTINGS)
+    left = residual(chamber, core_rig(RIG), prepared, [])
+    assert np.std(left.value[left.rows]) < 2.0 * left.noise
 
 
 def test_without_that_gauge_valve_and_line_are_one() -> None:
@@ -59,8 +70,8 @@ def test_without_that_gauge_valve_and_line_are_one() -> None:
 @pytest.mark.parametrize(
     ("wrong", "seen"),
     [
-        ({"valve.vent_conductance": 3.9e-9}, {"supply": False, "line": True, "chamber": False}),
-        ({"valve.fill_conductance": 3.9e-9}, {"supply": True, "line": True, "chamber": False}),
+        ({"valve.vent_conductance": 3.9e-9}, {"supply": False, "line": True, "chamber": True}),
+        ({"valve.fill_conductance": 3.9e-9}, {"supply": True, "line": True, "chamber": True}),
         ({"chamber.dead_volume": 6e-4}, {"supply": False, "line": False, "chamber": True}),
         ({"line.diameter": 3.2e-3}, {"supply": False, "line": True, "chamber": True}),
         ({}, {"supply": False, "line": False, "chamber": False}),
@@ -92,3 +103,14 @@ def test_sensitivities_of_the_inlet_are_those_of_differences() -> None:
         wanted = -(high - low) / (2e-4 * value)
         size = float(np.abs(wanted).max())
         np.testing.assert_allclose(slope[:, 0], wanted, atol=2e-2 * size)
+
+
+def test_a_small_leak_behind_the_line_is_named() -> None:
+    """From one gauge to the other it is some pascals: only what it adds up to tells it."""
+    true = RIG.with_effect("leak_muscle")
+    roles = ("fit", "fit", "held_out")
+    recordings = [recorded(true, role, seed) for seed, role in enumerate(roles)]
+    found = pamrs.diagnose(pamrs.Case("tube", RIG, recordings, Path()))
+    assert [e.id for e in found.effects] == ["leak_muscle"]
+    assert found.effects[0].probability > 0.8
+    assert found.where["block"] == "chamber"

@@ -402,7 +402,8 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; so is a valve
-    where a gauge stands between it and the line behind it; and so are muscles whose force (or
+    where a gauge stands between it and the line behind it, beside the chamber, which is driven from
+    the valve on where that can be; and so are muscles whose force (or
     torque at a joint) is measured. A rig with joints or a load and without valves and supplies is
     driven by the pressures of its muscles: these are given, and only what they move is judged.
 
@@ -420,9 +421,12 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     list of Block
     """
     have = _Map(rig, channels, settings)
+    # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
+    closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
+    whole = _Map(rig, closed, settings)
     found = [have.supply(name) for name in rig.tables("supply")]
     found += [have.inlet(name) for name in rig.tables("line")]
-    found += [have.chamber(name) for name in rig.tables("chamber")]
+    found += [whole.chamber(name) or have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
     found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
     found += [have.pull(name) for name in pulls_of(rig)]
@@ -491,14 +495,19 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
 
 def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
     """The smoothed channels, with the best that can be told where windows start of what a block
-    integrates (an arm: all joints).
+    integrates (an arm: all joints); inlets of lines only where the block is cut there.
     """
     state = [
         n
         for n in prepared.signals
         if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")
     ]
-    drives = {n: s for n, s in prepared.signals.items() if channel_of(n) in DRIVES}
+    around = {block.channel, *block.drives}
+    drives = {
+        n: s
+        for n, s in prepared.signals.items()
+        if channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around)
+    }
     return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
 
 
