@@ -476,6 +476,15 @@ class PlausibilitySettings(SettingsGroup):
         reason="distance of a command from its null beyond which it is another column or unit",
         origin="judgement",
     )
+    lost_command_share: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the time that a logger may lose a valve's command for; more is how the "
+        "controller is",
+        origin="judgement",
+    )
     command_time_share: float = setting(
         0.5,
         unit="1",
