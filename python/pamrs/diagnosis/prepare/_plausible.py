@@ -551,13 +551,16 @@ def _sense(
     """What would make the model's angle that of the recording: another unit, the other sign, two
     pressures in each other's place.
     """
-    rows = prepared.usable(block.channel, block.drives, [0])
+    starts = prepared.starts(block.window, block.drives)
+    rows = prepared.usable(block.channel, block.drives, starts)
+    if rows.sum() < 64:
+        return None
     measured, model = (
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
     quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
-    if rows.sum() < 64 or quiet or _misfit(measured, model) < settings.sense_wrong:
+    if quiet or _misfit(measured, model) < settings.sense_wrong:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
