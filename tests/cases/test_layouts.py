@@ -31,6 +31,9 @@ def test_every_layout_writes_a_case_that_is_read(layouts: ModuleType, tmp_path: 
     for name in layouts.LAYOUTS:
         case = pamrs.load_case(tmp_path / name)
         assert [r.role for r in case.recordings] == ["fit", "fit", "held_out"]
+        page = (tmp_path / name / "README.md").read_text(encoding="utf-8")
+        assert layouts.LAYOUTS[name].conceals in page
+        assert f"pamrs diagnose out/layouts/{name}" in page
     hanging = pamrs.load_case(tmp_path / "hanging_mass")
     for recording in hanging.recordings:
         masked = int(np.sum(~recording.mask["length"]))
