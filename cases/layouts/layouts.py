@@ -1,9 +1,9 @@
 """``python cases/layouts/layouts.py OUT [NAME ...]``: five rigs as laboratories have them, logged.
 
 For each layout a folder with ``rig.toml``, logs with noise and ``case.toml``: what a laboratory
-would hand in; and ``README.md``, which a laboratory would not have: what comes out. One effect or one wrong value is in the plant that made the logs and not in the rig
-file. ``pamrs diagnose OUT/NAME`` is to find it. The logs are made from a seed; nothing of them is
-committed.
+would hand in; and ``README.md``, which a laboratory would not have: what comes out. One effect or
+one wrong value is in the plant that made the logs and not in the rig file. ``pamrs diagnose
+OUT/NAME`` is to find it. The logs are made from a seed; nothing of them is committed.
 """
 
 from __future__ import annotations
