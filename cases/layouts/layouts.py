@@ -1,9 +1,9 @@
 """``python cases/layouts/layouts.py OUT [NAME ...]``: five rigs as laboratories have them, logged.
 
 For each layout a folder with ``rig.toml``, logs with noise and ``case.toml``: what a laboratory
-would hand in. One effect or one wrong value is in the plant that made the logs and not in the rig
-file. ``pamrs diagnose OUT/NAME`` is to find it. The logs are made from a seed; nothing of them is
-committed.
+would hand in; and ``README.md``, which a laboratory would not have: what comes out. One effect or
+one wrong value is in the plant that made the logs and not in the rig file. ``pamrs diagnose
+OUT/NAME`` is to find it. The logs are made from a seed; nothing of them is committed.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ LAYOUTS = {
 
 
 def write(layout: Layout, folder: Path) -> Path:
-    """Write rig, logs and case of a layout.
+    """Write rig, logs and case of a layout, and the page that says what it conceals.
 
     Parameters
     ----------
@@ -199,6 +199,8 @@ def write(layout: Layout, folder: Path) -> Path:
     home.mkdir(parents=True, exist_ok=True)
     source = HERE / f"{layout.name}.toml"
     (home / "rig.toml").write_text(source.read_text(encoding="utf-8"), encoding="utf-8")
+    page = source.with_suffix(".md").read_text(encoding="utf-8")
+    (home / "README.md").write_text(page, encoding="utf-8")
     entries = ['schema = "pamrs.case/1"\nrig = "rig.toml"\n']
     for number, run in enumerate(layout.runs(layout.plant(load_rig(source))), 1):
         file = f"run_{number}.csv"

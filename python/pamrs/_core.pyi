@@ -142,6 +142,7 @@ class Rig:
         parameters: list[str],
         measured: dict[str, _Signal],
         samples: int,
+        outlets: dict[str, float] | None = None,
     ) -> tuple[_Array, _Array | None]: ...
     def closure_terms(
         self,

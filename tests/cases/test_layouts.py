@@ -31,6 +31,9 @@ def test_every_layout_writes_a_case_that_is_read(layouts: ModuleType, tmp_path: 
     for name in layouts.LAYOUTS:
         case = pamrs.load_case(tmp_path / name)
         assert [r.role for r in case.recordings] == ["fit", "fit", "held_out"]
+        page = (tmp_path / name / "README.md").read_text(encoding="utf-8")
+        assert layouts.LAYOUTS[name].conceals in page
+        assert f"pamrs diagnose out/layouts/{name}" in page
     hanging = pamrs.load_case(tmp_path / "hanging_mass")
     for recording in hanging.recordings:
         masked = int(np.sum(~recording.mask["length"]))
@@ -62,3 +65,28 @@ def test_one_gauge_finds_the_dead_time(layouts: ModuleType, tmp_path: Path) -> N
     (wrong,) = found.wrong_parameters
     assert wrong.name == layout.conceals
     assert wrong.value == pytest.approx(0.03, abs=5e-4)
+
+
+@pytest.mark.slow
+def test_a_gauge_at_each_end_of_the_tube_finds_the_exhaust(
+    layouts: ModuleType, tmp_path: Path
+) -> None:
+    layout = layouts.LAYOUTS["eight_metres"]
+    found = pamrs.diagnose(layouts.write(layout, tmp_path))
+    (wrong,) = found.wrong_parameters
+    assert wrong.name == layout.conceals
+    assert wrong.value == pytest.approx(3.9e-9, rel=0.02)
+    assert wrong.probability > 0.8
+    assert found.where["block"] in ("line", "chamber")
+
+
+def test_a_hanging_mass_shows_the_friction_of_its_braid(
+    layouts: ModuleType, tmp_path: Path
+) -> None:
+    layout = layouts.LAYOUTS["hanging_mass"]
+    found = pamrs.diagnose(layouts.write(layout, tmp_path))
+    assert [e.id for e in found.effects] == [layout.conceals]
+    assert found.effects[0].probability > 0.8
+    holes = [text for text in found.warnings if "saturated in length" in text]
+    assert len(holes) >= 17  # six in each of three recordings, of which two may meet
+    assert "run_1: saturated in length, 5.28 to 5.35 s: 8 samples" in holes[0]

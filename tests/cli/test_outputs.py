@@ -133,6 +133,36 @@ def test_what_is_done_is_told_although_a_file_cannot_be_written(
     assert not json.exists()
 
 
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EPIPE])
+def test_the_text_is_not_lost_with_standard_output(capsys, tmp_path, monkeypatch, diagnosed, code):
+    """`pamrs diagnose CASE --json FILE > out.txt` on a full disk: work was done, and more than
+    nothing is left of it.
+    """
+    echo = cli._shared.typer.echo
+
+    def full(text="", **options):
+        if not options.get("err"):
+            raise OSError(code, os.strerror(code))
+        echo(text, **options)
+
+    monkeypatch.setattr(cli._shared.typer, "echo", full)
+    json = tmp_path / "a.json"
+    found, out, err = run(capsys, "diagnose", tmp_path, "--json", json)
+    assert (found, out) == (cli.NOT_WRITTEN, "")
+    assert "verdict: none\n" in err
+    assert f"not written: standard output ({os.strerror(code)})" in err
+    assert json.read_text(encoding="utf-8") == "{}\n"
+
+
+def test_a_package_that_is_broken_is_named(capsys, tmp_path, monkeypatch, diagnosed):
+    (tmp_path / "jinja2.py").write_text("raise ImportError('half of it')", encoding="utf-8")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.delitem(sys.modules, "jinja2", raising=False)
+    code, out, err = run(capsys, "diagnose", tmp_path, "--report", tmp_path / "out")
+    assert (code, out, diagnosed) == (2, "", [])
+    assert "this needs jinja2, which is not installed" in err
+
+
 def test_a_file_is_whole_or_as_before(tmp_path, monkeypatch):
     file = tmp_path / "a"
     file.write_text("before", encoding="utf-8")

@@ -57,6 +57,51 @@ def test_every_channel_is_looked_at(name: str, value: float) -> None:
     assert all(mask.all() for mask in kept.mask.values())
 
 
+ONCE = (30, 40)
+SHOULDER = pamrs.rigs.shoulder()
+
+
+def commanded(stretches: list[tuple[int, int]], *values: float) -> Recording:
+    """A wave of a valve's command inside its range, with other values now and then."""
+    time = 0.005 * np.arange(2000)
+    table = SHOULDER.model["valve"]
+    command = table["null_voltage"] + 0.8 * table["half_range"] * np.sin(time)
+    for (first, last), value in zip(stretches, values, strict=True):
+        command[first:last] = value
+    channels = {"valve_command": command}
+    mask = {"valve_command": np.ones(2000, dtype=bool)}
+    return Recording("a", "fit", time, 0.005, channels, mask, source="lift.csv")
+
+
+def test_commands_that_a_logger_lost_are_masked() -> None:
+    bad = commanded([(0, 12), ONCE, (1990, 2000)], -327.68, -327.68, -327.68)
+    (masked,), (told,) = without_impossible([bad], SHOULDER, SETTINGS.plausibility)
+    assert np.flatnonzero(~masked.mask["valve_command"]).tolist() == [
+        *range(12), *range(30, 40), *range(1990, 2000)
+    ]  # fmt: skip
+    assert "32 samples of valve_command in lift.csv are beyond the possible" in told
+    assert "0 to 0.055 s, 0.15 to 0.195 s, 9.95 to 9.995 s" in told
+
+
+@pytest.mark.parametrize(
+    ("stretches", "values"),
+    [
+        ([ONCE], (10.0,)),  # the end of the valve's range
+        ([ONCE, (40, 60)], (25.0, 11.0)),  # a controller comes back from beyond what is possible
+        ([(100, 101), (101, 102), (102, 103)], (25.0, 30.0, 28.0)),  # ... or moves there
+        ([(100, 800)], (30.0,)),  # ... or stays there
+    ],
+)
+def test_what_a_controller_asked_for_stays(
+    stretches: list[tuple[int, int]], values: tuple[float, ...]
+) -> None:
+    (kept,), said = without_impossible(
+        [commanded(stretches, *values)], SHOULDER, SETTINGS.plausibility
+    )
+    assert said == []
+    assert kept.mask["valve_command"].all()
+
+
 @pytest.mark.parametrize("channel", ["joint_angle", "length", "muscle_pressure", "temperature"])
 @pytest.mark.parametrize("rail", [-0.5, 9.0])
 def test_rails_inside_the_possible_are_masked_too(channel: str, rail: float) -> None:

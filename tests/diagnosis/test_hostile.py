@@ -158,6 +158,17 @@ REFUSED = {
         {},
         "joint_angle .* opposite to the model",
     ),
+    "angle the other way, pressure lost at first": (
+        lambda t: (
+            t
+            | {
+                "joint_angle": 2.7 - t["joint_angle"],
+                "muscle_pressure": np.where(t["time"] < 0.1, np.nan, t["muscle_pressure"]),
+            }
+        ),
+        {},
+        "joint_angle .* opposite to the model",
+    ),
     "supply and muscle": (
         swap("supply_pressure", "muscle_pressure"),
         {},

@@ -242,6 +242,21 @@ def test_sound_recordings_are_not_suspected() -> None:
     assert suspicions(held, {"muscle_pressure": "bar"}, rig) == []
 
 
+def test_a_regulator_goes_as_far_as_it_is_set() -> None:
+    """What the rig file begins with says nothing of it."""
+    rig = pamrs.rigs.named("regulated_joint").with_parameters({"supply.initial_pressure": 1e5})
+    pressure = (0.2 + 0.8 * LIFT) * 4e5
+    channels = {"supply_command": pressure, "muscle_pressure": pressure}
+    units = {"supply_command": "bar", "muscle_pressure": "bar"}
+    assert suspicions(channels, units, rig) == []
+    assert suspicions({"muscle_pressure": pressure}, units, rig) == []
+    both = channels | {"supply_pressure": pressure}
+    assert suspicions(both, units | {"supply_pressure": "bar"}, rig) == []
+    (found,) = suspicions(channels | {"muscle_pressure": 14.5 * pressure}, units, rig)
+    assert found.likely == "psi"
+    assert "of the largest command of the regulator" in found.text
+
+
 def test_suspicions_stand_in_the_case(tmp_path: Path) -> None:
     np.savez(tmp_path / "run.npz", t=TIME, **{"p_muscle [bar]": VENTED * 14.5})
     proposal = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder())

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from pamrs.errors import PamrsError, RecordingError
-from pamrs.recordings import CHANNELS, Recording, load_recording
+from pamrs.recordings import CHANNELS, Recording, load_recording, load_recordings
 from pamrs.recordings._faults import find_faults
 from pamrs.recordings.table import _READERS, _TEXT
 
@@ -247,6 +247,28 @@ def test_all_bad_columns_at_once(tmp_path: Path) -> None:
     message = refused(tmp_path, "time [s],force,length [V],zeppelin [m]\n0,1,2,3\n1,2,3,4\n")
     assert "3 problems" in message
     assert all(words in message for words in ("'force'", "length [V]", "zeppelin"))
+
+
+@pytest.mark.parametrize(
+    ("heading", "value", "likely"),
+    [
+        ("temperature [K]", 21.0, "said to be in K, .* read as degC it is 21.* degC"),
+        ("temperature [degC]", 3000.0, "right column and unit"),  # nothing fits
+        ("muscle_pressure [bar]", 3e5, "said to be in bar, .* read as Pa it reaches 3"),
+    ],
+)
+def test_impossible_values_name_the_unit_that_fits(
+    tmp_path: Path, heading: str, value: float, likely: str
+) -> None:
+    file = tmp_path / "a.csv"
+    rows = "".join(f"{0.01 * k:.2f},{value * (1 + 1e-4 * k)}\n" for k in range(100))
+    file.write_text(f"time [s],{heading}\n{rows}", encoding="utf-8")
+    with pytest.raises(RecordingError, match=f"not possible.*{likely}"):
+        load_recording(file)
+    name, _, unit = heading.partition(" [")
+    channels = {name: {"column": name, "unit": unit[:-1]}}
+    with pytest.raises(RecordingError, match=f"not possible.*{likely}"):
+        load_recordings(file, channels=channels, time="time")
 
 
 def test_swapped_columns_are_seen_by_impossible_values(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 //! and what is refused.
 
 use pam_core::blocks::supply::FASTEST;
+use pam_core::cut_chain::{predict, Block, Measured, Signal};
 use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec};
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
@@ -230,20 +231,25 @@ fn a_planar_arm_of_one_link_is_the_one_link_arm() {
     assert!(one.stable_step() > 1e-3);
 }
 
-#[test]
-fn a_regulator_settles_and_its_droop_follows_the_flow() {
-    let mut spec = gas(&[("", 1e-3, 0.0)], vec![orifice("supply", "chamber", 5e-6)]);
-    spec.supplies = vec![SupplySpec {
+/// Set to 4 bar, of 50 ms.
+fn regulator(droop: f64) -> SupplySpec {
+    SupplySpec {
         name: String::new(),
         kind: "regulator".into(),
         volume: 0.0,
         initial_pressure: 4e5,
         time_constant: 0.05,
-        droop: 4e6,
+        droop,
         dead_time: 0.0,
         rise_limit: FASTEST,
         fall_limit: FASTEST,
-    }];
+    }
+}
+
+#[test]
+fn a_regulator_settles_and_its_droop_follows_the_flow() {
+    let mut spec = gas(&[("", 1e-3, 0.0)], vec![orifice("supply", "chamber", 5e-6)]);
+    spec.supplies = vec![regulator(4e6)];
     let rig = Rig::new(spec).unwrap();
     let out = run(&rig, 500, &[], 0.02, 1e-3);
     assert!((last(&rig, &out, "muscle_pressure") - 4e5).abs() < 1.0);
@@ -465,4 +471,73 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
         (run(&valve, 40, &[("valve_command", &open)], 0.01, 1e-3), run(&line, 40, &[], 0.01, 1e-3));
     assert_eq!(a.get(&valve, "muscle_pressure"), b.get(&line, "muscle_pressure"));
     assert!(last(&valve, &a, "mass_supplied") < 0.0 && imbalance(&valve, &a) < 1e-12);
+}
+
+/// Every channel of a run as a measured signal, with its slopes.
+fn slopes(run: &Trajectory, rig: &Rig, name: &str, dt: f64) -> Vec<f64> {
+    let values = run.get(rig, name).unwrap();
+    let end = values.len() - 1;
+    let at = |k: usize| (k + 1).min(end);
+    (0..=end).map(|k| (values[at(k)] - values[k.saturating_sub(1)]) / (2.0 * dt)).collect()
+}
+
+#[test]
+fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
+    let rig = Rig::new(fed_through_a_tube(5e-6, 2.0)).unwrap();
+    let (rows, dt) = (400, 0.005);
+    let command = wave(rows, 0.0);
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let start = Initial::rest(&rig);
+    let truth = simulate(&rig, rows, &[("valve_command", &command)], timing, &start).unwrap();
+    let names = ["supply_pressure", "line_pressure", "muscle_pressure", "joint_angle"];
+    let known: Vec<_> = names.iter().filter(|name| truth.get(&rig, name).is_some()).collect();
+    let slopes: Vec<_> = known.iter().map(|name| slopes(&truth, &rig, name, dt)).collect();
+    let signals: Vec<_> = (known.iter().zip(&slopes))
+        .map(|(name, slope)| (**name, Signal { value: truth.get(&rig, name).unwrap(), slope }))
+        .collect();
+    let missed = |rig: &Rig| {
+        let measured = Measured::new(rig, rows, &[("valve_command", &command)], &signals).unwrap();
+        let block = Block::from_name(rig, "line").unwrap();
+        let timing = timing.at_most(block.longest_step(rig));
+        let found = predict(rig, block, &measured, timing, &[0], &[]).unwrap().value;
+        let read = truth.get(rig, "line_pressure").unwrap();
+        found.iter().zip(read).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let mut narrower = fed_through_a_tube(5e-6, 2.0);
+    narrower.valves[0].discharge_area_max *= 0.7;
+    let (own, other) = (missed(&rig), missed(&Rig::new(narrower).unwrap()));
+    assert!(own < 2e3 && other > 10.0 * own, "{own} Pa, {other} Pa");
+    assert!(Block::from_name(&rig, "line.other").is_err());
+}
+
+#[test]
+fn a_regulator_without_a_gauge_begins_where_it_is_told() {
+    let mut spec = gas(&[("", 1e-4, 0.0)], vec![tube("supply", "chamber", 2.0, 0.004)]);
+    spec.supplies = vec![regulator(0.0)];
+    let rig = Rig::new(spec).unwrap();
+    let (rows, dt) = (200, 0.005);
+    let (command, still, flat) = (vec![3e5; rows], vec![0.0; rows], vec![0.0; rows]);
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let begun = |outlets: &[(&str, f64)]| {
+        let signal = Signal { value: &still, slope: &flat };
+        let measured = Measured::new(
+            &rig,
+            rows,
+            &[("supply_command", &command)],
+            &[("muscle_pressure", signal)],
+        )
+        .unwrap()
+        .beginning(&rig, outlets)?;
+        let block = Block::from_name(&rig, "chamber").unwrap();
+        let timing = timing.at_most(block.longest_step(&rig));
+        predict(&rig, block, &measured, timing, &[0], &[]).map(|found| found.value)
+    };
+    let (fed, full) = (begun(&[]).unwrap(), begun(&[("supply", 3e5)]).unwrap());
+    let at_fed = begun(&[("supply", 0.0)]).unwrap();
+    assert_eq!(fed, at_fed, "where nothing is told, it begins at what it feeds");
+    assert!(full[20] - fed[20] > 5e4, "{} {}", full[20], fed[20]);
+    assert!((full[rows - 1] - fed[rows - 1]).abs() < 200.0, "both settle");
+    assert!(begun(&[("tank", 1e5)]).is_err());
+    assert!(begun(&[("supply", -2e5)]).is_err());
+    assert!(begun(&[("supply", f64::NAN)]).is_err());
 }

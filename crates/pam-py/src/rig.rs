@@ -63,6 +63,7 @@ impl Rig {
         step: f64,
         measured: &BTreeMap<String, Pair<'_>>,
         samples: usize,
+        outlets: &BTreeMap<String, f64>,
         work: impl FnOnce(Block, &Measured<'_>, Timing) -> pam_core::Result<T> + Send,
     ) -> PyResult<T> {
         let commands = owned(commands);
@@ -75,7 +76,9 @@ impl Rig {
             let signals: Vec<_> = (signals.iter())
                 .map(|(name, value, slope)| (name.as_str(), Signal { value, slope }))
                 .collect();
-            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?;
+            let outlets: Vec<_> = outlets.iter().map(|(name, p)| (name.as_str(), *p)).collect();
+            let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?
+                .beginning(inner, &outlets)?;
             let block = Block::from_name(inner, block)?;
             let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
             work(block, &measured, timing)
@@ -237,8 +240,9 @@ impl Rig {
     }
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without
-    /// parameters).
+    /// parameters). Regulators that nobody measured begin at `outlets` [Pa, gauge] where given.
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
+    #[pyo3(signature = (block, commands, sample_time, step, starts, parameters, measured, samples, outlets=None))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -250,6 +254,7 @@ impl Rig {
         parameters: Vec<String>,
         measured: BTreeMap<String, Pair<'py>>,
         samples: usize,
+        outlets: Option<BTreeMap<String, f64>>,
     ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
         let p = self.cut(
             py,
@@ -259,6 +264,7 @@ impl Rig {
             step,
             &measured,
             samples,
+            &outlets.unwrap_or_default(),
             |block, measured, timing| {
                 let ids = (parameters.iter())
                     .map(|name| self.inner.parameters().find(name))
@@ -297,6 +303,7 @@ impl Rig {
             step,
             &measured,
             samples,
+            &BTreeMap::new(),
             |block, measured, timing| closure_terms(&self.inner, block, measured, timing, &starts),
         )?;
         array(py, terms).reshape([samples, columns])

@@ -7,7 +7,7 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -34,6 +34,7 @@ __all__ = [
     "progress",
     "quantity",
     "rig_named",
+    "tell",
     "usable_samples",
     "write",
 ]
@@ -160,16 +161,44 @@ def check_packages(extra: str, *packages: str) -> None:
         try:
             importlib.import_module(package)
         except ImportError as error:
+            error.name = error.name or package
             raise missing_package(error, extra) from error
 
 
-def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]]) -> None:
+def tell(text: str) -> list[str]:
+    """Print the text of a result; on standard error where standard output takes none (a full disk,
+    a reader that is gone), so that what was worked out is not lost.
+
+    Parameters
+    ----------
+    text : str
+        What was found.
+
+    Returns
+    -------
+    list of str
+        What could not be written, and why, for :func:`write`; empty where it was printed.
+    """
+    try:
+        typer.echo(text)
+        sys.stdout.flush()
+    except OSError as error:
+        typer.echo(text, err=True)
+        return [f"standard output ({error.strerror or error})"]
+    return []
+
+
+def write(
+    contents: Mapping[Path, str | bytes | Callable[[Path], object]], failed: Sequence[str] = ()
+) -> None:
     """Write every file, and say so; one that fails does not keep the others from being written.
 
     Parameters
     ----------
     contents : mapping of Path to str, bytes or callable
         What is to be in each file, or what writes it, given its path.
+    failed : sequence of str, optional
+        What could not be written before, and why.
 
     Raises
     ------
@@ -181,7 +210,7 @@ def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]]) -> No
     from pamrs._writing import write_atomically
     from pamrs.errors import NotWrittenError, ParameterError
 
-    failed: list[str] = []
+    failed = list(failed)
     refused: ParameterError | None = None
     for path, content in contents.items():
         try:

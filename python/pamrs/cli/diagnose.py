@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pamrs.cli._shared import check_packages, check_writable, exact, progress, rig_named, write
+from pamrs.cli._shared import (
+    check_packages,
+    check_writable,
+    exact,
+    progress,
+    rig_named,
+    tell,
+    write,
+)
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
@@ -112,8 +119,7 @@ def diagnose_command(
 
     with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded)
-    typer.echo(result.summary())
-    sys.stdout.flush()
+    failed = tell(result.summary())
     files: dict[Path | None, Callable[[Path], object]] = {
         json: result.to_json,
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
@@ -121,7 +127,7 @@ def diagnose_command(
         png: result.figure,
         report: result.report,
     }
-    write({path: how for path, how in files.items() if path is not None})
+    write({path: how for path, how in files.items() if path is not None}, failed)
 
 
 def _playable(result: Diagnosis, file: Path | None) -> Path | None:
@@ -189,6 +195,5 @@ def _plan(
     )
     with progress(f"planning for {loaded.name}"):
         result = plan_diagnosis(loaded, given, noise=noise)
-    typer.echo(result.text())
-    if json is not None:
-        write({json: dumps(result.to_dict(), indent=2) + "\n"})
+    failed = tell(result.text())
+    write({} if json is None else {json: dumps(result.to_dict(), indent=2) + "\n"}, failed)

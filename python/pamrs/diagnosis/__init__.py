@@ -35,9 +35,11 @@ from pamrs.diagnosis.prepare import (
     Prepared,
     available_blocks,
     averaged_to_need,
+    begun_alike,
     check_plausible,
     check_sense,
     prepare,
+    said_of_beginnings,
     suspected_units,
     without_copies,
     without_impossible,
@@ -226,7 +228,8 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    warnings = [*suspected, *copies, *masked, *held, *left_out, *diagnosis.warnings]
+    begun = said_of_beginnings(blocks, [*inner.recordings, *outer.recordings])
+    warnings = [*suspected, *copies, *masked, *held, *left_out, *begun, *diagnosis.warnings]
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(
@@ -312,7 +315,8 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
     channels, least = case.channels, settings.prepare.least_block_share
-    blocks = available_blocks(rig, channels, settings.prepare)
+    blocks, core = available_blocks(rig, channels, settings.prepare), core_rig(rig)
+    fitted, held = ([begun_alike(blocks, core, p) for p in part] for part in (fitted, held))
     thin = {b.name: share for b in blocks if (share := _usable_share(b, fitted)) < least}
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
@@ -326,7 +330,7 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block "
             f"of the rig ({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
-    inner = Problem(blocks, fitted, core_rig(rig), settings)
+    inner = Problem(blocks, fitted, core, settings)
     with _in_range(case.name):
         drowned = _drowned(inner, rig)
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
@@ -337,4 +341,5 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
         f"block {name} was left out: only {100 * share:.0f} % of its samples are usable"
         for name, share in thin.items()
     ]
-    return inner, replace(inner, recordings=held) if held else inner, [*left_out, *drowned.values()]
+    outer = replace(inner, recordings=held) if held else inner
+    return inner, outer, [*left_out, *drowned.values()]

@@ -143,10 +143,11 @@ def recordings_of(
     """
     source = str(log.path)
     channels = [_sampled(log, item, item.clock or clock, sample_time) for item in sources]
+    said = {item.channel: item.unit for item in sources}
     if cut is None:
         if pieces is not None:
             raise RecordingError(f"{source}: pieces = {list(pieces)!r} needs split")
-        return [_recording(name, role, channels, source, sample_time)]
+        return [_recording(name, role, channels, source, sample_time, said)]
     column = None
     if cut.column is not None:
         series = log.find(cut.column)
@@ -155,7 +156,7 @@ def recordings_of(
     found: list[Recording] = []
     for part in parts(channels, cut, column, pieces, source):
         label = f"{name}_{part.label}"
-        found.append(_recording(label, role, part.channels, source, sample_time))
+        found.append(_recording(label, role, part.channels, source, sample_time, said))
     return found
 
 
@@ -165,6 +166,7 @@ def _recording(
     channels: Sequence[Sampled],
     source: str,
     sample_time: float | None,
+    said: Mapping[str, str],
 ) -> Recording:
     first = channels[0].time
     alike = all(
@@ -174,7 +176,7 @@ def _recording(
         return on_one_clock(name, role, channels, source, sample_time)
     raw = {channel.name: channel.values for channel in channels}
     units = {channel.name: channel.unit for channel in channels}
-    return assemble(name, role, {"time": first, **raw}, units, [], source, sample_time)
+    return assemble(name, role, {"time": first, **raw}, units, [], source, sample_time, said)
 
 
 def _sampled(log: Log, item: Source, clock: Clock, sample_time: float | None) -> Sampled:

@@ -23,6 +23,7 @@ from pamrs.channels import UNITS, channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._faults import find_faults
+from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.table import Table, read_table, thousands_of
 from pamrs.units import parse_unit, to_si
 
@@ -378,8 +379,8 @@ def load_recording(
     wanted = _understood(_headings(table, columns, source), source)
     raw, units = _si_columns(table, wanted, source, thousands, decimal)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    recording = assemble(name or stem, role, raw, units, table.ragged, source, sample_time)
     said = {channel: unit for channel, (_, unit) in wanted.items() if channel != "time"}
+    recording = assemble(name or stem, role, raw, units, table.ragged, source, sample_time, said)
     return replace(recording, source=source, said=said)
 
 
@@ -502,6 +503,7 @@ def assemble(
     ragged: list[int],
     source: str,
     sample_time: float | None,
+    said: Mapping[str, str] | None = None,
 ) -> Recording:
     """A recording of channels that share one clock.
 
@@ -519,6 +521,8 @@ def assemble(
         The file, for messages.
     sample_time : float or None
         Spacing of the grid [s].
+    said : mapping of str to str, optional
+        The units that the file says, for what is said of impossible values.
 
     Returns
     -------
@@ -563,7 +567,8 @@ def assemble(
     masks: dict[str, Mask] = {}
     for channel, values in raw.items():
         if channel != "time":
-            laid = judged(channel, values[stamped][grid.rows], grid, source, issues)
+            own = (said or {}).get(channel, "")
+            laid = judged(channel, values[stamped][grid.rows], grid, source, issues, said=own)
             channels[channel], masks[channel] = laid
     issues.sort(key=lambda issue: (issue.start, issue.channel))
     units.pop("time", None)
@@ -571,7 +576,14 @@ def assemble(
 
 
 def judged(
-    channel: str, values: Array, grid: Grid, source: str, issues: list[Issue], *, held: bool = False
+    channel: str,
+    values: Array,
+    grid: Grid,
+    source: str,
+    issues: list[Issue],
+    *,
+    held: bool = False,
+    said: str = "",
 ) -> tuple[Array, Mask]:
     """One channel on the grid with its mask.
 
@@ -589,6 +601,9 @@ def judged(
         Gets what is wrong with it.
     held : bool
         Logged on change: staying equal is its nature, and no fault.
+    said : str
+        The unit that the file says; another one that fits is named where the values are not
+        possible.
 
     Returns
     -------
@@ -606,10 +621,11 @@ def judged(
     bad = int(impossible.sum())
     if bad > max(3, len(values) // 50):
         worst = float(values[impossible][0])
+        likely = "".join(f" {one.text}" for one in suspicions({channel: values}, {channel: said}))
         raise RecordingError(
             f"{source}: column {channel!r}: {worst:.6g} {limits.unit} and {bad - 1} more values "
             f"are not possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column "
-            "and unit?"
+            f"and unit?{likely}"
         )
     found: list[tuple[str, int, int, str]] = _runs(~usable, "nan", "no value")
     found += _runs(impossible, "outlier", "an impossible value")

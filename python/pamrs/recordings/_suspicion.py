@@ -133,14 +133,22 @@ def _other(values: Array | float, said: str, other: str) -> Array | float:
 
 
 def _fed_by(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[float, str] | None:
-    """The pressure that a channel is judged by, and what it is."""
-    rated = [
-        float(table["initial_pressure"])
-        for block, table in (rig.tables("supply") if rig else {}).items()
-        if channel_of(name) != "supply_pressure" or dotted("supply_pressure", block) == name
-    ]
-    if rated and max(rated) > 0.0:
-        return max(rated), "the supply of the rig file"
+    """The pressure that a channel is judged by, and what it is.
+
+    A regulator may be set to anything: its largest command says how far, and nothing does where
+    that was not recorded.
+    """
+    rated: list[tuple[float, str]] = []
+    for block, table in (rig.tables("supply") if rig else {}).items():
+        if channel_of(name) == "supply_pressure" and dotted("supply_pressure", block) != name:
+            continue
+        command = channels.get(dotted("supply_command", block))
+        if table["kind"] != "regulator":
+            rated.append((float(table["initial_pressure"]), "the supply of the rig file"))
+        elif command is not None:
+            rated.append((top_of(command), "the largest command of the regulator"))
+    if rated and max(rated)[0] > 0.0:
+        return max(rated)
     if channel_of(name) != "supply_pressure":
         tops = [top_of(v) for key, v in channels.items() if channel_of(key) == "supply_pressure"]
         if tops and max(tops) > 0.0:

@@ -11,7 +11,8 @@ use std::ops::Range;
 pub enum Block {
     /// Commands and the pressures it feeds to a supply's pressure.
     Supply(usize),
-    /// Commands, neighbouring pressures and the angles of its muscles to a chamber's pressure.
+    /// Commands, neighbouring pressures and the angles of its muscles to the pressure of a gas: a
+    /// chamber or, behind those, the inlet of a line.
     Chamber(usize),
     /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the
     /// muscle on a linear load.
@@ -22,9 +23,9 @@ pub enum Block {
 }
 
 impl Block {
-    /// The block of a name: `supply`, `chamber` or `arm` (`load` of a linear load), with the name
-    /// of the supply, chamber or joint behind it where it has one (`chamber.flexor`); `torque` of a
-    /// joint in the same way, `force` of a linear load.
+    /// The block of a name: `supply`, `chamber`, `line` (its inlet) or `arm` (`load` of a linear
+    /// load), with the name of the supply, chamber, line or joint behind it where it has one
+    /// (`chamber.flexor`); `torque` of a joint in the same way, `force` of a linear load.
     ///
     /// # Errors
     /// [`Error::Model`] for another name.
@@ -46,6 +47,9 @@ impl Block {
                 .enumerate()
                 .map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))),
         )
+        .chain(rig.wiring.inlets.iter().enumerate().map(|(k, (line, _))| {
+            (dotted("line", &spec.lines[*line].name), Self::Chamber(spec.chambers.len() + k))
+        }))
         .chain(joints.enumerate().map(|(k, name)| (name, Self::Arm(k))))
         .chain(pulls.enumerate().map(|(k, name)| (name, Self::Pull(k))));
         let blocks: Vec<_> = blocks.collect();

@@ -1,6 +1,7 @@
 //! Measured channels that drive blocks of a cut chain.
 
 use super::block::Block;
+use crate::description::dotted;
 use crate::plant::{Channel, Plant, Rig};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
@@ -81,6 +82,8 @@ pub struct Measured<'a> {
     pub(crate) held: usize,
     /// Place of the state and its signal.
     pub(crate) signals: Vec<(usize, Signal<'a>)>,
+    /// Places of states that nobody measured, and where they begin.
+    pub(crate) outlets: Vec<(usize, f64)>,
 }
 
 impl<'a> Measured<'a> {
@@ -139,7 +142,29 @@ impl<'a> Measured<'a> {
             signal.check(name, samples)?;
             places.push((place, *signal));
         }
-        Ok(Self { samples, commands: own, held, signals: places })
+        Ok(Self { samples, commands: own, held, signals: places, outlets: Vec::new() })
+    }
+
+    /// The same, with regulators whose outlet nobody measured beginning at these pressures [Pa,
+    /// gauge] and not at that of what they feed.
+    ///
+    /// # Errors
+    /// [`Error::Model`] for a supply that the rig does not have; [`Error::Parameter`] for a
+    /// pressure that is no number above a vacuum.
+    pub fn beginning(mut self, rig: &Rig, outlets: &[(&str, f64)]) -> Result<Self> {
+        for (name, pressure) in outlets {
+            let supplies = &rig.spec().supplies;
+            let Some(k) = supplies.iter().position(|s| dotted("supply", &s.name) == *name) else {
+                return Err(Error::Model(format!("no supply '{name}' in this rig")));
+            };
+            let absolute = pressure + rig.gas.ambient_pressure;
+            if !absolute.is_finite() || absolute <= 0.0 {
+                let allowed = "a finite pressure above a vacuum";
+                return Err(Error::parameter(format!("outlets.{name}"), *pressure, allowed));
+            }
+            self.outlets.push((rig.layout().supply(k), absolute));
+        }
+        Ok(self)
     }
 
     #[inline]

@@ -203,7 +203,9 @@ impl<'a, S: Number> Cut<'a, S> {
         // at rest what nobody measures of a regulator's outlet is what it feeds
         if let Some(fed) = self.block.output(layout) {
             for supply in unread(rig, self.block, self.measured) {
-                state[layout.supply(supply)] = state[fed];
+                let place = layout.supply(supply);
+                let told = self.measured.outlets.iter().find(|(outlet, _)| *outlet == place);
+                state[place] = told.map_or(state[fed], |(_, pressure)| constant(*pressure));
             }
         }
         for gas in 0..layout.gases {

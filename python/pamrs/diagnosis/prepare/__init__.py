@@ -6,12 +6,13 @@ Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_co
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
 recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed` (signals),
 `Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and
-their residuals).
+their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
+from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Residual,
@@ -40,6 +41,7 @@ __all__ = [
     "averaged",
     "averaged_to_need",
     "begun",
+    "begun_alike",
     "binned",
     "change",
     "check_plausible",
@@ -50,6 +52,7 @@ __all__ = [
     "predicted",
     "prepare",
     "residual",
+    "said_of_beginnings",
     "smoothed",
     "suspected_units",
     "without_copies",

@@ -58,11 +58,13 @@ class Block:
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber``, ``arm`` (of a hanging load too) or ``pull`` (what the muscles
-        put on a joint or a load): its name without that of the tank, chamber or joint.
+        """``supply``, ``chamber`` (the inlet of a line too), ``arm`` (of a hanging load too) or
+        ``pull`` (what the muscles put on a joint or a load): its name without that of the tank,
+        chamber or joint.
         """
         kind = self.name.partition(".")[0]
-        return {"load": "arm", "force": "pull", "torque": "pull"}.get(kind, kind)
+        alike = {"line": "chamber", "load": "arm", "force": "pull", "torque": "pull"}
+        return alike.get(kind, kind)
 
     @property
     def mechanical(self) -> bool:
@@ -79,7 +81,7 @@ _VALVE = (
     "vent_critical_ratio",
     "null_voltage",
 )
-_LINE = ("length", "diameter", "discharge_area")
+_LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _MUSCLE = ("modulus_scale",)
 _ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
@@ -87,10 +89,18 @@ _LOAD = ("mass", "viscous", "coulomb")
 _LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
 
 
+_PRESSURE = {
+    "supply": "supply_pressure",
+    "line": "line_pressure",
+    "chamber": "muscle_pressure",
+}
+"""Channel of what a gauge at a block reads."""
+
+
 @dataclass(frozen=True)
 class _Way:
-    """A valve or a line: its own full name, what it leads from and to (chambers and supplies in
-    full), the command that opens it.
+    """A valve or a line: its own full name, what it leads from and to (chambers, supplies and
+    inlets of lines with a gauge, in full), the command that opens it, the line behind it.
     """
 
     name: str
@@ -99,10 +109,13 @@ class _Way:
     between: tuple[str, ...]
 
 
-def _ways(rig: Rig) -> list[_Way]:
-    """Every way of the air, a valve and the line behind it being one."""
+def _ways(rig: Rig, has: frozenset[str]) -> list[_Way]:
+    """Every way of the air; a valve and the line behind it are one, unless a gauge stands between
+    them.
+    """
     valves, lines = rig.ports("valve"), rig.ports("line")
-    behind = {qualified("line", name): ends["to"] for name, ends in lines.items()}
+    cut = {n: not e["from"] and dotted("line_pressure", n) in has for n, e in lines.items()}
+    behind = {qualified("line", n): ends["to"] for n, ends in lines.items() if not cut[n]}
     found = []
     for name, ends in valves.items():
         line = (ends["to"],) if ends["to"] in behind else ()
@@ -116,9 +129,9 @@ def _ways(rig: Rig) -> list[_Way]:
             )
         )
     found += [
-        _Way(qualified("line", name), (ends["from"], ends["to"]), (), ())
+        _Way(qualified("line", name), (ends["from"] or qualified("line", name), ends["to"]), (), ())
         for name, ends in lines.items()
-        if ends["from"]
+        if ends["from"] or cut[name]
     ]
     return found
 
@@ -128,7 +141,8 @@ class _Map:
 
     def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
         self.settings = settings
-        self.rig, self.has, self.ways = rig, frozenset(channels), _ways(rig)
+        self.rig, self.has = rig, frozenset(channels)
+        self.ways = _ways(rig, self.has)
         self.angles = (
             ("length",)
             if rig.model["load"]
@@ -142,12 +156,12 @@ class _Map:
         }
 
     def pressure(self, block: str) -> str:
-        """Channel of a supply's or chamber's pressure by its full name."""
+        """Channel of the pressure of a supply, a chamber or a line's inlet by its full name."""
         kind, _, name = block.partition(".")
-        return dotted("supply_pressure" if kind == "supply" else "muscle_pressure", name)
+        return dotted(_PRESSURE[kind], name)
 
     def around(self, block: str) -> list[_Way]:
-        """The ways that begin or end at a supply or chamber."""
+        """The ways that begin or end at a supply, a chamber or a line's inlet."""
         return [way for way in self.ways if block in way.ends]
 
     def neighbours(self, block: str) -> tuple[str, ...]:
@@ -157,14 +171,8 @@ class _Map:
         others = [
             end for way in self.around(block) for end in way.ends if end not in (block, "ambient")
         ]
-        inlets = [
-            dotted("line_pressure", name.partition(".")[2])
-            for way in self.around(block)
-            for name in way.between
-        ]
         known = [end for end in others if self._unread(end, "constant", "regulator")]
-        wanted = [self.pressure(end) for end in others if end not in known]
-        return tuple(dict.fromkeys([*wanted, *(name for name in inlets if name in self.has)]))
+        return tuple(dict.fromkeys(self.pressure(end) for end in others if end not in known))
 
     def _unread(self, block: str, *kinds: str) -> bool:
         """Whether a block is a supply of one of these kinds whose pressure nobody measured."""
@@ -297,6 +305,35 @@ class _Map:
             ("supply",) if unread else (),
         )
 
+    def inlet(self, name: str) -> Block | None:
+        """The block of a valve alone: what it feeds into a line at whose inlet a gauge stands."""
+        full = qualified("line", name)
+        if self.pressure(full) not in self.has or not self.commands(full):
+            return None
+        unread = self.unread(full)
+        drives = (
+            *self.neighbours(full),
+            *self.commands(full),
+            *(dotted("supply_command", supply) for supply in unread),
+        )
+        if not {*drives, *self.angles} <= self.has:
+            return None
+        names = (
+            self.of_ways(full)
+            | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
+            | self.zeros(self.chambers_at(full), ())
+        )
+        return Block(
+            full,
+            self.pressure(full),
+            drives,
+            self.settings.chamber_window,
+            frozenset(names),
+            self.settings.gas_step,
+            ("regulator and valve" if unread else "valve and line inlet") + _called(name),
+            ("supply",) if unread else (),
+        )
+
     def arm(self, joint: str) -> Block | None:
         """The block of one joint: muscles' pressures to its angle."""
         drives = tuple(
@@ -360,14 +397,15 @@ def _called(name: str) -> str:
 
 
 def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
-    """The blocks that these channels can tell apart: supplies, chambers, then joints or the load,
-    each in the order of the rig file.
+    """The blocks that these channels can tell apart: supplies, inlets of lines, chambers, then
+    joints or the load, each in the order of the rig file.
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
-    measured channels next to it, with the baseline parameters of what it stands for; and so are
-    muscles whose force (or torque at a joint) is measured. A rig with joints or a load and without
-    valves and supplies is driven by the pressures of its muscles: these are given, and only what
-    they move is judged.
+    measured channels next to it, with the baseline parameters of what it stands for; so is a valve
+    where a gauge stands between it and the line behind it, beside the chamber, which is driven from
+    the valve on where that can be; and so are muscles whose force (or
+    torque at a joint) is measured. A rig with joints or a load and without valves and supplies is
+    driven by the pressures of its muscles: these are given, and only what they move is judged.
 
     Parameters
     ----------
@@ -383,8 +421,12 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     list of Block
     """
     have = _Map(rig, channels, settings)
+    # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
+    closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
+    whole = _Map(rig, closed, settings)
     found = [have.supply(name) for name in rig.tables("supply")]
-    found += [have.chamber(name) for name in rig.tables("chamber")]
+    found += [have.inlet(name) for name in rig.tables("line")]
+    found += [whole.chamber(name) or have.chamber(name) for name in rig.tables("chamber")]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
     found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
     found += [have.pull(name) for name in pulls_of(rig)]
@@ -453,14 +495,19 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
 
 def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
     """The smoothed channels, with the best that can be told where windows start of what a block
-    integrates (an arm: all joints).
+    integrates (an arm: all joints); inlets of lines only where the block is cut there.
     """
     state = [
         n
         for n in prepared.signals
         if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")
     ]
-    drives = {n: s for n, s in prepared.signals.items() if channel_of(n) in DRIVES}
+    around = {block.channel, *block.drives}
+    drives = {
+        n: s
+        for n, s in prepared.signals.items()
+        if channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around)
+    }
     return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
 
 
@@ -476,7 +523,9 @@ def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     return there
 
 
-def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
+def predicted(
+    block: Block, core: _core.Rig, prepared: Prepared, outlets: dict[str, float] | None = None
+) -> Array:
     """A block's output over a recording, every window from its measured start.
 
     Parameters
@@ -487,6 +536,9 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
         The compiled model.
     prepared : Prepared
         The recording.
+    outlets : dict of str to float, optional
+        Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
+        what they feed by default.
 
     Returns
     -------
@@ -504,6 +556,7 @@ def predicted(block: Block, core: _core.Rig, prepared: Prepared) -> Array:
         [],
         begun(block, prepared, starts),
         prepared.n,
+        outlets,
     )
     return prediction
 

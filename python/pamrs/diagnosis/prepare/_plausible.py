@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,9 +133,12 @@ def without_impossible(
         channels = dict(recording.channels)
         for name in recording.channels:
             low, high = limits.get(name, (-math.inf, math.inf))
-            if channel_of(name) in _PRESSURES:
+            if channel_of(name) in (*_PRESSURES, "supply_command"):
                 low, high = settings.least_gauge_pressure, settings.most_pressure
             bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
+            table = rig.tables("valve").get(name.partition(".")[2])
+            if channel_of(name) == "valve_command" and table is not None:
+                bad, low, high = _lost(channels[name], mask[name], table, settings)
             if bad.any():
                 mask[name] = mask[name] & ~bad
                 channels[name] = np.where(bad, np.nan, channels[name])
@@ -146,6 +150,30 @@ def without_impossible(
                 )
         found.append(replace(recording, mask=mask, channels=channels))
     return found, said
+
+
+def _lost(
+    values: Array, mask: NDArray[np.bool_], table: Mapping[str, Any], settings: PlausibilitySettings
+) -> tuple[NDArray[np.bool_], float, float]:
+    """Samples that a logger lost of a valve's command, and the range [V] beyond which they are.
+
+    A controller may ask for more than its valve can do, and comes there from the end of the range
+    or stays there by many values. What was lost is one value, entered from inside the range and
+    left to inside it.
+    """
+    span = settings.command_span * table["half_range"]
+    low, high = table["null_voltage"] - span, table["null_voltage"] + span
+    off = np.where(mask, values, table["null_voltage"]) - table["null_voltage"]
+    beyond, inside = np.abs(off) > span, np.abs(off) <= table["half_range"]
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(np.int8)))
+    runs = list(zip(edges[::2], edges[1::2], strict=True))
+    one = {float(values[a]) for a, _ in runs if a < values.size}
+    lost = len(one) <= 2 and all(
+        np.ptp(values[a:b]) == 0.0 and (a == 0 or inside[a - 1]) and (b == values.size or inside[b])
+        for a, b in runs
+    )
+    rare = float(np.mean(beyond)) <= settings.lost_command_share
+    return (beyond if lost and rare else np.zeros_like(beyond)), low, high
 
 
 def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
@@ -523,13 +551,16 @@ def _sense(
     """What would make the model's angle that of the recording: another unit, the other sign, two
     pressures in each other's place.
     """
-    rows = prepared.usable(block.channel, block.drives, [0])
+    starts = prepared.starts(block.window, block.drives)
+    rows = prepared.usable(block.channel, block.drives, starts)
+    if rows.sum() < 64:
+        return None
     measured, model = (
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
     quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
-    if rows.sum() < 64 or quiet or _misfit(measured, model) < settings.sense_wrong:
+    if quiet or _misfit(measured, model) < settings.sense_wrong:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]

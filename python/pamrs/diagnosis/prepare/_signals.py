@@ -53,6 +53,9 @@ class Prepared:
         Samples of the filter at each sample of a channel.
     settings : DiagnosisSettings
         What it was made ready by.
+    unsettled : dict of str to int
+        First samples of a channel that are not judged, since they show where something that nobody
+        measured began.
     """
 
     recording: Recording
@@ -63,6 +66,7 @@ class Prepared:
     noise: dict[str, float]
     lengths: dict[str, Lengths]
     settings: DiagnosisSettings
+    unsettled: dict[str, int] = field(default_factory=dict)
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
@@ -149,6 +153,7 @@ class Prepared:
         for a, b in zip(starts, [*starts[1:], self.n], strict=True):
             first = np.flatnonzero(bad[a:b])
             rows[a : a + (int(first[0]) if first.size else b - a)] = True
+        rows[: self.unsettled.get(output, 0)] = False
         return rows & self.recording.mask[output]
 
 

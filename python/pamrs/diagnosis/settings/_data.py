@@ -154,6 +154,15 @@ class PrepareSettings(SettingsGroup):
         ),
         origin="judgement",
     )
+    outlet_noises: float = setting(
+        0.3,
+        unit="noise levels",
+        above=0.0,
+        reason="how far the beginning of a regulator without a gauge, at the pressure of what it "
+        "feeds or at what it is set to, may move a sample that is judged; less than the noise, "
+        "since all samples of a beginning move the same way",
+        origin="docs/decisions/0092",
+    )
     arm_window: float = setting(
         2.5,
         unit="s",
@@ -465,6 +474,15 @@ class PlausibilitySettings(SettingsGroup):
         unit="half ranges",
         above=0.0,
         reason="distance of a command from its null beyond which it is another column or unit",
+        origin="judgement",
+    )
+    lost_command_share: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the time that a logger may lose a valve's command for; more is how the "
+        "controller is",
         origin="judgement",
     )
     command_time_share: float = setting(

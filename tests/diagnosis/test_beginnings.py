@@ -1,0 +1,100 @@
+"""Where a regulator without a gauge began: what depends on it is not judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import (
+    Block,
+    Prepared,
+    available_blocks,
+    begun_alike,
+    predicted,
+    prepare,
+    residual,
+)
+from pamrs.errors import PamrsError
+from pamrs.rig import Rig, parse_rig
+from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
+from tests.diagnosis.test_regulator import TEXT
+
+SETTINGS = DiagnosisSettings()
+RIG = parse_rig(TEXT)
+DT = 0.005
+FILLING = 3e5 + 2e5 * np.sin(2.0 * np.arange(0.0, 6.0, DT))
+
+
+def made(rig: Rig, command: np.ndarray, outlet: float, chamber: float) -> tuple[Block, Prepared]:
+    """The chamber of a log that begins with these pressures, the outlet having no gauge."""
+    start = {"supply_pressure": outlet, "muscle_pressure": chamber}
+    run = pamrs.simulate(rig, supply_command=command, sample_time=DT, initial=start)
+    channels = {"supply_command": command, "muscle_pressure": run["muscle_pressure"]}
+    one = noisy("lift", "fit", DT, channels, {"muscle_pressure": 400.0}, [3])
+    (block,) = available_blocks(rig, tuple(channels), SETTINGS.prepare)
+    return block, prepare(one, rig, SETTINGS)
+
+
+@pytest.mark.parametrize("outlet", [0.0, 1.5e5, 3e5])
+def test_what_shows_the_unknown_beginning_is_not_judged(outlet: float) -> None:
+    """A stopcock is opened as the log begins, or the set pressure jumps: whatever the regulator's
+    outlet is, a true model leaves noise.
+    """
+    core = core_rig(RIG)
+    block, prepared = made(RIG, FILLING, outlet, 0.0)
+    kept = begun_alike([block], core, prepared)
+    before, after = (residual(block, core, p, []) for p in (prepared, kept))
+    assert 0.3 < kept.unsettled["muscle_pressure"] * DT < 1.5
+    assert not after.rows[: kept.unsettled["muscle_pressure"]].any()
+    assert np.array_equal(after.rows[400:], before.rows[400:])
+    assert np.std(after.value[after.rows]) < 1.1 * after.noise
+    if outlet > 0.0:
+        assert np.std(before.value[before.rows]) > 5.0 * before.noise
+
+
+def test_a_log_that_begins_at_rest_loses_nothing() -> None:
+    command = np.repeat([2e5, 4e5, 3e5], 400)
+    block, prepared = made(RIG, command, 2e5, 2e5)
+    kept = begun_alike([block], core_rig(RIG), prepared)
+    assert kept.unsettled.get("muscle_pressure", 0) * DT < 0.3
+
+
+def test_a_supply_with_a_gauge_begins_where_it_was_measured() -> None:
+    run = pamrs.simulate(RIG, supply_command=FILLING, sample_time=DT)
+    channels = {"supply_command": FILLING}
+    channels |= {n: run[n] for n in ("supply_pressure", "muscle_pressure")}
+    noise = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
+    one = noisy("lift", "fit", DT, channels, noise, [3])
+    blocks = available_blocks(RIG, tuple(channels), SETTINGS.prepare)
+    assert begun_alike(blocks, core_rig(RIG), prepare(one, RIG, SETTINGS)).unsettled == {}
+
+
+def test_outlets_are_those_of_supplies_and_above_a_vacuum() -> None:
+    core = core_rig(RIG)
+    block, prepared = made(RIG, FILLING, 3e5, 0.0)
+    far, near = (predicted(block, core, prepared, {"supply": p}) for p in (3e5, 0.0))
+    assert far[20] - near[20] > 1e4
+    for wrong in ({"tank": 1e5}, {"supply": -2e5}, {"supply": float("nan")}):
+        with pytest.raises(PamrsError):
+            predicted(block, core, prepared, wrong)
+
+
+def test_a_diagnosis_says_what_it_did_not_judge() -> None:
+    recordings = []
+    for seed, role in enumerate(("fit", "fit", "held_out")):
+        command = FILLING + 1e5 * np.sin(3.1 * seed + 7.0 * np.arange(0.0, 6.0, DT))
+        _, prepared = made(RIG, command, float(command[0]), 0.0)
+        recordings.append(replace(prepared.recording, name=f"r{seed}", role=role))
+    found = pamrs.diagnose(pamrs.Case("lifts", RIG, recordings, Path()))
+    assert found.verdict == "none"
+    (told,) = (text for text in found.warnings if "were not judged" in text)
+    assert "block chamber: the first 0." in told
+    assert "of r0, " in told
+    assert "of r2" in told
+    assert "a gauge for supply_pressure would" in told

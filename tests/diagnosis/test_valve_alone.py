@@ -1,0 +1,116 @@
+"""A gauge between valve and line: the valve is a block of its own, beside the chamber."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.fit import acts_in
+from pamrs.diagnosis.prepare import available_blocks, prepare, residual
+from pamrs.recordings import Recording
+from pamrs.rig import Rig, load_rig
+from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
+
+SETTINGS = DiagnosisSettings()
+RIG = load_rig(Path(__file__).parents[2] / "cases" / "layouts" / "eight_metres.toml")
+NOISE = {"supply_pressure": 400.0, "line_pressure": 400.0, "muscle_pressure": 400.0}
+CHANNELS = ("valve_command", *NOISE)
+
+
+def recorded(true: Rig, role: str, seed: int) -> Recording:
+    """Steps of the valve, twelve seconds at 200 Hz."""
+    rng = np.random.default_rng(seed)
+    command = np.repeat(rng.uniform(1.0, 9.0, 24), 100)
+    run = pamrs.simulate(true, valve_command=command, sample_time=0.005)
+    channels = {"valve_command": command} | {name: run[name] for name in NOISE}
+    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [5, seed])
+
+
+def test_every_gauge_is_a_boundary() -> None:
+    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
+    assert list(blocks) == ["supply", "line", "chamber"]
+    assert set(blocks["supply"].drives) == {"line_pressure", "valve_command"}
+    assert set(blocks["line"].drives) == {"supply_pressure", "muscle_pressure", "valve_command"}
+    assert set(blocks["chamber"].drives) == {"supply_pressure", "valve_command"}
+    assert blocks["line"].covers == "valve and line inlet"
+    assert blocks["chamber"].covers == "valve, line and chamber"
+    assert "valve.vent_conductance" in blocks["line"].parameters
+    assert "line.inlet_volume" in blocks["line"].parameters
+    assert "valve.vent_conductance" in blocks["chamber"].parameters
+    assert "line.diameter" in blocks["line"].parameters & blocks["chamber"].parameters
+    assert "chamber.dead_volume" not in blocks["line"].parameters
+    assert acts_in("valve_dead_zone", blocks["line"])
+    assert not acts_in("muscle_hysteresis", blocks["line"])
+
+
+def test_the_inlet_drives_the_chamber_where_the_valve_cannot() -> None:
+    lacking = ("valve_command", "line_pressure", "muscle_pressure")  # a tank without a gauge
+    (chamber,) = available_blocks(RIG, lacking, SETTINGS.prepare)
+    assert (chamber.name, chamber.drives) == ("chamber", ("line_pressure",))
+    assert chamber.covers == "line and chamber"
+    assert "valve.vent_conductance" not in chamber.parameters
+    prepared = prepare(recorded(RIG, "fit", 0), RIG, SETTINGS)
+    left = residual(chamber, core_rig(RIG), prepared, [])
+    assert np.std(left.value[left.rows]) < 2.0 * left.noise
+
+
+def test_without_that_gauge_valve_and_line_are_one() -> None:
+    without = tuple(name for name in CHANNELS if name != "line_pressure")
+    blocks = {b.name: b for b in available_blocks(RIG, without, SETTINGS.prepare)}
+    assert list(blocks) == ["supply", "chamber"]
+    assert set(blocks["chamber"].drives) == {"supply_pressure", "valve_command"}
+    assert blocks["chamber"].covers == "valve, line and chamber"
+
+
+@pytest.mark.parametrize(
+    ("wrong", "seen"),
+    [
+        ({"valve.vent_conductance": 3.9e-9}, {"supply": False, "line": True, "chamber": True}),
+        ({"valve.fill_conductance": 3.9e-9}, {"supply": True, "line": True, "chamber": True}),
+        ({"chamber.dead_volume": 6e-4}, {"supply": False, "line": False, "chamber": True}),
+        ({"line.diameter": 3.2e-3}, {"supply": False, "line": True, "chamber": True}),
+        ({}, {"supply": False, "line": False, "chamber": False}),
+    ],
+)
+def test_what_is_wrong_shows_between_its_gauges(
+    wrong: dict[str, float], seen: dict[str, bool]
+) -> None:
+    prepared = prepare(recorded(RIG.with_parameters(wrong), "fit", 0), RIG, SETTINGS)
+    for block in available_blocks(RIG, CHANNELS, SETTINGS.prepare):
+        left = residual(block, core_rig(RIG), prepared, [])
+        ratio = float(np.std(left.value[left.rows])) / left.noise
+        assert (ratio > 2.0) == seen[block.name], (block.name, ratio)
+
+
+def test_sensitivities_of_the_inlet_are_those_of_differences() -> None:
+    prepared = prepare(recorded(RIG, "fit", 0), RIG, SETTINGS)
+    block = available_blocks(RIG, CHANNELS, SETTINGS.prepare)[1]
+    for name in ("valve.vent_conductance", "line.diameter", "line.inlet_volume"):
+        value = RIG.parameter(name).value
+        slope = residual(block, core_rig(RIG), prepared, [name]).jacobian
+        assert slope is not None
+        low, high = (
+            residual(
+                block, core_rig(RIG.with_parameters({name: value * f})), prepared, [name]
+            ).value
+            for f in (1.0 - 1e-4, 1.0 + 1e-4)
+        )
+        wanted = -(high - low) / (2e-4 * value)
+        size = float(np.abs(wanted).max())
+        np.testing.assert_allclose(slope[:, 0], wanted, atol=2e-2 * size)
+
+
+def test_a_small_leak_behind_the_line_is_named() -> None:
+    """From one gauge to the other it is some pascals: only what it adds up to tells it."""
+    true = RIG.with_effect("leak_muscle")
+    roles = ("fit", "fit", "held_out")
+    recordings = [recorded(true, role, seed) for seed, role in enumerate(roles)]
+    found = pamrs.diagnose(pamrs.Case("tube", RIG, recordings, Path()))
+    assert [e.id for e in found.effects] == ["leak_muscle"]
+    assert found.effects[0].probability > 0.8
+    assert found.where["block"] == "chamber"
