@@ -46,7 +46,7 @@ def test_what_is_kept_is_what_a_whole_run_has(name):
 
 
 def test_a_prescribed_pressure_needs_no_sums():
-    rig = pamrs.rigs.bench(pamrs.muscles.pam_a())
+    rig = pamrs.rigs.bench(pamrs.rigs.shoulder().muscle)
     pressure = 2e5 + 1e5 * np.sin(8.0 * SAMPLE * np.arange(ROWS))
     length = np.full(ROWS, rig.model["muscle"]["rest_length"])
     drive = {"sample_time": SAMPLE, "pressure": pressure, "length": length}
