@@ -50,8 +50,8 @@ def test_a_prescribed_pressure_needs_no_sums():
     pressure = 2e5 + 1e5 * np.sin(8.0 * SAMPLE * np.arange(ROWS))
     length = np.full(ROWS, rig.model["muscle"]["rest_length"])
     drive = {"sample_time": SAMPLE, "pressure": pressure, "length": length}
-    whole, kept = pamrs.simulate(rig, **drive), pamrs.simulate(rig, **drive, record=["force"])
-    np.testing.assert_array_equal(kept["force"], whole["force"])
+    whole, kept = pamrs.simulate(rig, **drive), pamrs.simulate(rig, **drive, record=["muscle_force"])
+    np.testing.assert_array_equal(kept["muscle_force"], whole["muscle_force"])
 
 
 def test_a_run_of_some_channels_says_what_it_lacks():
