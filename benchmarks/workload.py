@@ -35,8 +35,9 @@ class Shoulder:
         self.steps = (samples - 1) * peers.STEPS
 
     def ours(self, step: float = STEP) -> Array:
-        """Joint angle of one run in steps no longer than one [s], by the package [rad]; it keeps the
-        four states that the peers keep.
+        """Joint angle of one run in steps no longer than one [s], by the package [rad].
+
+        It keeps the four states that the peers keep.
         """
         run = pamrs.simulate(
             self.rig,

@@ -2,7 +2,9 @@
 
 import errno
 import os
+import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -152,6 +154,28 @@ def test_the_text_is_not_lost_with_standard_output(capsys, tmp_path, monkeypatch
     assert "verdict: none\n" in err
     assert f"not written: standard output ({os.strerror(code)})" in err
     assert json.read_text(encoding="utf-8") == "{}\n"
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is needed")
+@pytest.mark.parametrize("both", [False, True])
+def test_a_full_disk_behind_standard_output_gives_its_own_exit_code(tmp_path, both):
+    """The buffer that could not be written must not fail again as the process ends."""
+    code = (
+        "import sys; from pathlib import Path; from pamrs.cli import _shared; from pamrs.errors "
+        "import NotWrittenError\n"
+        "try: _shared.write({Path(sys.argv[1]): 'kept'}, _shared.tell('told'))\n"
+        "except NotWrittenError: sys.exit(4)"
+    )
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path / "a.txt")],
+            stdout=full,
+            stderr=full if both else subprocess.PIPE,
+            check=False,
+        )
+    assert done.returncode == 4
+    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "kept"
+    assert both or b"told" in done.stderr
 
 
 def test_a_package_that_is_broken_is_named(capsys, tmp_path, monkeypatch, diagnosed):

@@ -45,12 +45,33 @@ def test_what_is_kept_is_what_a_whole_run_has(name):
             np.testing.assert_array_equal(kept[channel], whole[channel], err_msg=channel)
 
 
+@pytest.mark.parametrize("record", [[], ["joint_angle"], ["joint_torque"]])
+def test_a_run_of_one_row(record):
+    run = pamrs.simulate(pamrs.rigs.shoulder(), [5.0], sample_time=SAMPLE, record=record)
+    assert [values.size for values in run.values()] == [1] * (2 + len(record))
+
+
+def test_a_run_that_leaves_the_curves_keeps_the_same():
+    """An arm thrown beyond its stop goes on by the equations of the blocks."""
+    rig = pamrs.rigs.shoulder()
+    drive = {"sample_time": SAMPLE, "initial": {"joint_rate": 30.0}}
+    whole = pamrs.simulate(rig, np.full(ROWS, 6.0), **drive)
+    kept = pamrs.simulate(rig, np.full(ROWS, 6.0), **drive, record=STATES)
+    low, high = (rig.model["joint"][end] for end in ("min_angle", "max_angle"))
+    assert whole["joint_angle"].max() > high + 0.25 * (high - low)
+    for channel in STATES:
+        np.testing.assert_array_equal(kept[channel], whole[channel])
+
+
 def test_a_prescribed_pressure_needs_no_sums():
     rig = pamrs.rigs.bench(pamrs.rigs.shoulder().muscle)
     pressure = 2e5 + 1e5 * np.sin(8.0 * SAMPLE * np.arange(ROWS))
     length = np.full(ROWS, rig.model["muscle"]["rest_length"])
     drive = {"sample_time": SAMPLE, "pressure": pressure, "length": length}
-    whole, kept = pamrs.simulate(rig, **drive), pamrs.simulate(rig, **drive, record=["muscle_force"])
+    whole, kept = (
+        pamrs.simulate(rig, **drive),
+        pamrs.simulate(rig, **drive, record=["muscle_force"]),
+    )
     np.testing.assert_array_equal(kept["muscle_force"], whole["muscle_force"])
 
 
@@ -69,5 +90,5 @@ def test_a_run_of_some_channels_says_what_it_lacks():
     [("joint_angle", "record = 'joint_angle'"), (["angle"], "'angle' is not a channel; there are")],
 )
 def test_what_is_no_channel_is_refused(record, message):
-    with pytest.raises(pamrs.PamrsError, match=message):
+    with pytest.raises((pamrs.ParameterError, pamrs.RigError), match=message):
         pamrs.simulate(pamrs.rigs.shoulder(), [5.0, 5.0], sample_time=SAMPLE, record=record)

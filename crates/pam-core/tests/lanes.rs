@@ -128,7 +128,7 @@ fn neighbours_and_threads_change_no_bit() {
     let mut single = request(&rig, 150, &signals, vec![("arm.payload", &payload)]);
     single.threads = 1;
     assert_eq!(whole, run(&rig, &single));
-    for plant in [0, 7, 63, 64, 149] {
+    for plant in [0, 7, 31, 32, 64, 149] {
         let own = [payload[plant]];
         let alone = run(&rig, &request(&rig, 1, &signals, vec![("arm.payload", &own)]));
         for (alone, whole) in alone.recorded.iter().zip(&whole.recorded) {

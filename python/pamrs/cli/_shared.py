@@ -4,6 +4,8 @@ progress.
 
 from __future__ import annotations
 
+import contextlib
+import os
 import re
 import sys
 import time
@@ -183,7 +185,14 @@ def tell(text: str) -> list[str]:
         typer.echo(text)
         sys.stdout.flush()
     except OSError as error:
-        typer.echo(text, err=True)
+        with contextlib.suppress(
+            OSError, ValueError
+        ):  # what is left would be tried again at the end
+            nowhere = os.open(os.devnull, os.O_WRONLY)
+            os.dup2(nowhere, sys.stdout.fileno())
+            os.close(nowhere)
+        with contextlib.suppress(OSError):
+            typer.echo(text, err=True)
         return [f"standard output ({error.strerror or error})"]
     return []
 
@@ -224,7 +233,8 @@ def write(
             why = getattr(error, "strerror", None) or str(error) or type(error).__name__
             failed.append(f"{path} ({why})")
         else:
-            typer.echo(f"written: {path}", err=True)
+            with contextlib.suppress(OSError):
+                typer.echo(f"written: {path}", err=True)
     if refused is not None:
         raise refused
     if failed:

@@ -317,13 +317,19 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
     channels, least = case.channels, settings.prepare.least_block_share
     blocks, core = available_blocks(rig, channels, settings.prepare), core_rig(rig)
     fitted, held = ([begun_alike(blocks, core, p) for p in part] for part in (fitted, held))
-    thin = {b.name: share for b in blocks if (share := _usable_share(b, fitted)) < least}
+    thin = {
+        b.name: share
+        for b in blocks
+        if (share := min(_usable_share(b, part) for part in (fitted, held) if part)) < least
+    }
+    begun = said_of_beginnings([b for b in blocks if b.name in thin], [*fitted, *held])
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
         raise DiagnosisError(
-            f"case {case.name!r}: holes leave too few usable samples in every block ("
+            f"case {case.name!r}: too few samples are usable in every block ("
             + ", ".join(f"{name}: {100 * share:.0f} %" for name, share in thin.items())
             + f"); at least {100 * least:.0f} % are needed"
+            + "".join(f"; {told}" for told in begun)
         )
     if not blocks:
         raise DiagnosisError(
@@ -342,4 +348,4 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
         for name, share in thin.items()
     ]
     outer = replace(inner, recordings=held) if held else inner
-    return inner, outer, [*left_out, *drowned.values()]
+    return inner, outer, [*left_out, *begun, *drowned.values()]

@@ -164,13 +164,10 @@ impl<S: Simd, const R: usize> Num<S, R> {
         Mask { simd: self.simd, lanes }
     }
 
-    /// One number where this one is finite and between two others, another where it is not.
+    /// One number where this one is between two others, another where it is not, or no number.
     #[inline(always)]
     pub fn inside(self, low: Self, high: Self, yes: Self, no: Self) -> Self {
-        // what is no number, or infinite, has no difference to itself
-        let finite = (self - self).at_most(self.constant(0.0));
-        let above = low.at_most(self).select(yes, no);
-        finite.select(self.at_most(high).select(above, no), no)
+        self.at_most(high).select(low.at_most(self).select(yes, no), no)
     }
 
     /// Where this is less.

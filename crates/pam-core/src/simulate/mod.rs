@@ -222,7 +222,8 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
     Ok(())
 }
 
-/// Simulated channels in the order of [`crate::plant::Names::channels`], one row per sample; row 0
+/// Simulated channels, all in the order of [`crate::plant::Names::channels`] or those that are
+/// wanted in theirs, one row per sample; row 0
 /// is the initial state. SI, pressures gauge and as the sensors read them (zeros included). And
 /// what happened on the way.
 #[derive(Debug, Clone, PartialEq)]
@@ -259,6 +260,9 @@ impl Trajectory {
     /// The channel of a name, where all are kept.
     #[must_use]
     pub fn get(&self, rig: &Rig, name: &str) -> Option<&[f64]> {
+        if self.wanted.is_some() {
+            return None;
+        }
         let k = rig.names.channels.iter().position(|(n, _)| n == name)?;
         self.channels.get(k).map(Vec::as_slice)
     }
@@ -593,6 +597,7 @@ impl Progress {
         out: &mut Trajectory,
         look: &mut dyn FnMut() -> Result<()>,
     ) -> Result<()> {
+        debug_assert_eq!(self.state.len(), run.stepper.plant.states(), "sums as the run has them");
         run.prescribe(drive);
         for k in samples {
             let happened = out.events.len();

@@ -51,7 +51,7 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
 
 def _remembered(block: Block, core: _core.Rig, prepared: Prepared) -> int:
     """Samples up to the last one that shows where the regulators of a block began."""
-    commands = [name for name in block.drives if name.partition(".")[0] == "supply_command"]
+    commands = _set(block)
     outlets = {
         qualified("supply", name.partition(".")[2]): max(0.0, float(prepared.held[name][0]))
         for name in commands
@@ -63,6 +63,11 @@ def _remembered(block: Block, core: _core.Rig, prepared: Prepared) -> int:
     most = prepared.settings.prepare.outlet_noises * prepared.noise[block.channel]
     seen = np.flatnonzero(np.abs(apart) > most)
     return int(seen[-1]) + 1 if seen.size else 0
+
+
+def _set(block: Block) -> list[str]:
+    """Commands of the regulators that a block is driven by."""
+    return [name for name in block.drives if name.partition(".")[0] == "supply_command"]
 
 
 def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
@@ -88,7 +93,8 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             told = ", ".join(
                 f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in own
             )
-            what = dotted("supply_pressure", block.name.partition(".")[2])
+            regulators = [d.partition(".")[2] for d in _set(block)]
+            what = " or ".join(dotted("supply_pressure", name) for name in regulators)
             said.append(
                 f"block {block.name}: the first {told} were not judged: they show where the "
                 f"regulator began, and nobody measured that (a gauge for {what} would)"

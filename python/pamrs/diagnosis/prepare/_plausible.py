@@ -33,6 +33,8 @@ Array = NDArray[np.float64]
 
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
 _DEGREES = 180.0 / math.pi
+#: Quantile of a command that counts as its largest value: a logger's spikes are above.
+_HIGHEST = 0.995
 _TOLD = 12
 """Findings that a message lists."""
 
@@ -167,10 +169,18 @@ def _lost(
     beyond, inside = np.abs(off) > span, np.abs(off) <= table["half_range"]
     edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(np.int8)))
     runs = list(zip(edges[::2], edges[1::2], strict=True))
-    one = {float(values[a]) for a, _ in runs if a < values.size}
-    lost = len(one) <= 2 and all(
-        np.ptp(values[a:b]) == 0.0 and (a == 0 or inside[a - 1]) and (b == values.size or inside[b])
-        for a, b in runs
+    one = {float(values[a]) for a, _ in runs}
+    # a controller at its ends asks for as much on both sides
+    ends = len(one) == 2 and np.ptp([abs(value - table["null_voltage"]) for value in one]) == 0.0
+    lost = (
+        len(one) <= 2
+        and not ends
+        and all(
+            np.ptp(values[a:b]) == 0.0
+            and (a == 0 or inside[a - 1])
+            and (b == values.size or inside[b])
+            for a, b in runs
+        )
     )
     rare = float(np.mean(beyond)) <= settings.lost_command_share
     return (beyond if lost and rare else np.zeros_like(beyond)), low, high
@@ -255,14 +265,15 @@ def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | 
     """About the highest pressure [Pa gauge] that a supply should have, and the command that says
     so; no command where the rig file does.
 
-    A regulator may be set to anything: its largest command tells; None where it was not recorded.
+    A regulator may be set to anything: its largest command tells, but for spikes; None where it was
+    not recorded.
     """
     table = rig.tables("supply")[supply]
     if table["kind"] != "regulator":
         return float(table["initial_pressure"]), ""
     command = dotted("supply_command", supply)
     known = _values(recording, command)
-    return (float(known.max()), command) if known.size else None
+    return (float(np.quantile(known, _HIGHEST)), command) if known.size else None
 
 
 def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
