@@ -158,8 +158,8 @@ impl<S: Simd, const R: usize> Num<S, R> {
     #[inline(always)]
     fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S, R> {
         let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); R];
-        for k in 1..R {
-            lanes[k] = of(self.simd, self.lanes[k], other.lanes[k]);
+        for (k, mask) in lanes.iter_mut().enumerate().skip(1) {
+            *mask = of(self.simd, self.lanes[k], other.lanes[k]);
         }
         Mask { simd: self.simd, lanes }
     }

@@ -44,9 +44,7 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
             let zero = before[0].constant(0.0);
             let mut known = [[zero; SMALL]; 4];
             let [start, stage, next, sum] = &mut known;
-            for place in 0..states {
-                start[place] = before[place];
-            }
+            start[..states].copy_from_slice(&before[..states]);
             let room = Stages { start, stage, next, sum };
             room.step(wide, shape, lanes, &mut state[..states], step);
         } else {
@@ -89,13 +87,10 @@ impl<S: Simd, const R: usize> Stages<'_, S, R> {
             (stage[place], next[place], sum[place]) = (start[place], start[place], zero);
         }
         // The rates stand here once: they are much code, compiled for each kind of register.
-        for k in 0..STAGES.len() {
-            let (weight, ahead) = STAGES[k];
+        for (k, (weight, ahead)) in STAGES.into_iter().enumerate() {
             let slopes = Slopes { start, sum, next, weight, ahead: ahead * step, first: k == 0 };
             lanes.rates(wide, shape, stage, slopes);
-            for place in 0..shape.states() {
-                stage[place] = next[place];
-            }
+            stage[..shape.states()].copy_from_slice(&next[..shape.states()]);
         }
         for place in 0..shape.states() {
             out[place] = sum[place].times_plus(step / 6.0, start[place]);
