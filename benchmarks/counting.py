@@ -18,6 +18,7 @@ import numpy as np
 import pamrs
 
 from . import peers
+from .workload import KEPT
 from .peers import shoulder_scipy
 
 __all__ = ["WEIGHTS", "Work", "work_of_a_step"]
@@ -37,7 +38,7 @@ class Work:
     flops: float
     #: Read from the table, which stays in the nearest cache.
     table_bytes: float
-    #: Commands read and rows written, of a run that keeps all of its channels.
+    #: Commands read and rows written, of a run that keeps what the peers keep.
     stream_bytes: float
 
 
@@ -140,10 +141,9 @@ def work_of_a_step(rig: pamrs.Rig, samples: int = 401) -> Work:
     # stages y + h k three times; k1 + 2 k2 + 2 k3 + k4, times h/6, added to y
     step["+"] += STATES * (3 + 3 + 1)
     step["*"] += STATES * (3 + 2 + 1)
-    row = 8.0 * len(list(run.keys()))
     return Work(
         operations=step,
         flops=sum(WEIGHTS[kind] * count for kind, count in step.items()),
         table_bytes=4.0 * 8.0 * (DEGREE + 1) * COLUMNS,
-        stream_bytes=(8.0 + row) / peers.STEPS,
+        stream_bytes=8.0 * (1 + len(KEPT)) / peers.STEPS,
     )

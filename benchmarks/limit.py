@@ -50,7 +50,7 @@ def limit(repeats: int) -> Limit:
     times = race({"one": shoulder.ours, "batch": batches.ours(1)}, repeats)
     # a batch that is reduced keeps its states in registers and caches: nothing streams
     ways = [
-        ("one run, all channels kept", times["one"].min() / shoulder.steps, work.stream_bytes),
+        ("one run, four states kept", times["one"].min() / shoulder.steps, work.stream_bytes),
         (f"{BATCH} plants, reduced", times["batch"].min() / shoulder.steps / BATCH, 0.0),
     ]
     shares = [

@@ -117,7 +117,8 @@ def goal_part(goals: list[Goal], repeats: int) -> str:
             f"Works take turns, {repeats} times; times are medians, and the ratio (peer over "
             "pamrs) is the median of the ratios of all turns. `apart` is the largest difference "
             f"of the last joint angles; more than {ALLOWED:g} deg would not be the same result. "
-            "SciPy chooses its own steps. Lines without a goal are for comparison.",
+            "SciPy chooses its own steps. One run keeps the four states that the peers keep, a batch "
+            "its last angles. Lines without a goal are for comparison.",
             table(header, rows),
         ]
     )
@@ -200,7 +201,7 @@ def limit_part(limit: Limit) -> str:
             "and power are weighted with about the length of their polynomials.",
             table(("operation", "in one step", "counted as"), counts),
             f"That is {work.flops:.0f} flop. The table is read for {work.table_bytes:.0f} B a step "
-            "out of the nearest cache; a run that keeps all channels streams "
+            "out of the nearest cache; a run that keeps four states streams "
             f"{work.stream_bytes:.3g} B a step, one that is reduced none. A core does "
             f"{limit.peak_flops / 1e9:.3g} Gflop/s in a matrix product and moves "
             f"{limit.peak_bytes / 1e9:.3g} GB/s in a triad, both measured in this run. So "

@@ -14,12 +14,14 @@ import pamrs
 
 from . import peers
 
-__all__ = ["BATCH", "SAMPLES", "Batches", "Shoulder", "apart"]
+__all__ = ["BATCH", "KEPT", "SAMPLES", "Batches", "Shoulder", "apart"]
 
 Array = NDArray[np.float64]
 SAMPLES = 401  # 2 s
 BATCH = 512
 STEP = peers.SAMPLE_TIME / peers.STEPS
+#: Channels that one run keeps: the states that the peers keep.
+KEPT = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
 #: Payloads of the batches, lightest and heaviest [kg].
 PAYLOADS = (0.0, 20.0)
 
@@ -44,7 +46,7 @@ class Shoulder:
             self.command,
             sample_time=peers.SAMPLE_TIME,
             step=step,
-            record=("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate"),
+            record=KEPT,
         )
         return run["joint_angle"]
 
