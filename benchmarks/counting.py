@@ -18,8 +18,8 @@ import numpy as np
 import pamrs
 
 from . import peers
-from .workload import KEPT
 from .peers import shoulder_scipy
+from .workload import KEPT
 
 __all__ = ["WEIGHTS", "Work", "work_of_a_step"]
 

@@ -117,8 +117,8 @@ def goal_part(goals: list[Goal], repeats: int) -> str:
             f"Works take turns, {repeats} times; times are medians, and the ratio (peer over "
             "pamrs) is the median of the ratios of all turns. `apart` is the largest difference "
             f"of the last joint angles; more than {ALLOWED:g} deg would not be the same result. "
-            "SciPy chooses its own steps. One run keeps the four states that the peers keep, a batch "
-            "its last angles. Lines without a goal are for comparison.",
+            "SciPy chooses its own steps. One run keeps the four states that the peers keep, a "
+            "batch its last angles. Lines without a goal are for comparison.",
             table(header, rows),
         ]
     )
