@@ -33,8 +33,6 @@ Array = NDArray[np.float64]
 
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
 _DEGREES = 180.0 / math.pi
-#: Quantile of a command that counts as its largest value: a logger's spikes are above.
-_HIGHEST = 0.995
 _TOLD = 12
 """Findings that a message lists."""
 
@@ -218,7 +216,7 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
     rated = {
         dotted("supply_pressure", supply): told
         for supply in rig.tables("supply")
-        if (told := _set_to(recording, rig, supply)) is not None
+        if (told := _set_to(recording, rig, supply, settings)) is not None
     }
     largest = max(
         [
@@ -261,7 +259,9 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
                 )
 
 
-def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
+def _set_to(
+    recording: Recording, rig: Rig, supply: str, settings: PlausibilitySettings
+) -> tuple[float, str] | None:
     """About the highest pressure [Pa gauge] that a supply should have, and the command that says
     so; no command where the rig file does.
 
@@ -273,7 +273,7 @@ def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | 
         return float(table["initial_pressure"]), ""
     command = dotted("supply_command", supply)
     known = _values(recording, command)
-    return (float(np.quantile(known, _HIGHEST)), command) if known.size else None
+    return (float(np.quantile(known, settings.command_quantile)), command) if known.size else None
 
 
 def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
@@ -321,7 +321,7 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
         for supply in supplies:
             if name not in recording.channels:
                 continue
-            highest = _highest(recording, rig, supply)
+            highest = _highest(recording, rig, supply, settings)
             if highest is None:
                 continue
             source, rows, limit = highest
@@ -343,7 +343,7 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
 
 
 def _highest(
-    recording: Recording, rig: Rig, supply: str
+    recording: Recording, rig: Rig, supply: str, settings: PlausibilitySettings
 ) -> tuple[str, NDArray[np.bool_], Array] | None:
     """What a supply's pressure is told by, where that is known, and the highest that it can be.
 
@@ -353,7 +353,7 @@ def _highest(
     full = dotted("supply_pressure", supply)
     if full in recording.channels:
         return full, recording.mask[full], recording.channels[full]
-    told = _set_to(recording, rig, supply)
+    told = _set_to(recording, rig, supply, settings)
     if told is None:
         return None
     size, command = told

@@ -485,6 +485,15 @@ class PlausibilitySettings(SettingsGroup):
         "controller is",
         origin="judgement",
     )
+    command_quantile: float = setting(
+        0.995,
+        unit="1",
+        least=0.5,
+        most=1.0,
+        reason="quantile of a regulator's command that counts as its largest value; what is above "
+        "are a logger's spikes",
+        origin="judgement",
+    )
     command_time_share: float = setting(
         0.5,
         unit="1",
