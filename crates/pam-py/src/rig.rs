@@ -196,10 +196,10 @@ impl Rig {
                 Some(wanted) => Run::alone_for(rig, wanted)?,
                 None => Run::alone(rig)?,
             };
-            let mut out = match &wanted {
-                Some(wanted) => Trajectory::of_some(&run, rows, wanted),
-                None => Trajectory::new(rig, rows),
-            };
+            let mut out = wanted.map_or_else(
+                || Trajectory::new(rig, rows),
+                |wanted| Trajectory::of_some(&run, rows, &wanted),
+            );
             let progress = run.start(&initial(rig, &start)?);
             progress.observe_in(&mut run, timing, &mut out)?;
             Ok((timing, progress, drive, run, out))
@@ -208,11 +208,10 @@ impl Rig {
         let held = 0..rows.saturating_sub(1);
         watched(py, |look| progress.advance_in(&mut run, timing, &drive, held, &mut out, look))?;
         let happened = events(&out);
-        let Some(names) = record else { return Ok((channels(py, rig, out)?, happened)) };
-        let kept = PyDict::new(py);
-        for (name, values) in names.iter().zip(out.channels) {
-            kept.set_item(name, array(py, values))?;
-        }
+        let kept = match &record {
+            Some(names) => channels(py, names.iter().map(String::as_str), out)?,
+            None => channels(py, rig.names().channels.iter().map(|(n, _)| n.as_str()), out)?,
+        };
         Ok((kept, happened))
     }
 

@@ -36,13 +36,13 @@ pub fn watched(
 }
 
 /// Channels of a trajectory by name.
-pub fn channels<'py>(
+pub fn channels<'py, 'n>(
     py: Python<'py>,
-    rig: &pam_core::Rig,
+    names: impl IntoIterator<Item = &'n str>,
     t: Trajectory,
 ) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    for ((name, _), values) in rig.names().channels.iter().zip(t.channels) {
+    for (name, values) in names.into_iter().zip(t.channels) {
         out.set_item(name, array(py, values))?;
     }
     Ok(out)
@@ -239,7 +239,8 @@ impl Simulator {
             })
         })?;
         let happened = events(&out);
-        Ok((channels(py, &self.rig, out)?, happened))
+        let names = self.rig.names().channels.iter().map(|(name, _)| name.as_str());
+        Ok((channels(py, names, out)?, happened))
     }
 
     /// Hold one command for some samples: the last of them as numbers by name, and what happened on

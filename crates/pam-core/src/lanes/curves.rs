@@ -124,8 +124,7 @@ impl Curves {
     #[inline(always)]
     fn row<W: Simd>(&self, wide: W, cell: f64, [x, square]: [f64; 2], row: &mut [f64]) {
         let per_row = COLUMNS / W::F64_LANES;
-        let number = cell.to_bits() as u32 as usize;
-        let cell = self.cells.get(number).unwrap_or(&self.none);
+        let cell = self.cells.get(cell.to_bits() as u32 as usize).unwrap_or(&self.none);
         let powers = W::as_simd_f64s(cell).0;
         let (x, square) = (wide.splat_f64s(x), wide.splat_f64s(square));
         for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
@@ -141,9 +140,7 @@ impl Curves {
     /// Cell of each lane, in the last digits of a number, and the place in it from -1/2 to 1/2.
     #[inline(always)]
     fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
-        let of = |piece: &Piece| piece.numbers(at);
-        let [mut scale, mut offset, mut first, mut last] = of(&self.first);
-        if side_by_side::<S, R>() == 1 {
+        let [scale, offset, first, last] = if side_by_side::<S, R>() == 1 {
             // a plant alone goes where it is
             let mut own = &self.first;
             for piece in &self.others {
@@ -152,17 +149,17 @@ impl Curves {
                 }
                 own = piece;
             }
-            [scale, offset, first, last] = of(own);
+            own.numbers(at)
         } else {
+            let mut own = self.first.numbers(at);
             for piece in &self.others {
                 let here = at.constant(piece.start).at_most(at);
-                let [its_scale, its_offset, its_first, its_last] = of(piece);
-                scale = here.select(its_scale, scale);
-                offset = here.select(its_offset, offset);
-                first = here.select(its_first, first);
-                last = here.select(its_last, last);
+                for (own, its) in own.iter_mut().zip(piece.numbers(at)) {
+                    *own = here.select(its, *own);
+                }
             }
-        }
+            own
+        };
         let position = at.times_plus(scale, offset);
         // on a kink, rounding alone would find the cell on its other side
         let cell = (position + WHOLE).or_above(first).or_below(last);

@@ -179,19 +179,18 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
         let values = &mut values[..side_by_side::<S, R>()];
         for (k, unit) in rig.wiring.valves.iter().enumerate() {
             let commands = &self.held[k * rows..(k + 1) * rows];
+            let runs = &mut self.runs;
+            let mut open = |row: usize| {
+                let plant = &runs.of(row).stepper.plant;
+                let spool = spool_position(commands[row], plant.valves[k].null, unit.half_range);
+                opening(plant, k, spool)
+            };
             if self.alike && commands.iter().all(|command| *command == commands[0]) {
-                let plant = &self.runs.runs[0].stepper.plant;
-                let spool = spool_position(commands[0], plant.valves[k].null, unit.half_range);
-                values.fill(opening(plant, k, spool));
-                self.lanes.open(k, values);
-                continue;
-            }
-            for (lane, value) in values.iter_mut().enumerate() {
-                let row = lane.min(rows - 1);
-                let plant = &self.runs.of(row).stepper.plant;
-                let null = plant.valves[k].null;
-                let spool = spool_position(self.held[k * rows + row], null, unit.half_range);
-                *value = opening(plant, k, spool);
+                values.fill(open(0));
+            } else {
+                for (lane, value) in values.iter_mut().enumerate() {
+                    *value = open(lane.min(rows - 1));
+                }
             }
             self.lanes.open(k, values);
         }

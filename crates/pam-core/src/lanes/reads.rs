@@ -27,10 +27,9 @@ impl Reads {
     /// Channels by number of plants of one structure.
     pub fn new(rig: &Rig, plants: &[&Plant<'_, f64>], wanted: &[usize]) -> Self {
         let reads: Vec<Read> = wanted.iter().map(|k| read(rig, plants, *k)).collect();
-        let observes = reads.iter().any(|read| matches!(read, Read::Observed(_)));
-        let channels = if observes { rig.names().channels.len() } else { 0 };
+        let channels = room(&reads, rig);
         let memory = plants.first().map_or_else(Vec::new, |plant| plant.fresh_memory());
-        Self { reads, channels: vec![Vec::new(); channels], memory }
+        Self { reads, channels, memory }
     }
 
     /// Write down every wanted channel of all plants, then the next channel.
@@ -88,9 +87,7 @@ impl Wanted {
             None => Read::Observed(*k),
         };
         let reads: Vec<Read> = wanted.iter().map(of).collect();
-        let observes = reads.iter().any(|read| matches!(read, Read::Observed(_)));
-        let channels = if observes { rig.names().channels.len() } else { 0 };
-        Self { reads, all: vec![Vec::new(); channels] }
+        Self { all: room(&reads, rig), reads }
     }
 
     /// Room for a sample of every channel, which has to be observed first; empty where states are
@@ -110,6 +107,12 @@ impl Wanted {
             });
         }
     }
+}
+
+/// Room for one sample of every channel, where some that are read are no states.
+fn room(reads: &[Read], rig: &Rig) -> Vec<Vec<f64>> {
+    let observes = reads.iter().any(|read| matches!(read, Read::Observed(_)));
+    vec![Vec::new(); if observes { rig.names().channels.len() } else { 0 }]
 }
 
 /// Whether a channel is of the masses or of the sums of the balance.

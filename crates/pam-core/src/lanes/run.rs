@@ -138,18 +138,15 @@ impl<'w, 'r> Work<'w, 'r> {
     /// Every row of a block.
     fn block(&self, block: &mut Block<'_>) -> Result<Spent> {
         let request = self.checked.request;
-        let (mut rows, mut drives) = (Vec::new(), Vec::new());
         // one drive for all of them where no signal is a plant's own
         let common = request.signals.iter().all(|(_, signal)| matches!(signal, Signal::Common(_)));
+        let own = if common { 1 } else { block.failures.len() };
+        let drives: Vec<_> = (block.first..block.first + own)
+            .map(|plant| self.drive(plant))
+            .collect::<Result<_>>()?;
+        let mut rows = Vec::new();
         for place in 0..block.failures.len() {
-            let plant = block.first + place;
-            if !common || place == 0 {
-                let signals: Vec<(&str, &[f64])> = (request.signals.iter())
-                    .map(|(name, signal)| (*name, signal.of(plant, request.rows)))
-                    .collect();
-                drives.push(Drive::new(self.checked.rig, request.rows, &signals)?);
-            }
-            match self.row(place, plant)? {
+            match self.row(place, block.first + place)? {
                 Row { failure: Some(failure), .. } => block.without(place, failure),
                 row => rows.push(row),
             }
@@ -161,6 +158,15 @@ impl<'w, 'r> Work<'w, 'r> {
             spent += group.spent();
         }
         Ok(spent)
+    }
+
+    /// What drives a plant.
+    fn drive(&self, plant: usize) -> Result<Drive<'r>> {
+        let request = self.checked.request;
+        let signals: Vec<(&str, &[f64])> = (request.signals.iter())
+            .map(|(name, signal)| (*name, signal.of(plant, request.rows)))
+            .collect();
+        Drive::new(self.checked.rig, request.rows, &signals)
     }
 
     /// A row at its start, which has ended where that is out of the model's range.

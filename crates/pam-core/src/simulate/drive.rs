@@ -113,21 +113,21 @@ impl<'a> Drive<'a> {
 
     /// Drive a row as a sample of another drive does.
     pub(crate) fn set(&mut self, row: usize, other: &Drive<'_>, sample: usize) {
-        for (own, values) in self.commands.iter_mut().zip(&other.commands) {
-            own.to_mut()[row] = values[sample];
-        }
-        for ((_, own), (_, values)) in self.prescribed.iter_mut().zip(&other.prescribed) {
-            own.to_mut()[row] = values[sample];
-        }
+        self.follow(other, |own, values| own[row] = values[sample]);
     }
 
     /// Drive all rows as a sample of another drive does.
     pub(crate) fn set_all(&mut self, other: &Drive<'_>, sample: usize) {
+        self.follow(other, |own, values| own.fill(values[sample]));
+    }
+
+    /// Write the rows of each signal by the samples of another drive.
+    fn follow(&mut self, other: &Drive<'_>, write: impl Fn(&mut [f64], &[f64])) {
         for (own, values) in self.commands.iter_mut().zip(&other.commands) {
-            own.to_mut().fill(values[sample]);
+            write(own.to_mut(), values);
         }
         for ((_, own), (_, values)) in self.prescribed.iter_mut().zip(&other.prescribed) {
-            own.to_mut().fill(values[sample]);
+            write(own.to_mut(), values);
         }
     }
 

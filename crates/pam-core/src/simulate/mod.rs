@@ -223,9 +223,8 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
 }
 
 /// Simulated channels, all in the order of [`crate::plant::Names::channels`] or those that are
-/// wanted in theirs, one row per sample; row 0
-/// is the initial state. SI, pressures gauge and as the sensors read them (zeros included). And
-/// what happened on the way.
+/// wanted in theirs, one row per sample; row 0 is the initial state. SI, pressures gauge and as the
+/// sensors read them (zeros included). And what happened on the way.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Trajectory {
     /// One vector for each channel.
