@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.findings import WrongParameter
 
 HOME = Path(__file__).parents[2] / "cases" / "layouts"
 
@@ -41,29 +42,41 @@ def test_every_layout_writes_a_case_that_is_read(layouts: ModuleType, tmp_path: 
     assert layouts.main([str(tmp_path), "moon"]) == 2
 
 
+def with_its_effect(layouts: ModuleType, name: str, folder: Path) -> pamrs.Diagnosis:
+    """The diagnosis of a layout, which names the effect that it conceals and no other."""
+    layout = layouts.LAYOUTS[name]
+    found = pamrs.diagnose(layouts.write(layout, folder))
+    assert [e.id for e in found.effects] == [layout.conceals]
+    return found
+
+
+def with_its_value(
+    layouts: ModuleType, name: str, folder: Path
+) -> tuple[pamrs.Diagnosis, WrongParameter]:
+    """The same of a layout whose rig file has a wrong value, with what it says of that."""
+    layout = layouts.LAYOUTS[name]
+    found = pamrs.diagnose(layouts.write(layout, folder))
+    (wrong,) = found.wrong_parameters
+    assert wrong.name == layout.conceals
+    return found, wrong
+
+
 def test_an_isometric_bench_has_no_force_below_a_pressure(
     layouts: ModuleType, tmp_path: Path
 ) -> None:
-    layout = layouts.LAYOUTS["isometric_bench"]
-    found = pamrs.diagnose(layouts.write(layout, tmp_path))
-    assert [e.id for e in found.effects] == [layout.conceals]
+    found = with_its_effect(layouts, "isometric_bench", tmp_path)
     assert found.effects[0].parameters["threshold"]["value"] == pytest.approx(2e4, rel=0.1)
 
 
 def test_three_nozzles_show_the_heat_of_the_wall(layouts: ModuleType, tmp_path: Path) -> None:
-    layout = layouts.LAYOUTS["tank_three_nozzles"]
-    found = pamrs.diagnose(layouts.write(layout, tmp_path))
-    assert [e.id for e in found.effects] == [layout.conceals]
+    found = with_its_effect(layouts, "tank_three_nozzles", tmp_path)
     value = found.effects[0].parameters["heat_transfer_coefficient"]["value"]
     assert value == pytest.approx(50.0, rel=0.02)
 
 
 @pytest.mark.slow
 def test_one_gauge_finds_the_dead_time(layouts: ModuleType, tmp_path: Path) -> None:
-    layout = layouts.LAYOUTS["regulator_one_gauge"]
-    found = pamrs.diagnose(layouts.write(layout, tmp_path))
-    (wrong,) = found.wrong_parameters
-    assert wrong.name == layout.conceals
+    _, wrong = with_its_value(layouts, "regulator_one_gauge", tmp_path)
     assert wrong.value == pytest.approx(0.03, abs=5e-4)
 
 
@@ -71,10 +84,7 @@ def test_one_gauge_finds_the_dead_time(layouts: ModuleType, tmp_path: Path) -> N
 def test_a_gauge_at_each_end_of_the_tube_finds_the_exhaust(
     layouts: ModuleType, tmp_path: Path
 ) -> None:
-    layout = layouts.LAYOUTS["eight_metres"]
-    found = pamrs.diagnose(layouts.write(layout, tmp_path))
-    (wrong,) = found.wrong_parameters
-    assert wrong.name == layout.conceals
+    found, wrong = with_its_value(layouts, "eight_metres", tmp_path)
     assert wrong.value == pytest.approx(3.9e-9, rel=0.02)
     assert wrong.probability > 0.8
     assert found.where["block"] in ("line", "chamber")
@@ -83,9 +93,7 @@ def test_a_gauge_at_each_end_of_the_tube_finds_the_exhaust(
 def test_a_hanging_mass_shows_the_friction_of_its_braid(
     layouts: ModuleType, tmp_path: Path
 ) -> None:
-    layout = layouts.LAYOUTS["hanging_mass"]
-    found = pamrs.diagnose(layouts.write(layout, tmp_path))
-    assert [e.id for e in found.effects] == [layout.conceals]
+    found = with_its_effect(layouts, "hanging_mass", tmp_path)
     assert found.effects[0].probability > 0.8
     holes = [text for text in found.warnings if "saturated in length" in text]
     assert len(holes) >= 17  # six in each of three recordings, of which two may meet

@@ -14,7 +14,17 @@ ROOT = Path(__file__).parents[2]
 #: Those in one line do not know each other.
 LAYERS = (
     ("errors",),
-    ("channels", "comparison", "findings", "units", "_checks", "_files", "_writing", "_moved"),
+    (
+        "channels",
+        "comparison",
+        "findings",
+        "units",
+        "_checks",
+        "_files",
+        "_stretches",
+        "_writing",
+        "_moved",
+    ),
     ("effects",),
     ("rig",),
     ("recordings", "rigs"),

@@ -185,9 +185,8 @@ def tell(text: str) -> list[str]:
         typer.echo(text)
         sys.stdout.flush()
     except OSError as error:
-        with contextlib.suppress(
-            OSError, ValueError
-        ):  # what is left would be tried again at the end
+        # what is left in the buffer would be tried again when the process ends
+        with contextlib.suppress(OSError, ValueError):
             nowhere = os.open(os.devnull, os.O_WRONLY)
             os.dup2(nowhere, sys.stdout.fileno())
             os.close(nowhere)

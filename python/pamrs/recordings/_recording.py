@@ -14,11 +14,12 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._clock import Grid, lay_grid
@@ -256,10 +257,7 @@ class Recording:
         list of (start, stop)
             Sample indices, ``stop`` excluded.
         """
-        padded = np.concatenate([[False], self.valid(*channels), [False]])
-        edges = np.flatnonzero(padded[1:] != padded[:-1])
-        pairs = zip(edges[::2], edges[1::2], strict=True)
-        return [(int(a), int(b)) for a, b in pairs if b - a >= minimum]
+        return [(a, b) for a, b in stretches(self.valid(*channels)) if b - a >= minimum]
 
     def between(self, start: float | None = None, stop: float | None = None) -> Recording:
         """The part of a recording between two times; its time begins at 0 again.
@@ -652,9 +650,4 @@ def judged(
 
 
 def _runs(flags: Mask, kind: str, text: str) -> list[tuple[str, int, int, str]]:
-    padded: NDArray[Any] = np.concatenate([[False], flags, [False]])
-    edges = np.flatnonzero(padded[1:] != padded[:-1])
-    return [
-        (kind, int(a), int(b), f"{text} ({int(b - a)} samples)")
-        for a, b in zip(edges[::2], edges[1::2], strict=True)
-    ]
+    return [(kind, a, b, f"{text} ({b - a} samples)") for a, b in stretches(flags)]

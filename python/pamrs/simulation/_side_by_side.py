@@ -132,7 +132,8 @@ def simulate_batch(
     count = plants_of(n, None, per_plant)
     reduced = dict(reduce or {})
     kept = -(-rows // _checked_every(every))
-    _check_size(count, kept, record, reduced)
+    wanted = names_of("record", record)
+    _check_size(count, kept, wanted, reduced)
     begin = {name: rowwise(f"initial {name}", (initial or {})[name], count) for name in starts}
     core = core_rig(rig)
     recorded, numbers, ended = _core.side_by_side(
@@ -144,7 +145,7 @@ def simulate_batch(
         chosen_step(sample_time, step),
         {name: rowwise(name, values, count) for name, values in (parameters or {}).items()},
         begin,
-        names_of("record", record),
+        wanted,
         every,
         [_reduction(name, asked, rows) for name, asked in reduced.items()],
         thread_count(threads),
@@ -234,7 +235,7 @@ def _check_size(
     plants: int, kept: int, record: Sequence[str], reduced: Mapping[str, Reduction]
 ) -> None:
     """Refuse results that would not fit in memory, before anything runs."""
-    numbers = plants * (kept * len(names_of("record", record)) + len(reduced))
+    numbers = plants * (kept * len(record) + len(reduced))
     if numbers > MOST_NUMBERS:
         raise ParameterError(
             f"{plants} plants with {kept} rows of {len(record)} channels are not allowed: at most "

@@ -214,7 +214,7 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
-        check_rows(len(core_rig(self.rig).channels), samples or 0)
+        self._check_rows(samples or 0)
         signals, count = signals_of(
             self.rig,
             valve_command=valve_command,
@@ -225,8 +225,12 @@ class Simulator:
         )
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")
-        check_rows(len(core_rig(self.rig).channels), count)
+        self._check_rows(count)
         return self._advance(count, signals)
+
+    def _check_rows(self, rows: int) -> None:
+        """Refuse rows of all channels that would not fit in memory."""
+        check_rows(len(core_rig(self.rig).channels), rows)
 
     def control(
         self,
@@ -275,7 +279,7 @@ class Simulator:
             "period", self.sample_time if period is None else period, self.sample_time, least=1
         )
         total = whole_samples("duration", duration, self.sample_time, least=0)
-        check_rows(len(core_rig(self.rig).channels), total + 1)
+        self._check_rows(total + 1)
         sample, began, happened = self.observe(), self.time, len(self.events)
         rows = np.empty((len(sample), total + 1))
         rows[:, 0] = list(sample.values())

@@ -59,12 +59,7 @@ def describe_closure(found: Fit, problem: Problem, baseline: Fit) -> str:
         raise DiagnosisError(
             f"found.effects = {found.effects} is not allowed: one of {', '.join(TERMS)} is needed"
         )
-    # the inlet of a line has the kind of a chamber, and no form acts there
-    blocks = [
-        b
-        for b in problem.blocks
-        if CLOSURE_OF.get(b.kind) in found.effects and b.name.partition(".")[0] != "line"
-    ]
+    blocks = [b for b in problem.blocks if b.closure in found.effects]
     return "\n".join(_sentence(found, problem, baseline, block) for block in blocks)
 
 

@@ -14,6 +14,7 @@ from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of
 from pamrs.diagnosis.settings import PrepareSettings
+from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import default_step
@@ -65,6 +66,14 @@ class Block:
         kind = self.name.partition(".")[0]
         alike = {"line": "chamber", "load": "arm", "force": "pull", "torque": "pull"}
         return alike.get(kind, kind)
+
+    @property
+    def closure(self) -> str | None:
+        """The sum of terms that can stand for what is missing in it; None where the simulator has
+        none: at a load, at a force and in front of a line.
+        """
+        named = self.name.partition(".")[0]
+        return None if named in ("load", "line") else CLOSURE_OF.get(self.kind)
 
     @property
     def mechanical(self) -> bool:
@@ -403,9 +412,9 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; so is a valve
     where a gauge stands between it and the line behind it, beside the chamber, which is driven from
-    the valve on where that can be; and so are muscles whose force (or
-    torque at a joint) is measured. A rig with joints or a load and without valves and supplies is
-    driven by the pressures of its muscles: these are given, and only what they move is judged.
+    the valve on where that can be; and so are muscles whose force (or torque at a joint) is
+    measured. A rig with joints or a load and without valves and supplies is driven by the pressures
+    of its muscles: these are given, and only what they move is judged.
 
     Parameters
     ----------

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._stretches import stretches
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared
@@ -165,11 +166,10 @@ def _lost(
     low, high = table["null_voltage"] - span, table["null_voltage"] + span
     off = np.where(mask, values, table["null_voltage"]) - table["null_voltage"]
     beyond, inside = np.abs(off) > span, np.abs(off) <= table["half_range"]
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], beyond, [False]]).astype(np.int8)))
-    runs = list(zip(edges[::2], edges[1::2], strict=True))
+    runs = stretches(beyond)
     one = {float(values[a]) for a, _ in runs}
     # a controller at its ends asks for as much on both sides
-    ends = len(one) == 2 and np.ptp([abs(value - table["null_voltage"]) for value in one]) == 0.0
+    ends = len(one) == 2 and len({abs(value - table["null_voltage"]) for value in one}) == 1
     lost = (
         len(one) <= 2
         and not ends
@@ -186,9 +186,8 @@ def _lost(
 
 def _when(bad: NDArray[np.bool_], recording: Recording) -> str:
     """The first stretches in which something is, in seconds."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], bad, [False]]).astype(np.int8)))
-    pairs = list(zip(edges[::2], edges[1::2] - 1, strict=True))
-    told = [f"{recording.time[a]:.4g} to {recording.time[b]:.4g} s" for a, b in pairs[:_TOLD]]
+    pairs = stretches(bad)
+    told = [f"{recording.time[a]:.4g} to {recording.time[b - 1]:.4g} s" for a, b in pairs[:_TOLD]]
     more = f" and {len(pairs) - _TOLD} more stretches" if len(pairs) > _TOLD else ""
     return ", ".join(told) + more
 

@@ -152,12 +152,13 @@ def find_closure(
 
 def _closures(blocks: Sequence[Block]) -> dict[str, str]:
     """Closures by the block that each acts in."""
-    unknown = [b.name for b in blocks if b.kind not in CLOSURE_OF]
+    found = {b.name: b.closure for b in blocks}
+    unknown = [name for name, closure in found.items() if closure is None]
     if unknown or not blocks:
         raise DiagnosisError(
             f"blocks = {unknown} is not allowed: one or more of {', '.join(CLOSURE_OF)}"
         )
-    return {b.name: CLOSURE_OF[b.kind] for b in blocks}
+    return {name: closure for name, closure in found.items() if closure is not None}
 
 
 def _shapes(closure: str) -> dict[str, tuple[float, ...]]:

@@ -371,7 +371,7 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
         {b.kind for b in suspects}
     ) < len(suspects):
         return group  # of two chambers one form would have to serve both
-    if any(b.kind == "pull" or b.name.partition(".")[0] in ("load", "line") for b in suspects):
+    if any(b.closure is None for b in suspects):
         tell(
             "no form of what is missing is looked for, since that of a load, of a force or of a "
             "valve in front of a line is not in the simulator"
