@@ -70,7 +70,7 @@ impl<S: Scalar> Held<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::Dual64;
+    use crate::dual::Slope;
 
     #[test]
     fn an_edge_moves_through_a_step() {
@@ -78,24 +78,24 @@ mod tests {
         let mean = |time: f64, shift: f64| Held::over(time, 1e-3, 5e-3, shift).mean(value);
         assert_eq!((mean(0.014, 0.0), mean(0.015, 0.0), mean(0.015, 2e-3)), (1.0, 5.0, 1.0));
         assert!((mean(0.017, 2.25e-3) - (0.25 * 1.0 + 0.75 * 5.0)).abs() < 1e-9);
-        let slope = Held::over(0.017, 1e-3, 5e-3, Dual64::new(2.25e-3, 1.0))
-            .mean(|k| Dual64::from(value(k)))
-            .eps;
+        let slope = Held::over(0.017, 1e-3, 5e-3, Slope::new(2.25e-3, 1.0))
+            .mean(|k| Slope::from(value(k)))
+            .slope();
         assert!((slope + 4.0 / 1e-3).abs() < 1e-6, "{slope}");
     }
 
     #[test]
     fn an_edge_on_the_beginning_of_a_step_has_a_slope() {
-        let value = |k: i64| Dual64::from(if k < 3 { 1.0 } else { 5.0 });
-        let shift = |by: f64| Dual64::new(by, 1.0);
-        let ends = |held: Held<Dual64>| (held.before, held.now, held.share_before);
+        let value = |k: i64| Slope::from(if k < 3 { 1.0 } else { 5.0 });
+        let shift = |by: f64| Slope::new(by, 1.0);
+        let ends = |held: Held<Slope>| (held.before, held.now, held.share_before);
         let mean = Held::over(0.015, 1e-3, 5e-3, shift(0.0)).mean(value);
-        assert!((mean.re - 5.0).abs() < 1e-9 && (mean.eps + 4.0 / 1e-3).abs() < 1e-6);
+        assert!((mean.re - 5.0).abs() < 1e-9 && (mean.slope() + 4.0 / 1e-3).abs() < 1e-6);
         let (first, last, share) = ends(Held::over(0.02, 1e-3, 5e-3, shift(5e-3)));
         assert_eq!((first, last), (2, 3));
-        assert!(share.re.abs() < 1e-9 && (share.eps - 1.0 / 1e-3).abs() < 1e-6);
+        assert!(share.re.abs() < 1e-9 && (share.slope() - 1.0 / 1e-3).abs() < 1e-6);
         let (first, last, share) = ends(Held::over(0.022, 1e-3, 5e-3, shift(5e-3)));
-        assert_eq!((first, last, share.eps), (3, 3, 0.0));
+        assert_eq!((first, last, share.slope()), (3, 3, 0.0));
         let (first, last, share) = ends(Held::over(0.017, 1e-3, 5e-3, shift(2.25e-3)));
         assert_eq!((first, last), (2, 3));
         assert!((share.re - 0.25).abs() < 1e-9);

@@ -19,6 +19,7 @@ mod chebyshev;
 mod clock;
 pub mod cut_chain;
 pub mod description;
+pub mod dual;
 pub mod effects;
 pub mod error;
 pub mod lanes;

@@ -1,9 +1,9 @@
 //! Laws of the joints: the moment arm is the slope of the shortening, so that a joint conserves
 //! power.
 
-use num_dual::Dual64;
 use pam_core::blocks::joint::tendon::{TendonJoint, Torque};
 use pam_core::blocks::joint::{Joint, Polynomial, Pulley};
+use pam_core::dual::Slope;
 use proptest::prelude::*;
 
 fn each(lengths: [f64; 4], radius: f64, coefficients: &[f64]) -> Vec<Joint> {
@@ -31,9 +31,9 @@ proptest! {
             if !joint.reaches(angle) {
                 continue;
             }
-            let point = joint.eval(Dual64::new(angle, 1.0));
+            let point = joint.eval(Slope::new(angle, 1.0));
             let scale = point.moment_arm.re.abs().max(1e-3);
-            prop_assert!((point.shortening.eps - point.moment_arm.re).abs() < 1e-12 * scale);
+            prop_assert!((point.shortening.slope() - point.moment_arm.re).abs() < 1e-12 * scale);
             if index == 1 {
                 prop_assert!(point.torque_arm.re.abs() <= point.moment_arm.re.abs());
             } else {

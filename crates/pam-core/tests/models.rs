@@ -110,7 +110,7 @@ fn published_ends_meet_the_fibre_in_contraction_and_keep_their_radius_in_extensi
         let (i1, i2) = muscle.geometry.integrals(e).unwrap();
         let (q1, q2) = muscle.geometry.integrals_by_quadrature(e).unwrap();
         assert!((i1 / q1 - 1.0).abs() < 1e-12 && (i2 / q2 - 1.0).abs() < 1e-12);
-        assert!(muscle.geometry.solve_dual(e).unwrap().radius.eps > 0.0);
+        assert!(muscle.geometry.solve_dual(e).unwrap().radius.slope() > 0.0);
     }
     // The printed arc is too long there, so that no smaller radius is better than the rest radius.
     assert!((muscle.shape(-0.02).unwrap().radius / 0.0127 - 1.0).abs() < 1e-9);

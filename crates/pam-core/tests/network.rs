@@ -498,7 +498,7 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
     let missed = |rig: &Rig| {
         let measured = Measured::new(rig, rows, &[("valve_command", &command)], &signals).unwrap();
         let block = Block::from_name(rig, "line").unwrap();
-        let timing = timing.at_most(block.longest_step(rig));
+        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap());
         let found = predict(rig, block, &measured, timing, &[0], &[]).unwrap().value;
         let read = truth.get(rig, "line_pressure").unwrap();
         found.iter().zip(read).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -529,7 +529,7 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
         .unwrap()
         .beginning(&rig, outlets)?;
         let block = Block::from_name(&rig, "chamber").unwrap();
-        let timing = timing.at_most(block.longest_step(&rig));
+        let timing = timing.at_most(block.longest_step(&rig, &measured)?);
         predict(&rig, block, &measured, timing, &[0], &[]).map(|found| found.value)
     };
     let (fed, full) = (begun(&[]).unwrap(), begun(&[("supply", 3e5)]).unwrap());
@@ -540,4 +540,31 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
     assert!(begun(&[("tank", 1e5)]).is_err());
     assert!(begun(&[("supply", -2e5)]).is_err());
     assert!(begun(&[("supply", f64::NAN)]).is_err());
+}
+
+/// A gas between driven pressures is as fast as its openings alone: half as fast as beside pressures
+/// that answer, and a step of that length still ends where shorter ones do.
+#[test]
+fn a_gas_beside_driven_pressures_takes_longer_steps() {
+    let mut spec = gas(&[("", 1e-4, 0.0)], vec![orifice("supply", "chamber", 2e-6)]);
+    spec.supplies = shoulder().supplies;
+    let rig = Rig::new(spec).unwrap();
+    let (rows, dt) = (400, 0.001);
+    let (full, still) = (vec![6e5; rows], vec![0.0; rows]);
+    let begun: Vec<f64> = (0..rows).map(|k| if k == 0 { 5.9e5 } else { 6e5 }).collect();
+    let signals = [
+        ("supply_pressure", Signal { value: &full, slope: &still }),
+        ("muscle_pressure", Signal { value: &begun, slope: &still }),
+    ];
+    let measured = Measured::new(&rig, rows, &[], &signals).unwrap();
+    let block = Block::from_name(&rig, "chamber").unwrap();
+    let longest = block.longest_step(&rig, &measured).unwrap();
+    assert!((longest / rig.gas_step() - 2.0).abs() < 0.3, "{longest} {}", rig.gas_step());
+    let end = |step: f64| {
+        let timing = Timing::new(dt, dt).unwrap().at_most(step);
+        let found = predict(&rig, block, &measured, timing, &[0], &[]).unwrap().value;
+        assert!(found.windows(2).all(|pair| pair[1] >= pair[0] - 1e-6), "it oscillates");
+        found[rows - 1]
+    };
+    assert!((end(longest) - end(0.1 * longest)).abs() < 1.0);
 }

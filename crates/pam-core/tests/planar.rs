@@ -2,9 +2,9 @@
 //! links, errors.
 
 use nalgebra::{SMatrix, SVector};
-use num_dual::{Dual64, DualStruct};
 use pam_core::blocks::arm::one_link::OneLink;
 use pam_core::blocks::arm::planar::{Link, PlanarArm, Stops};
+use pam_core::dual::Slope;
 use pam_core::scalar::{constant, Scalar};
 use pam_core::simulate::integrate::Rk4;
 use pam_core::Error;
@@ -39,8 +39,8 @@ fn arm<S: Scalar, const N: usize>(links: &[Link<f64>; N]) -> PlanarArm<S, N> {
 }
 
 /// `values` that move with `rates`.
-fn moving<const N: usize>(values: &SVector<f64, N>, rates: &SVector<f64, N>) -> SVector<Dual64, N> {
-    values.zip_map(rates, Dual64::new)
+fn moving<const N: usize>(values: &SVector<f64, N>, rates: &SVector<f64, N>) -> SVector<Slope, N> {
+    values.zip_map(rates, Slope::new)
 }
 
 fn unit<const N: usize>(k: usize) -> SVector<f64, N> {
@@ -75,7 +75,7 @@ fn motion<const N: usize>(rows: &[[f64; 3]; N]) -> [SVector<f64, N>; 3] {
 fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseError> {
     let links = numbers.map(|n| link(&n, [0.7, 1.5]));
     let [q, r, a] = motion(rows);
-    let (plain, dual) = (arm::<f64, N>(&links), arm::<Dual64, N>(&links));
+    let (plain, dual) = (arm::<f64, N>(&links), arm::<Slope, N>(&links));
     let h = plain.mass_matrix(&q);
     let c = plain.coriolis_matrix(&q, &r);
     let (mass, speed) = (h.amax(), h.amax() * r.amax());
@@ -87,11 +87,11 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     );
 
     // H' - 2C is skew, and C is that of the Christoffel symbols of H.
-    let h_rate = dual.mass_matrix(&moving(&q, &r)).map(|v| v.eps);
+    let h_rate = dual.mass_matrix(&moving(&q, &r)).map(|v| v.slope());
     let skew = h_rate - c * 2.0;
     prop_assert!((skew + skew.transpose()).amax() < 1e-13 * speed.max(1.0));
     let slope: [SMatrix<f64, N, N>; N] =
-        std::array::from_fn(|k| dual.mass_matrix(&moving(&q, &unit(k))).map(|v| v.eps));
+        std::array::from_fn(|k| dual.mass_matrix(&moving(&q, &unit(k))).map(|v| v.slope()));
     let christoffel = SMatrix::<f64, N, N>::from_fn(|i, j| {
         (0..N).map(|k| 0.5 * (slope[k][(i, j)] + slope[j][(i, k)] - slope[i][(k, j)]) * r[k]).sum()
     });
@@ -104,14 +104,14 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
             < 1e-12 * mass * r.norm_squared().max(1.0)
     );
     let ends = dual.positions(&moving(&q, &r));
-    let (mut base, mut turn) = ([Dual64::new(0.0, 0.0); 2], 0.0);
+    let (mut base, mut turn) = ([Slope::new(0.0, 0.0); 2], 0.0);
     let (mut bodies, mut potential) = (0.0, 0.0);
     for (i, l) in links.iter().enumerate() {
         turn += r[i];
         let end = [ends[(0, i)], ends[(1, i)]];
         let centre = [0, 1].map(|k| base[k] + (end[k] - base[k]) * (l.centre / l.length));
         for (m, place) in [(l.mass, centre), (l.payload, end)] {
-            bodies += 0.5 * m * (place[0].eps.powi(2) + place[1].eps.powi(2));
+            bodies += 0.5 * m * (place[0].slope().powi(2) + place[1].slope().powi(2));
             potential += m * GRAVITY * place[1].re;
         }
         bodies += 0.5 * l.inertia * turn * turn;
@@ -126,7 +126,7 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     let g = plain.gravity_torque(&q);
     for k in 0..N {
         prop_assert!(
-            (dual.potential_energy(&moving(&q, &unit(k))).eps - g[k]).abs()
+            (dual.potential_energy(&moving(&q, &unit(k))).slope() - g[k]).abs()
                 < 1e-11 * g.amax().max(100.0)
         );
     }
@@ -145,7 +145,7 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
 
     // Power: d/dt energy = tau q' - friction q', and friction never gives.
     let (place, rate) = (moving(&q, &r), moving(&r, &a));
-    let power = (dual.kinetic_energy(&place, &rate) + dual.potential_energy(&place)).eps;
+    let power = (dual.kinetic_energy(&place, &rate) + dual.potential_energy(&place)).slope();
     let flow = torque.abs().dot(&r.abs()).max(speed * r.norm_squared()).max(1.0);
     prop_assert!((power - (torque - friction).dot(&r)).abs() < 1e-12 * flow);
     prop_assert!(friction.iter().zip(r.iter()).all(|(f, r)| f * r >= 0.0));
@@ -154,9 +154,9 @@ fn check_laws<const N: usize>((numbers, rows): &Case<N>) -> Result<(), TestCaseE
     // here.
     let pull = moving(&torque, &unit(0));
     let lifted = dual.acceleration(&place, &rate, &pull).unwrap();
-    let slopes = lifted.map(|v| v.eps).amax();
+    let slopes = lifted.map(|v| v.slope()).amax();
     prop_assert!((lifted.map(|v| v.re()) - back).amax() <= 1e-14 * scale);
-    let returned = dual.inverse_dynamics(&place, &rate, &lifted).map(|v| v.eps) - unit::<N>(0);
+    let returned = dual.inverse_dynamics(&place, &rate, &lifted).map(|v| v.slope()) - unit::<N>(0);
     prop_assert!(
         returned.amax() < 1e-13 * mass * (scale + slopes) * (1.0 + r.amax()),
         "{}",

@@ -80,7 +80,8 @@ impl Rig {
             let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?
                 .beginning(inner, &outlets)?;
             let block = Block::from_name(inner, block)?;
-            let timing = Timing::new(sample_time, step)?.at_most(block.longest_step(inner));
+            let longest = block.longest_step(inner, &measured)?;
+            let timing = Timing::new(sample_time, step)?.at_most(longest);
             work(block, &measured, timing)
         });
         found.map_err(|e| error(py, &e))

@@ -34,6 +34,12 @@ impl<S: Scalar> Pipe<S> {
         Pipe { flow_factor: self.flow_factor.re(), laminar: self.laminar.re() }
     }
 
+    /// Mass flow into a vacuum per upstream pressure, were there no laminar friction [kg/(s Pa)].
+    #[inline]
+    pub fn flow_factor(&self) -> f64 {
+        self.flow_factor.re()
+    }
+
     /// Mass flow [kg/s] between two absolute pressures [Pa], negative against the arrow.
     #[inline]
     pub fn mass_flow(&self, upstream: S, downstream: S) -> S {

@@ -38,6 +38,15 @@ impl<S: Scalar> Opening<S> {
         }
     }
 
+    /// Choked mass flow per upstream pressure [kg/(s Pa)].
+    #[inline]
+    pub fn choked(&self, gas: &Gas) -> f64 {
+        match self {
+            Self::Area(area) => gas.choked_flow(area.re(), 1.0),
+            Self::Conductance(tube) => tube.flow_factor(),
+        }
+    }
+
     /// Whether nothing passes.
     #[inline]
     pub fn shut(&self) -> bool {

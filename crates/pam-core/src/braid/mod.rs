@@ -22,7 +22,7 @@ pub mod numeric;
 
 use std::f64::consts::PI;
 
-use num_dual::Dual64;
+use crate::dual::Slope;
 
 use self::elliptic::{Arc, Ends, ARC_NODES};
 use self::numeric::{brent, minimum, GaussLegendre, Root};
@@ -197,9 +197,9 @@ impl MuscleGeometry {
     ///
     /// # Errors
     /// As [`MuscleGeometry::solve`].
-    pub fn solve_dual(&self, e: f64) -> Result<Shape<Dual64>> {
+    pub fn solve_dual(&self, e: f64) -> Result<Shape<Slope>> {
         let (root, taut) = self.outer_radius(e)?;
-        let at = Dual64::new(e, 1.0);
+        let at = Slope::new(e, 1.0);
         let radius = if taut {
             self.floor(at)
         } else {
@@ -214,10 +214,10 @@ impl MuscleGeometry {
                     cylinder::radius(&self.braid, (-at + 1.0) * self.braid.rest_length)
                 }
                 Profile::Elliptic | Profile::EllipticPublished => {
-                    let along = self.fibre_length(at, Dual64::new(root.x, 0.0)).eps;
+                    let along = self.fibre_length(at, Slope::new(root.x, 0.0)).slope();
                     let across =
-                        self.fibre_length(Dual64::new(e, 0.0), Dual64::new(root.x, 1.0)).eps;
-                    Dual64::new(root.x, -along / across)
+                        self.fibre_length(Slope::new(e, 0.0), Slope::new(root.x, 1.0)).slope();
+                    Slope::new(root.x, -along / across)
                 }
             }
         };
@@ -547,9 +547,9 @@ mod tests {
                     (a - 8.0 * b + 8.0 * c - d) / (12.0 * h)
                 };
                 let volume = slope(|s| s.air_volume);
-                assert!((exact.air_volume.eps / volume - 1.0).abs() < 1e-6, "{e}: {volume}");
+                assert!((exact.air_volume.slope() / volume - 1.0).abs() < 1e-6, "{e}: {volume}");
                 let radius = slope(|s| s.radius);
-                assert!((exact.radius.eps / radius - 1.0).abs() < 1e-6, "{e}: {radius}");
+                assert!((exact.radius.slope() / radius - 1.0).abs() < 1e-6, "{e}: {radius}");
             }
         }
     }

@@ -60,11 +60,18 @@ impl Block {
     }
 
     /// Longest stable step [s] while its neighbours are driven.
-    pub fn longest_step(self, rig: &Rig) -> f64 {
-        match self {
-            Self::Arm(_) | Self::Pull(_) => rig.body_step(),
-            Self::Supply(_) | Self::Chamber(_) => rig.gas_step(),
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for links that cannot be.
+    pub fn longest_step(self, rig: &Rig, measured: &Measured<'_>) -> Result<f64> {
+        if self.mechanical() {
+            return Ok(rig.body_step());
         }
+        let layout = rig.layout();
+        let mut moving = hidden(layout, measured);
+        moving.extend(unread(rig, self, measured).into_iter().map(|k| layout.supply(k)));
+        moving.extend(self.output(layout));
+        rig.air_step(|node| node.place(layout).is_some_and(|place| moving.contains(&place)))
     }
 
     /// Whether muscles and what they move make its output, and not air alone.

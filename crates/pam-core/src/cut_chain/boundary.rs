@@ -55,6 +55,12 @@ impl Signal<'_> {
     #[inline]
     pub(crate) fn at(&self, k: usize, fraction: f64, dt: f64) -> (f64, f64) {
         let [p0, m0, p1, m1] = self.ends(k, dt);
+        if fraction == 0.0 {
+            return (p0, m0 / dt);
+        }
+        if fraction == 1.0 {
+            return (p1, m1 / dt);
+        }
         let (t, t2) = (fraction, fraction * fraction);
         let t3 = t2 * t;
         let value =

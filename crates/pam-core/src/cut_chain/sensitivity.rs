@@ -4,14 +4,12 @@
 use super::block::{check, Block};
 use super::boundary::Measured;
 use super::window::Cut;
-use crate::effects::{Number, LANES, WIDE_LANES};
-use crate::plant::parameters::unit;
+use crate::dual::{Dual, LANES, WIDE_LANES};
+use crate::effects::Number;
 use crate::plant::{ParameterId, Place, Plant, Rig};
 use crate::scalar::constant;
 use crate::simulate::Timing;
 use crate::{Error, Result};
-use nalgebra::Const;
-use num_dual::DualSVec64;
 
 /// Prediction of a block's output with its sensitivities.
 #[derive(Debug, Clone, PartialEq)]
@@ -84,24 +82,23 @@ impl Task<'_> {
     /// The values, and the derivatives of up to `N` columns.
     fn differentiate<const N: usize>(&self, columns: &[usize], out: &mut Prediction) -> Result<()>
     where
-        DualSVec64<N>: Number,
+        Dual<N>: Number,
     {
         let Self { rig, block, measured, timing, starts, parameters } = *self;
-        let mut values = rig.parameters().lift::<DualSVec64<N>>();
-        let mut bumps = vec![constant::<DualSVec64<N>>(0.0); block.initial_count(rig)];
+        let mut values = rig.parameters().lift::<Dual<N>>();
+        let mut bumps = vec![constant::<Dual<N>>(0.0); block.initial_count(rig)];
         for (lane, column) in columns.iter().enumerate() {
             match parameters.get(*column) {
                 Some(id) => values.seed(*id, lane),
-                None => bumps[column - parameters.len()].eps = unit(lane),
+                None => bumps[column - parameters.len()] = Dual::from(0.0).along(lane),
             }
         }
         let plant = Plant::new(rig, values, false)?;
         let Prediction { value, jacobian, columns: width } = out;
         Cut::new(plant, block, measured, timing, bumps).run(starts, |k, y, _, _, _| {
             value[k] = y.re;
-            let gradient = y.eps.unwrap_generic(Const::<N>, Const::<1>);
-            for (column, slope) in columns.iter().zip(gradient.iter()) {
-                jacobian[k * *width + column] = *slope;
+            for (column, slope) in columns.iter().zip(y.eps) {
+                jacobian[k * *width + column] = slope;
             }
         })
     }

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::blocks::gas::Gas;
 use crate::made_by;
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 
 /// Number of terms.
 pub const TERMS: usize = 16;
@@ -103,8 +103,8 @@ impl<S: Scalar> Here<S> {
             x * p,
             size * p,
             fills * (supply - p),
-            tanh(fills / SIDE) * supply,
-            tanh(vents / SIDE) * p,
+            (fills / SIDE).tanh() * supply,
+            (vents / SIDE).tanh() * p,
             null,
             supply - p,
             p * volume_rate,

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::blocks::gas::Gas;
 use crate::made_by;
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 
 /// Number of terms.
 pub const TERMS: usize = 22;
@@ -101,7 +101,7 @@ impl<S: Scalar> Here<S> {
     pub fn terms(&self) -> [S; TERMS] {
         let Self { pressure: s, angle: a, rate: w, memory: [z, zs, q] } = *self;
         let speed = if w.re() < 0.0 { -w } else { w };
-        let sign = tanh(w / SIGN_SPEED);
+        let sign = (w / SIGN_SPEED).tanh();
         let (once, twice) = (a * 4.0, a * 8.0);
         [
             constant(1.0),

@@ -3,19 +3,9 @@
 
 use super::port::{Effect, Port};
 use crate::blocks::gas::Gas;
+use crate::dual::{Dual, LANES, WIDE_LANES};
 use crate::scalar::Scalar;
-use num_dual::DualSVec64;
 use serde::Serialize;
-
-/// Lanes of the dual numbers that sensitivities are found with.
-pub const LANES: usize = 8;
-/// The dual number of sensitivities.
-pub type Dual = DualSVec64<LANES>;
-
-/// Derivatives of a prediction that has more of them: ten at once cost half of twice eight.
-pub const WIDE_LANES: usize = 16;
-/// Number with that many derivatives.
-pub type WideDual = DualSVec64<WIDE_LANES>;
 
 /// What a parameter is to a fit and to a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -251,9 +241,9 @@ pub struct Make {
     /// Plain numbers.
     pub plain: fn(&[f64], &Gas) -> Box<dyn Effect<f64>>,
     /// Dual numbers.
-    pub dual: fn(&[Dual], &Gas) -> Box<dyn Effect<Dual>>,
+    pub dual: fn(&[Dual<LANES>], &Gas) -> Box<dyn Effect<Dual<LANES>>>,
     /// Dual numbers with more derivatives.
-    pub wide: fn(&[WideDual], &Gas) -> Box<dyn Effect<WideDual>>,
+    pub wide: fn(&[Dual<WIDE_LANES>], &Gas) -> Box<dyn Effect<Dual<WIDE_LANES>>>,
 }
 
 /// A [`Make`] of a function that is generic over its number type.
@@ -276,13 +266,13 @@ impl Number for f64 {
     }
 }
 
-impl Number for Dual {
+impl Number for Dual<LANES> {
     fn effect(make: &Make, values: &[Self], gas: &Gas) -> Box<dyn Effect<Self>> {
         (make.dual)(values, gas)
     }
 }
 
-impl Number for WideDual {
+impl Number for Dual<WIDE_LANES> {
     fn effect(make: &Make, values: &[Self], gas: &Gas) -> Box<dyn Effect<Self>> {
         (make.wide)(values, gas)
     }

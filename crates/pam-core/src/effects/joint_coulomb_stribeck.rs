@@ -24,7 +24,7 @@
 use super::{At, Effect, EffectInfo, EffectParameter, Extremes, Form, Port};
 use crate::blocks::gas::Gas;
 use crate::made_by;
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 
 const STICTION: EffectParameter =
     EffectParameter::new("stiction", "N m", 0.0, 1e6, 1.0).starts(&[0.5, 3.0]).off(0.0);
@@ -163,7 +163,7 @@ impl<S: Scalar> Effect<S> for Friction<S> {
         let steady = self.coulomb + self.share * *load;
         let friction = self.stiction * self.fading.left(relative) + steady;
         let backward = if rate.re() < 0.0 { self.backward } else { constant(1.0) };
-        -(friction * tanh(relative / SHARE) * backward)
+        -(friction * (relative / SHARE).tanh() * backward)
     }
 
     fn resistance(&self, most: &Extremes) -> (f64, f64) {

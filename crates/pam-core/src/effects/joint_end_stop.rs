@@ -96,7 +96,7 @@ impl<S: Scalar> Effect<S> for EndStop<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::Dual64;
+    use crate::dual::Slope;
 
     #[test]
     fn it_pushes_back_inside_and_never_pulls() {
@@ -125,15 +125,15 @@ mod tests {
         // neither a logarithm of nothing nor its slope
         let touch = torque(
             [
-                Dual64::from(500.0),
-                Dual64::from(1.2),
-                Dual64::from(0.0),
-                Dual64::new(1.0, 1.0),
-                Dual64::from(1.0),
+                Slope::from(500.0),
+                Slope::from(1.2),
+                Slope::from(0.0),
+                Slope::new(1.0, 1.0),
+                Slope::from(1.0),
             ],
-            Dual64::from(1.2),
-            Dual64::from(0.0),
+            Slope::from(1.2),
+            Slope::from(0.0),
         );
-        assert_eq!((touch.re, touch.eps), (0.0, 0.0));
+        assert_eq!((touch.re, touch.slope()), (0.0, 0.0));
     }
 }

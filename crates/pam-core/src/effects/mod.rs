@@ -10,8 +10,7 @@ mod port;
 
 pub(crate) use self::info::BEGINNING;
 pub use self::info::{
-    AtRest, Dual, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role,
-    SameData, Use, WideDual, LANES, WIDE_LANES,
+    AtRest, EffectInfo, EffectParameter, EffectState, Form, Kink, Make, Number, Role, SameData, Use,
 };
 pub(crate) use self::port::{begun, BAR, BEGUN, LITRE};
 pub use self::port::{At, AtMuscle, Cord, Effect, Extremes, Port};

@@ -10,7 +10,7 @@
 use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role};
 use crate::blocks::gas::Gas;
 use crate::made_by;
-use crate::scalar::{tanh, Scalar};
+use crate::scalar::Scalar;
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -44,7 +44,7 @@ pub fn change<S: Scalar>(softening: S, width: S, bladder: S, contraction: S, lar
     if contraction.re() >= largest.re() {
         return bladder * 0.0;
     }
-    -(softening * tanh((largest - contraction) / width) * bladder)
+    -(softening * ((largest - contraction) / width).tanh() * bladder)
 }
 
 /// Softening of a bladder; its state is the largest contraction ratio so far.

@@ -4,8 +4,8 @@
 //! Valve and tube in series without volume between them: the pressure at the node is that at which
 //! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`. `iso_6358`: the tube has a sonic
 //! conductance and a critical ratio of 0.3. `pipe`: isothermal flow through a long pipe, laminar at
-//! small flows and turbulent at large ones ([`crate::blocks::pipe`]; Shapiro 1953). The node is found by Newton steps inside a bracket; one
-//! more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
+//! small flows and turbulent at large ones ([`crate::blocks::pipe`]; Shapiro 1953). The node is found by Newton steps inside a bracket, for the difference of the flows or of their
+//! squares; one more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
 //! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014);
 //! Eckersten, "Simplified flow calculations for pneumatic components", 1975. A conductance of
 //! [`NONE`] or more restricts nothing.
@@ -22,9 +22,9 @@ use crate::blocks::gas::Gas;
 use crate::blocks::pipe::Pipe;
 use crate::blocks::tube::Tube;
 use crate::blocks::valve::Opening;
+use crate::dual::Slope;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
-use num_dual::Dual64;
 
 const CONDUCTANCE: EffectParameter =
     EffectParameter::new("conductance", "m3/(s Pa)", 1e-15, 1.0, 1.2e-8)
@@ -78,6 +78,8 @@ pub const NONE: f64 = 1.0;
 pub const AT_VALVE: f64 = 0.5;
 const CRITICAL_RATIO: f64 = 0.3;
 const MOST_STEPS: usize = 60;
+/// Last step to a node, of its pressure [1].
+const NEAR: f64 = 1e-12;
 
 /// The tube of a conductance.
 pub fn tube<S: Scalar>(conductance: S, temperature: f64) -> Passage<S> {
@@ -119,6 +121,14 @@ impl<S: Scalar> Passage<S> {
 }
 
 impl Passage<f64> {
+    /// Mass flow into a vacuum per upstream pressure [kg/(s Pa)].
+    fn choked(&self) -> f64 {
+        match self {
+            Self::Tube(tube) => tube.flow_factor(),
+            Self::Pipe(pipe) => pipe.flow_factor(),
+        }
+    }
+
     #[inline]
     fn lift<S: Scalar>(&self) -> Passage<S> {
         match self {
@@ -200,51 +210,58 @@ impl<S: Scalar> Series<'_, S> {
 }
 
 impl Series<'_, f64> {
+    /// Pressure at the node of two long pipes that choke like these two [Pa]; next to a shut one,
+    /// that at the other one's end.
+    fn near_node(&self, upstream: f64, downstream: f64) -> f64 {
+        let (valve, tube) = (self.opening.choked(self.gas).powi(2), self.tube.choked().powi(2));
+        let (first, last) = if self.tube_first { (tube, valve) } else { (valve, tube) };
+        if first <= 0.0 {
+            return downstream;
+        }
+        if last <= 0.0 {
+            return upstream;
+        }
+        let square =
+            (first * upstream * upstream + last * downstream * downstream) / (first + last);
+        square.sqrt().clamp(downstream, upstream)
+    }
+
     /// Pressure at the node [Pa] and slope of what it gains there [kg/(s Pa)].
     fn node(&self, upstream: f64, downstream: f64) -> (f64, f64) {
         let dual = Series {
             gas: self.gas,
-            opening: self.opening.lift::<Dual64>(),
-            tube: self.tube.lift::<Dual64>(),
+            opening: self.opening.lift::<Slope>(),
+            tube: self.tube.lift::<Slope>(),
             tube_first: self.tube_first,
         };
-        let gain = |node: f64| {
-            let (a, b) = dual.flows(upstream.into(), Dual64::new(node, 1.0), downstream.into());
-            (a - b).re_and_eps()
-        };
-        // It falls with the node's pressure, from what comes in at the lower end to what goes out
-        // at the upper.
+        // What the node gains falls with its pressure, from what comes in at the lower end to what
+        // goes out at the upper.
         let (mut low, mut high) = (downstream, upstream);
-        let mut node = 0.5 * (low + high);
+        let mut node = self.near_node(upstream, downstream);
         let mut slope = 0.0;
         for _ in 0..MOST_STEPS {
-            let (value, steep) = gain(node);
-            slope = steep;
-            if value > 0.0 {
+            let (a, b) = dual.flows(upstream.into(), Slope::new(node, 1.0), downstream.into());
+            let gain = a - b;
+            slope = gain.slope();
+            if gain.re > 0.0 {
                 low = node;
-            } else if value < 0.0 {
+            } else if gain.re < 0.0 {
                 high = node;
             } else {
                 break;
             }
-            let newton = node - value / steep;
-            let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - node).abs() <= 1e-15 * node {
+            // far away, where a flow is steep, its square is nearly straight
+            let squares = a * a - b * b;
+            let newton = [gain, squares].map(|f| node - f.re / f.slope());
+            let inside = newton.into_iter().find(|next| *next > low && *next < high);
+            let next = inside.unwrap_or(0.5 * (low + high));
+            let near = (next - node).abs() <= NEAR * node;
+            node = next;
+            if near {
                 break;
             }
-            node = next;
         }
         (node, slope)
-    }
-}
-
-trait Parts {
-    fn re_and_eps(self) -> (f64, f64);
-}
-
-impl Parts for Dual64 {
-    fn re_and_eps(self) -> (f64, f64) {
-        (self.re, self.eps)
     }
 }
 
@@ -365,11 +382,11 @@ mod tests {
             [[8e-6, 1.2e-8, 8e5, 2e5], [2e-6, 1.2e-8, 8e5, 7.8e5], [8e-6, 1.2e-8, 3e5, 2.9995e5]]
         {
             for k in 0..4 {
-                let mut d = x.map(Dual64::from);
-                d[k].eps = 1.0;
+                let mut d = x.map(Slope::from);
+                d[k].eps = [1.0];
                 let exact =
                     mass_flow(&gas, &Opening::Area(d[0]), &tube(d[1], 293.15), d[2], d[3], false)
-                        .eps;
+                        .slope();
                 let h = 1e-6 * x[k];
                 let (mut up, mut down) = (x, x);
                 up[k] += h;

@@ -296,8 +296,8 @@ fn monotone(c: &[[Node; 2]; 2]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::dual::Slope;
     use crate::muscle::tests::shoulder;
-    use num_dual::Dual64;
 
     fn grid(p: &[f64], e: &[f64], force: impl Fn(f64, f64) -> f64) -> MuscleSpec {
         MuscleSpec {
@@ -365,8 +365,8 @@ mod tests {
         let surface = MapSurface::new(&grid(&p, &e, sharp)).unwrap().unwrap();
         for q in [-1e4, 2e4, 1e5, 1.7e5, 6.5e5] {
             for x in [-0.05, 0.0, e[3], 0.1, 0.4] {
-                let by_p = surface.force(Dual64::new(q, 1.0), Dual64::from(x)).eps;
-                let by_e = surface.force(Dual64::from(q), Dual64::new(x, 1.0)).eps;
+                let by_p = surface.force(Slope::new(q, 1.0), Slope::from(x)).slope();
+                let by_e = surface.force(Slope::from(q), Slope::new(x, 1.0)).slope();
                 let change =
                     |a: f64, b: f64| surface.force(q + a, x + b) - surface.force(q - a, x - b);
                 assert!((by_p - change(1.0, 0.0) / 2.0).abs() < 2e-6, "{q} {x}");

@@ -290,7 +290,7 @@ fn check_direction(direction: f64) -> Result<f64> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use num_dual::Dual64;
+    use crate::dual::Slope;
 
     pub(crate) fn shoulder() -> MuscleSpec {
         MuscleSpec {
@@ -393,7 +393,7 @@ pub(crate) mod tests {
             if force >= 0.0 {
                 assert_eq!(held, force);
             }
-            let slope = muscle.buckled(Dual64::new(force, 1.0)).eps;
+            let slope = muscle.buckled(Slope::new(force, 1.0)).slope();
             let step = 1e-6;
             let change =
                 (muscle.buckled(force + step) - muscle.buckled(force - step)) / (2.0 * step);

@@ -14,7 +14,7 @@
 //! implicitly differentiated one) at points off the nodes; the largest disagreement found is
 //! [`Table::error_bound`].
 
-use num_dual::Dual64;
+use crate::dual::Slope;
 
 use super::model::Elasticity;
 use crate::braid::MuscleGeometry;
@@ -248,14 +248,14 @@ impl Table {
         let x = (e - piece.start) * (2.0 * piece.cells_per_unit) - (2 * cell + 1) as f64;
         let cell = &self.cells[piece.first + cell];
         let columns =
-            if S::NDERIV == 0 { evaluate(cell, x) } else { chained(x, |x| evaluate(cell, x)) };
+            if S::DERIVATIVES == 0 { evaluate(cell, x) } else { chained(x, |x| evaluate(cell, x)) };
         TablePoint::from_columns(columns)
     }
 
     fn continuation(&self, e: f64) -> Continuation {
-        let p = self.inside(e, Dual64::new(e, 1.0));
+        let p = self.inside(e, Slope::new(e, 1.0));
         let columns = [p.a_gas, p.a_elastic, p.b_elastic, p.volume, p.volume_slope];
-        let mut slope = columns.map(|c| c.eps);
+        let mut slope = columns.map(|c| c.slope());
         slope[VOLUME] = p.volume_slope.re;
         slope[SLOPE] = 0.0;
         Continuation { value: columns.map(|c| c.re), slope }
@@ -308,7 +308,7 @@ impl Exact<'_> {
     /// The columns at `e`, the slope by implicit differentiation of the solve.
     fn columns_and_slope(&self, e: f64) -> Result<[f64; COLUMNS]> {
         let mut columns = self.columns(e)?;
-        columns[SLOPE] = self.geometry.solve_dual(e)?.air_volume.eps;
+        columns[SLOPE] = self.geometry.solve_dual(e)?.air_volume.slope();
         Ok(columns)
     }
 
@@ -478,7 +478,7 @@ mod tests {
                 let point: TablePoint = table.eval(e);
                 let shape = muscle.exact.geometry.solve_dual(e).unwrap();
                 assert!((point.volume / shape.air_volume.re - 1.0).abs() < 2e-9, "{e}");
-                assert!((point.volume_slope - shape.air_volume.eps).abs() < 2e-9 * 6e-3, "{e}");
+                assert!((point.volume_slope - shape.air_volume.slope()).abs() < 2e-9 * 6e-3, "{e}");
                 let exact = muscle.exact.coefficients(e).unwrap();
                 assert!((point.b_elastic - exact.b_elastic).abs() < 2e-9 * largest, "{e}");
             }
@@ -504,16 +504,19 @@ mod tests {
                 if !muscle.table.contains(e) {
                     continue;
                 }
-                let point = muscle.table.eval(Dual64::new(e, 1.0));
+                let point = muscle.table.eval(Slope::new(e, 1.0));
                 let plain: TablePoint = muscle.table.eval(e);
                 assert_eq!(point.volume.re, plain.volume);
-                let relative = point.volume.eps / plain.volume_slope - 1.0;
+                let relative = point.volume.slope() / plain.volume_slope - 1.0;
                 assert!(relative.abs() < 1e-12, "{e}: {relative:e}");
                 let shape = muscle.exact.geometry.solve_dual(e).unwrap();
                 let elasticity = Elasticity::contracting(&muscle.exact.spec).unwrap();
                 let exact = elasticity.coefficients(muscle.exact.geometry.braid(), &shape);
-                assert!((point.a_gas.eps / exact.a_gas.eps - 1.0).abs() < 1e-5, "{e}");
-                assert!((point.b_elastic.eps / exact.b_elastic.eps - 1.0).abs() < 1e-5, "{e}");
+                assert!((point.a_gas.slope() / exact.a_gas.slope() - 1.0).abs() < 1e-5, "{e}");
+                assert!(
+                    (point.b_elastic.slope() / exact.b_elastic.slope() - 1.0).abs() < 1e-5,
+                    "{e}"
+                );
             }
         }
     }

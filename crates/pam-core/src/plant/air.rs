@@ -347,16 +347,18 @@ impl Plant<'_, f64> {
         valves.chain(lines)
     }
 
-    /// Fastest rate of the gas [1/s], and the gas that it is in (none for a supply): a bound by
-    /// Gershgorin's rows, every valve open, next to equal pressures.
-    pub(crate) fn fastest_gas(&self) -> (f64, Option<usize>) {
+    /// Fastest rate of the air [1/s] where some pressures move and a signal drives the others, and
+    /// the gas that it is in (none for a supply): a bound by Gershgorin's rows, every valve open,
+    /// next to equal pressures.
+    pub(crate) fn fastest_air(&self, moves: impl Fn(Node) -> bool) -> (f64, Option<usize>) {
         let (wiring, gas) = (&self.wiring, &self.rig.gas);
         let rt = gas.gas_constant * gas.temperature;
         let mut steepest = vec![0.0; wiring.gases.len()];
         let mut drawn = vec![0.0; wiring.supplies.len()];
         let mut add = |node: Node, other: Node, slope: f64| {
-            // The other end answers with the same slope where its pressure is a state.
-            let twice = if matches!(other, Node::Ambient) { slope } else { 2.0 * slope };
+            // The other end answers with the same slope where its pressure moves.
+            let answers = !matches!(other, Node::Ambient) && moves(other);
+            let twice = if answers { 2.0 * slope } else { slope };
             match node {
                 Node::Gas(k) => steepest[k] += twice,
                 Node::Supply(k) => drawn[k] += twice,
@@ -388,9 +390,13 @@ impl Plant<'_, f64> {
                 add(Node::Gas(unit.to), Node::Ambient, slope);
             }
         }
-        let mut worst =
-            (self.fastest_effect(|place| matches!(place, Place::Supply(_) | Place::Gas(_))), None);
-        for (k, slope) in steepest.iter().enumerate() {
+        let of_effects = self.fastest_effect(|place| match place {
+            Place::Supply(k) => moves(Node::Supply(k)),
+            Place::Gas(k) => moves(Node::Gas(k)),
+            _ => false,
+        });
+        let mut worst = (of_effects, None);
+        for (k, slope) in steepest.iter().enumerate().filter(|(k, _)| moves(Node::Gas(*k))) {
             let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
             let (volume, wall) = self.least_volume(k);
             let leak = self.steepest_flows(Node::Gas(k));
@@ -399,7 +405,8 @@ impl Plant<'_, f64> {
                 worst = (rate, Some(k));
             }
         }
-        for (k, (supply, slope)) in self.supplies.iter().zip(&drawn).enumerate() {
+        let supplies = self.supplies.iter().zip(&drawn).enumerate();
+        for (k, (supply, slope)) in supplies.filter(|(k, _)| moves(Node::Supply(*k))) {
             let rate = supply.fastest(*slope + self.steepest_flows(Node::Supply(k)), rt);
             if rate > worst.0 {
                 worst = (rate, None);

@@ -5,7 +5,7 @@ use super::Values;
 use crate::blocks::arm::linear::HangingMass;
 use crate::blocks::arm::one_link::{OneLink, Stops};
 use crate::blocks::arm::planar::{Link, PlanarArm};
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 use crate::Result;
 use nalgebra::SVector;
 
@@ -263,7 +263,7 @@ fn planar_passive<S: Scalar, const N: usize>(
     rate: S,
 ) -> S {
     let link = &arm.links()[k];
-    let friction = link.viscous * rate + link.coulomb * tanh(rate / link.coulomb_speed);
+    let friction = link.viscous * rate + link.coulomb * (rate / link.coulomb_speed).tanh();
     link.stops.map_or(constant(0.0), |s| s.torque(angle, rate)) - friction
 }
 

@@ -12,17 +12,16 @@
 //! ambient pressure may not feel a lower one: there the slope is the mean of both.
 
 use super::memory::Memory;
-use super::parameters::unit;
 use super::ports::Acting;
 use super::rates::{Controls, Plant, Simulated};
 use super::{Rig, StateRole};
 use crate::blocks::supply::SetPressure;
 use crate::blocks::valve::spool_position;
 use crate::description::dotted;
-use crate::effects::{Dual, Role, BEGUN, LANES};
+use crate::dual::{Dual, LANES};
+use crate::effects::{Role, BEGUN};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
-use nalgebra::Const;
 
 /// How far next to its null a valve is [1]: so near that no slope changes by more than 1e-7 of
 /// itself, so far that what flows shows in the last digits of the pressure behind a hose.
@@ -273,7 +272,7 @@ impl Plant<'_, f64> {
 struct Point<'a> {
     rig: &'a Rig,
     state: Vec<f64>,
-    memory: Vec<Memory<Dual>>,
+    memory: Vec<Memory<Dual<LANES>>>,
 }
 
 impl<'a> Point<'a> {
@@ -295,9 +294,7 @@ impl<'a> Point<'a> {
             for (chunk, sums) in by.chunks(LANES).zip(sums.chunks_mut(LANES)) {
                 let rates = self.rates(chunk, *beside)?;
                 for (k, rate) in rates.into_iter().enumerate() {
-                    let gradient = rate.eps.unwrap_generic(Const::<LANES>, Const::<1>);
-                    for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(gradient.iter())
-                    {
+                    for ((by, sum), slope) in chunk.iter().zip(sums.iter_mut()).zip(rate.eps) {
                         // A command counts from the null: more of the one is less of the other.
                         let sign = if matches!(by, By::Command(_)) { -1.0 } else { 1.0 };
                         sum[k] += sign * slope / sides.len() as f64;
@@ -309,23 +306,23 @@ impl<'a> Point<'a> {
     }
 
     /// Rates of all states, each lane with the derivative by one thing.
-    fn rates(&self, by: &[By], beside: Beside) -> Result<Vec<Dual>> {
-        let mut values = self.rig.parameters().lift::<Dual>();
+    fn rates(&self, by: &[By], beside: Beside) -> Result<Vec<Dual<LANES>>> {
+        let mut values = self.rig.parameters().lift::<Dual<LANES>>();
         let layout = &self.rig.layout;
         let gases = layout.pressure(0)..layout.mass(0);
         let shifted = |(place, x): (usize, &f64)| {
             constant(if gases.contains(&place) { x * (1.0 + beside.shift) } else { *x })
         };
-        let mut state: Vec<Dual> = self.state.iter().enumerate().map(shifted).collect();
+        let mut state: Vec<Dual<LANES>> = self.state.iter().enumerate().map(shifted).collect();
         for (lane, by) in by.iter().enumerate() {
             match *by {
-                By::State(place) => state[place].eps = unit(lane),
+                By::State(place) => state[place] = state[place].along(lane),
                 By::Command(valve) => values.seed(self.rig.wiring.valves[valve].null, lane),
             }
         }
         let plant = Plant::new(self.rig, values, false)?;
         // What a muscle remembers does not move with the state.
-        let still: Vec<Dual> = self.state.iter().map(|x| constant(*x)).collect();
+        let still: Vec<Dual<LANES>> = self.state.iter().map(|x| constant(*x)).collect();
         let mut start = vec![constant(0.0); self.memory.len()];
         plant.contractions(&still, &mut start);
         Ok(plant.rates_beside(&state, &self.memory, &start, beside))

@@ -249,7 +249,7 @@ impl Rig {
                 "the arm's mass matrix is not positive definite: a link without inertia".into(),
             ));
         }
-        let (air, place) = plant.fastest_gas();
+        let (air, place) = plant.fastest_air(|_| true);
         let needed = |step: f64| {
             format!(
                 "a step of {step:.1e} s would be needed, at least {LEAST_STEP:.0e} s is allowed"
@@ -308,6 +308,13 @@ impl Rig {
     /// The same for the gas alone, while the motion is driven.
     pub fn gas_step(&self) -> f64 {
         self.gas_step
+    }
+
+    /// The same for some pressures alone, while the others are driven.
+    pub(crate) fn air_step(&self, moves: impl Fn(Node) -> bool) -> Result<f64> {
+        let plant = Plant::new(self, self.parameters.lift::<f64>(), false)?;
+        let (rate, _) = plant.fastest_air(moves);
+        Ok(STABLE / rate.max(plant.fastest_command()))
     }
 
     /// The same for the motion alone, while the pressures are driven.

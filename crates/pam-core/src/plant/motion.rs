@@ -1,7 +1,7 @@
 //! The arm with the effects that act on it: torques of their own, another payload, a cord, a base
 //! that gives way.
 
-use num_dual::Dual64;
+use crate::dual::Slope;
 
 use super::body::Body;
 use super::ports::{Acting, Place};
@@ -222,12 +222,12 @@ impl Plant<'_, f64> {
             let (low, high) = self.rig.angles(group);
             let mut most = 0.0_f64;
             for i in 0..=32 {
-                let angle = Dual64::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
+                let angle = Slope::new(low + (high - low) * f64::from(i) / 32.0, 1.0);
                 let point = group.joint.eval(angle);
                 let contraction = point.shortening / group.rest_length;
                 let table = group.muscle.table.eval(contraction);
                 let pull = |scale: f64| {
-                    let (gauge, scale) = (Dual64::from(gauge), Dual64::from(scale));
+                    let (gauge, scale) = (Slope::from(gauge), Slope::from(scale));
                     group.muscle.pull(&table, gauge, contraction, scale)
                 };
                 let torque = pull(self.scales[k]) * point.torque_arm;
@@ -238,7 +238,7 @@ impl Plant<'_, f64> {
                 let swept = table.volume_slope.re * arm * group.count / group.rest_length;
                 let air = self.alphas[group.chamber].volume * pressure * swept * swept / volume;
                 let friction = self.presliding_stiffness(k, group, pull(1.0).re.abs(), gauge);
-                most = most.max(group.count * (torque.eps.abs() + friction * arm * arm) + air);
+                most = most.max(group.count * (torque.slope().abs() + friction * arm * arm) + air);
             }
             total += most;
         }

@@ -1,10 +1,9 @@
 //! The scalar parameters of a rig as one table, so that any of them can carry a derivative.
 
+use crate::dual::Dual;
 use crate::error::check_range;
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
-use nalgebra::Const;
-use num_dual::{Derivative, DualSVec64};
 use std::sync::Arc;
 
 /// An error for a value outside its bounds.
@@ -120,22 +119,13 @@ pub struct Values<S> {
     values: Vec<S>,
 }
 
-impl<const N: usize> Values<DualSVec64<N>> {
+impl<const N: usize> Values<Dual<N>> {
     /// Give a parameter the unit derivative in one lane.
     pub fn seed(&mut self, id: ParameterId, lane: usize) {
         if let Some(value) = self.values.get_mut(id.0) {
-            value.eps = unit(lane);
+            *value = value.along(lane);
         }
     }
-}
-
-/// Unit derivative in one lane (none when the lane does not exist).
-pub fn unit<const N: usize>(lane: usize) -> Derivative<f64, Const<N>, Const<1>> {
-    let mut gradient = nalgebra::SVector::<f64, N>::zeros();
-    if let Some(entry) = gradient.get_mut(lane) {
-        *entry = 1.0;
-    }
-    Derivative::some(gradient)
 }
 
 impl<S: Scalar> std::ops::Index<ParameterId> for Values<S> {

@@ -209,9 +209,8 @@ def residuals(
         if len(relevant) == len(names):
             return found
         full = np.zeros((found.value.size, len(names)))
-        for column, name in enumerate(relevant):
-            assert found.jacobian is not None
-            full[:, list(names).index(name)] = found.jacobian[:, column]
+        if relevant:
+            full[:, [list(names).index(name) for name in relevant]] = found.jacobian
         return replace(found, jacobian=full)
 
     return _everywhere(problem, one)

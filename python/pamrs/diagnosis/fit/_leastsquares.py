@@ -46,7 +46,9 @@ def levenberg_marquardt(
     evaluations : int
         Limit, the first included.
     settings : FitSettings
-        Least predicted gain of a step, the same as a share of the sum of squares, damping.
+        Least predicted gain of a step, the same as a share of the sum of squares, damping, and how
+        many evaluations may bring less than such a gain in all: where a model is not smooth, steps
+        promise what they do not keep.
     share : float, optional
         Another share; 0 where the last few units of chi-square count.
 
@@ -73,6 +75,7 @@ def levenberg_marquardt(
     x = np.clip(start, low, high)
     best = evaluate(x)
     spent, damping = 1, settings.first_damping
+    reached = [float(best[0] @ best[0])]  # by each evaluation
     while x.size and spent < evaluations:
         rows, jacobian, _ = best
         gradient = jacobian.T @ rows
@@ -84,10 +87,12 @@ def levenberg_marquardt(
         while (gain := _promise(step, gradient, normal)) < worth and hard < hardest:
             hard = 10.0 * hard
             step = _step(x, gradient, normal, hard, low, high)
-        if gain < worth:
+        late = reached[-1 - settings.stall_evaluations :]
+        if gain < worth or (len(late) > settings.stall_evaluations and late[0] - late[-1] < worth):
             break
         tried = np.clip(x + step, low, high)
         spent += 1
+        reached.append(reached[-1])
         try:
             found = evaluate(tried)
         except SimulationError:
@@ -95,7 +100,7 @@ def levenberg_marquardt(
             continue
         gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
-            x, best = tried, found
+            x, best, reached[-1] = tried, found, reached[-1] - gained
             damping = (
                 damping * 0.1
                 if gained > 0.5 * gain

@@ -615,23 +615,24 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     )
     rows = prepared.usable(block.channel, block.drives, starts)
     value = np.where(rows, measured - prediction, 0.0)
+    jacobian[~rows] = 0.0
     shifted = prediction.copy()
     k = len(names)
     bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        used = rows[a:b]
-        start = jacobian[a:b, k:]
-        if used.sum() < least * start.shape[1]:
+        slopes, start = jacobian[a:b, :k], jacobian[a:b, k:]
+        if np.count_nonzero(rows[a:b]) < least * start.shape[1]:
             rows[a:b] = False
             value[a:b] = 0.0
+            slopes[:] = 0.0
             continue
-        q, _ = np.linalg.qr(np.where(used[:, None], start, 0.0))
+        q, _ = np.linalg.qr(start)
         bases.append((a, b, q))
         correction = q @ (q.T @ value[a:b])
         value[a:b] -= correction
         shifted[a:b] += correction
-        jacobian[a:b, :k] -= q @ (q.T @ np.where(used[:, None], jacobian[a:b, :k], 0.0))
-    jac = np.where(rows[:, None], jacobian[:, :k], 0.0) if parameters else None
+        slopes -= q @ (q.T @ slopes)
+    jac = jacobian[:, :k] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
     return Residual(value, jac, shown, rows, prepared.noise[block.channel], bases)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,6 +177,8 @@ def _same(
     rows, beside = _looked_at(inside, settings), settings.beside_samples
     told, denied = np.zeros(rows.size, dtype=bool), np.zeros(rows.size, dtype=bool)
     for name in names:
+        if np.count_nonzero(~denied) < settings.least_samples:
+            break
         filled = _filled(slow, name)
         centre = float(filled.mean())
         values, source = filled[rows] - centre, _filled(fast, name) - centre
@@ -188,20 +191,49 @@ def _same(
             continue
         left = _left(values, others, good, settings.block_samples)
         alone = _left(values, near, good, settings.block_samples)
-        for a in range(0, rows.size, settings.window_samples):
-            window = np.flatnonzero(good[a : a + settings.window_samples]) + a
-            if window.size < settings.window_samples // 2:
-                continue
-            usual = window[alone[window] <= np.quantile(alone[window], settings.usual_share)]
-            size = float(alone[usual].mean())
-            alive = float(np.mean(np.diff(values[window]) != 0.0))
-            rounding = 1e-12 * max(float(np.abs(filled[rows[window]]).max()), 1e-300)
-            if alive < settings.least_alive or size <= rounding:
-                continue  # at rest on one step of the converter: equal by chance
-            span = slice(a, a + settings.window_samples)
-            (told if left[usual].mean() < settings.noise_share * size else denied)[span] = True
+        judged, alike = _by_window(values, filled[rows], good, alone, left, settings)
+        told |= judged & alike
+        denied |= judged & ~alike
     same = told & ~denied
     return rows[same], float(same.sum()) * float(inside.sum()) / max(rows.size, 1)
+
+
+def _by_window(
+    values: Array, samples: Array, good: Mask, alone: Array, left: Array, settings: OverlapSettings
+) -> tuple[Mask, Mask]:
+    """Rows of windows in which a channel says anything, and those in which the other recording
+    tells its noise. At rest on one step of the converter samples are equal by chance.
+    """
+    length = settings.window_samples
+    count = -(-values.size // length)
+
+    def windows(of: Array | Mask) -> NDArray[Any]:
+        return np.pad(of, (0, count * length - of.size)).reshape(count, length)
+
+    order = np.argsort(~windows(good), axis=1, kind="stable")  # what may be used comes first
+
+    def usable(of: Array) -> Array:
+        return np.take_along_axis(windows(of), order, axis=1)
+
+    sizes = windows(good).sum(axis=1)
+    there = np.arange(length) < sizes[:, None]
+    ranked = np.sort(np.where(there, usable(alone), np.inf), axis=1)
+    last = np.maximum(sizes - 1, 0) * settings.usual_share
+    below, share = last.astype(int), last - last.astype(int)
+    at = np.arange(count)
+    above = ranked[at, np.minimum(below + 1, np.maximum(sizes - 1, 0))]
+    with np.errstate(invalid="ignore"):
+        limit = ranked[at, below] + share * (above - ranked[at, below])
+        usual = there & (usable(alone) <= limit[:, None])
+    members = np.maximum(usual.sum(axis=1), 1)
+    size = (usable(alone) * usual).sum(axis=1) / members
+    missed = (usable(left) * usual).sum(axis=1) / members
+    moved = (np.diff(usable(values), axis=1) != 0.0) & there[:, 1:]
+    alive = moved.sum(axis=1) / np.maximum(sizes - 1, 1)
+    rounding = 1e-12 * np.maximum(np.abs(usable(samples) * there).max(axis=1), 1e-300)
+    judged = (sizes >= length // 2) & (alive >= settings.least_alive) & (size > rounding)
+    rows = np.repeat(np.stack([judged, missed < settings.noise_share * size]), length, axis=1)
+    return rows[0, : values.size], rows[1, : values.size]
 
 
 def _looked_at(inside: Mask, settings: OverlapSettings) -> NDArray[np.intp]:

@@ -70,6 +70,7 @@ class Prepared:
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
+    _clear: dict[tuple[str, ...], Mask] = field(repr=False, default_factory=dict)
 
     def driving(self, *, mechanical: bool) -> dict[str, Array]:
         """Commands for the prediction of a block: what moves knows them by the pressures alone, so
@@ -91,14 +92,16 @@ class Prepared:
         """Rows at which every drive was measured: holes of up to three samples are bridged, longer
         ones are cut out together with what the smoothing carries over their edges.
         """
-        settings = self.settings.prepare
-        reach = round(0.5 * settings.smoothing_time / self.dt)
-        out = np.ones(self.n, dtype=bool)
-        for a, b in (
-            _long_holes(self.recording.valid(*drives), settings.bridged_samples) if drives else []
-        ):
-            out[max(0, a - reach) : b + reach] = False
-        return out
+        if drives not in self._clear:
+            settings = self.settings.prepare
+            reach = round(0.5 * settings.smoothing_time / self.dt)
+            out = np.ones(self.n, dtype=bool)
+            mask = self.recording.valid(*drives) if drives else out
+            for a, b in _long_holes(mask, settings.bridged_samples):
+                out[max(0, a - reach) : b + reach] = False
+            out.flags.writeable = False
+            self._clear[drives] = out
+        return self._clear[drives]
 
     def starts(self, window: float | None, drives: tuple[str, ...]) -> list[int]:
         """Samples at which windows begin: every ``window`` seconds (None: once) and after each hole
@@ -448,8 +451,6 @@ def binned(values: Array, rows: Mask, width: int) -> tuple[Array, Array]:
     n = rows.size // width * width
     weights = rows[:n].reshape(-1, width).astype(np.float64)
     counts = weights.sum(axis=1)
-    data = values[:n].reshape(-1, width, *values.shape[1:])
-    shape = (slice(None), slice(None), *([None] * (values.ndim - 1)))
-    total = (data * weights[shape]).sum(axis=1)
-    divisor = np.maximum(counts, 1.0)
-    return total / divisor[(slice(None), *([None] * (values.ndim - 1)))], counts
+    data = values[:n].reshape(*weights.shape, -1)
+    means = (weights[:, None, :] @ data)[:, 0] / np.maximum(counts, 1.0)[:, None]
+    return means.reshape(counts.size, *values.shape[1:]), counts

@@ -92,6 +92,13 @@ class FitSettings(SettingsGroup):
         reason="the same in a fit that goes to its end",
         origin="docs/decisions/0022: a fit that stopped early looked like missing physics",
     )
+    stall_evaluations: int = setting(
+        4,
+        unit="count",
+        least=1,
+        reason="evaluations that together gain less than one step must, and the fit ends",
+        origin="docs/decisions/0097",
+    )
     evaluations: int = setting(
         12, unit="count", least=1, reason="evaluations of a fit at the most", origin="judgement"
     )

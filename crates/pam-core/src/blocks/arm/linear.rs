@@ -4,7 +4,7 @@
 //! of all muscles; stops as of the one-link arm, in metres. A frame prescribes `x` (dissertation
 //! ch. 2: length cycled slowly at held pressure).
 
-use crate::scalar::{tanh, Scalar};
+use crate::scalar::Scalar;
 
 /// A mass that hangs from a muscle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,7 +25,7 @@ impl<S: Scalar> HangingMass<S> {
     /// Friction [N] at a speed [m/s], positive against it.
     #[inline]
     pub fn friction(&self, speed: S) -> S {
-        speed * self.viscous + tanh(speed / self.coulomb_speed) * self.coulomb
+        speed * self.viscous + (speed / self.coulomb_speed).tanh() * self.coulomb
     }
 
     /// Acceleration of the shortening [m/s2] under the pull of the muscles and a stop force [N].

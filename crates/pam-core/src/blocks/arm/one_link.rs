@@ -4,7 +4,7 @@
 //! tau_stop`, angle from the gravity vector (physics of dissertation ch. 5; stops as one-sided
 //! spring and damper).
 
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 
 /// Parameters of a one-link arm.
 #[derive(Debug, Clone, Copy)]
@@ -75,7 +75,7 @@ impl<S: Scalar> OneLink<S> {
     /// Friction of the joint [N m] at a rate [rad/s], positive against it.
     #[inline]
     pub fn friction(&self, rate: S) -> S {
-        self.viscous * rate + self.coulomb * tanh(rate / self.coulomb_speed)
+        self.viscous * rate + self.coulomb * (rate / self.coulomb_speed).tanh()
     }
 
     /// Torque that holds the arm against gravity [N m].

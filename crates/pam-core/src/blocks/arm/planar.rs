@@ -20,7 +20,7 @@
 
 pub use super::one_link::Stops;
 use crate::error::{check_range, Error, Result};
-use crate::scalar::{constant, tanh, Scalar};
+use crate::scalar::{constant, Scalar};
 use nalgebra::{SMatrix, SVector};
 
 /// One link and the joint at its base.
@@ -169,7 +169,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     pub fn friction_torque(&self, rate: &SVector<S, N>) -> SVector<S, N> {
         SVector::from_fn(|i, _| {
             let link = &self.links[i];
-            link.viscous * rate[i] + link.coulomb * tanh(rate[i] / link.coulomb_speed)
+            link.viscous * rate[i] + link.coulomb * (rate[i] / link.coulomb_speed).tanh()
         })
     }
 

@@ -98,7 +98,7 @@ impl Joint {
     #[inline]
     pub fn eval<S: Scalar>(&self, angle: S) -> JointPoint<S> {
         match self {
-            Self::Tendon(joint) if S::NDERIV > 0 => {
+            Self::Tendon(joint) if S::DERIVATIVES > 0 => {
                 let [shortening, moment_arm, torque_arm] = chained(angle, |angle| {
                     let point = joint.eval(angle);
                     [point.shortening, point.moment_arm, point.torque_arm]

@@ -101,7 +101,7 @@ impl TendonJoint {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::{DualSVec64, DualStruct};
+    use crate::dual::Slope;
 
     #[test]
     fn moment_arm_is_the_derivative_of_the_shortening() {
@@ -109,15 +109,8 @@ mod tests {
             TendonJoint::new(0.0254, 0.027432, 0.027432, 0.004826, 15f64.to_radians()).unwrap();
         assert!(joint.eval(15f64.to_radians()).shortening.abs() < 1e-15);
         for degrees in [15.0, 40.0, 90.0, 119.0f64] {
-            let angle = DualSVec64::<1>::from_re(degrees.to_radians()).derivative(0);
-            let point = joint.eval(angle);
-            assert!(
-                (point.shortening.eps.unwrap_generic(nalgebra::Const::<1>, nalgebra::Const::<1>)
-                    [0]
-                    - point.moment_arm.re())
-                .abs()
-                    < 1e-14
-            );
+            let point = joint.eval(Slope::new(degrees.to_radians(), 1.0));
+            assert!((point.shortening.slope() - point.moment_arm.re).abs() < 1e-14);
         }
         assert!(TendonJoint::new(f64::NAN, 0.02, 0.02, 0.0, 0.2).is_err());
     }

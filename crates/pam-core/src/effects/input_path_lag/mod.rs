@@ -197,7 +197,7 @@ impl<S: Scalar> Effect<S> for InputPath<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use num_dual::Dual64;
+    use crate::dual::Slope;
 
     /// The same chain by many small Runge-Kutta steps.
     fn integrated(mut y: Chain<f64>, input: f64, tc: f64, delay: f64, time: f64) -> Chain<f64> {
@@ -260,12 +260,13 @@ mod tests {
 
     #[test]
     fn sensitivities_are_those_of_differences() {
-        let start = [0.3, 0.1, -0.2, 0.05].map(Dual64::from);
+        let start = [0.3, 0.1, -0.2, 0.05].map(Slope::from);
         for (tc, delay) in [(5e-3, 9e-3), (4e-3, 12e-3)] {
             let run = |t: f64, d: f64| moved(&start.map(|s| s.re), 0.8, t, d, 3e-3)[3];
-            let by_lag = moved(&start, 0.8.into(), Dual64::new(tc, 1.0), delay.into(), 3e-3)[3].eps;
+            let by_lag =
+                moved(&start, 0.8.into(), Slope::new(tc, 1.0), delay.into(), 3e-3)[3].slope();
             let by_delay =
-                moved(&start, 0.8.into(), tc.into(), Dual64::new(delay, 1.0), 3e-3)[3].eps;
+                moved(&start, 0.8.into(), tc.into(), Slope::new(delay, 1.0), 3e-3)[3].slope();
             let h = 1e-7;
             assert!((by_lag - (run(tc + h, delay) - run(tc - h, delay)) / (2.0 * h)).abs() < 1e-3);
             assert!(
