@@ -44,11 +44,12 @@ class NotWrittenError(PamrsError, OSError):
 
 
 class MissingPackageError(PamrsError, ImportError):
-    """A package that only some commands need is not installed."""
+    """A package that only some commands need is not installed, or cannot be loaded."""
 
 
 def missing_package(error: ImportError, extra: str) -> MissingPackageError:
-    """The error that says what to install for a package that could not be imported.
+    """The error that says what to install for a package that could not be imported, or that it is
+    there and cannot be loaded.
 
     Parameters
     ----------
@@ -61,10 +62,11 @@ def missing_package(error: ImportError, extra: str) -> MissingPackageError:
     -------
     MissingPackageError
     """
-    return MissingPackageError(
-        f"this needs {error.name}, which is not installed: pip install pamrs[{extra}]",
-        name=error.name,
-    )
+    if isinstance(error, ModuleNotFoundError):
+        why = f"which is not installed: pip install pamrs[{extra}]"
+    else:
+        why = f"which cannot be loaded ({error}); to install it anew: pip install pamrs[{extra}]"
+    return MissingPackageError(f"this needs {error.name}, {why}", name=error.name)
 
 
 def joined(head: str, problems: Iterable[str]) -> str:

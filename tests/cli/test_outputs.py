@@ -10,7 +10,7 @@ import pytest
 
 import pamrs.diagnosis
 import pamrs.recordings
-from pamrs import _writing, cli
+from pamrs import _writing, cli, report
 from pamrs._writing import check_writable, write_atomically
 from pamrs.errors import ParameterError
 
@@ -200,3 +200,10 @@ def test_a_file_is_whole_or_as_before(tmp_path, monkeypatch):
     assert [(p.name, p.read_text(encoding="utf-8")) for p in tmp_path.iterdir()] == [
         ("a", "before")
     ]
+
+
+def test_a_package_that_cannot_be_loaded_is_not_called_missing(tmp_path, monkeypatch):
+    (tmp_path / "half_installed.py").write_text("from math import no_such_name\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    with pytest.raises(ImportError, match=r"cannot be loaded \(cannot import name 'no_such_name'"):
+        report.require("half_installed")

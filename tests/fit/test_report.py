@@ -185,7 +185,7 @@ def test_a_missing_package_of_the_page_is_named(fit, monkeypatch, package):
     monkeypatch.setitem(sys.modules, package, None)
     with pytest.raises(
         ImportError,
-        match=rf"the report needs {package}, which is not installed: pip install pamrs\[report\]",
+        match=rf"this needs {package}, which is not installed: pip install pamrs\[report\]",
     ):
         pages.render_html(fit)
 
@@ -197,7 +197,7 @@ def test_a_missing_package_of_the_pictures_is_named(fit, monkeypatch, draw):
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     with pytest.raises(
         ImportError,
-        match=r"the report needs matplotlib, which is not installed: pip install pamrs\[report\]",
+        match=r"this needs matplotlib, which is not installed: pip install pamrs\[report\]",
     ):
         draw(fit)
 

@@ -6,7 +6,7 @@ import importlib
 import os
 from pathlib import Path
 
-from pamrs.errors import MissingPackageError
+from pamrs.errors import missing_package
 from pamrs.findings import Findings
 
 __all__ = ["render_html", "write_figure", "write_report"]
@@ -29,10 +29,7 @@ def require(*packages: str) -> None:
         try:
             importlib.import_module(package)
         except ImportError as error:
-            text = (
-                f"the report needs {error.name}, which is not installed: pip install pamrs[report]"
-            )
-            raise MissingPackageError(text, name=error.name) from error
+            raise missing_package(error, "report") from error
 
 
 def render_html(diagnosis: Findings) -> str:
