@@ -29,6 +29,7 @@ def require(*packages: str) -> None:
         try:
             importlib.import_module(package)
         except ImportError as error:
+            error.name = error.name or package
             raise missing_package(error, "report") from error
 
 
