@@ -70,7 +70,7 @@ pub trait Scalar:
     #[must_use]
     fn powi(self, n: i32) -> Self {
         let x = self.re();
-        self.with(x.powi(n), || f64::from(n) * x.powi(n - 1))
+        self.with(x.powi(n), || if n == 0 { 0.0 } else { f64::from(n) * x.powi(n - 1) })
     }
 
     /// `x^n`.
@@ -78,7 +78,7 @@ pub trait Scalar:
     #[must_use]
     fn powf(self, n: f64) -> Self {
         let x = self.re();
-        self.with(x.powf(n), || n * x.powf(n - 1.0))
+        self.with(x.powf(n), || if n == 0.0 { 0.0 } else { n * x.powf(n - 1.0) })
     }
 
     /// Square root.

@@ -74,6 +74,7 @@ fn what_does_not_vary_stays_so() {
     one.eps[1] = 1.0;
     assert_eq!(two.sqrt().eps, [0.0; 2]);
     assert_eq!((one.sqrt().eps[0], one.sqrt().eps[1]), (0.0, f64::INFINITY));
+    assert_eq!((one.powi(0).eps, one.powf(0.0).eps), ([0.0; 2], [0.0; 2]));
     assert!(!one.same(&two) && one == two && two.same(&two));
     assert_eq!(one.along(5).eps, [0.0; 2]);
 }
