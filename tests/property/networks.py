@@ -163,6 +163,14 @@ def joint(**changes: Any) -> dict[str, Any]:
 
 
 @st.composite
+def springs(draw: st.DrawFn) -> dict[str, Any]:
+    """A spring across a joint, or none."""
+    if draw(st.booleans()):
+        return {}
+    return {"stiffness": draw(st.floats(0.5, 20.0)), "spring_angle": draw(st.floats(-0.5, 2.5))}
+
+
+@st.composite
 def links(draw: st.DrawFn, on: str, rubbing: float) -> dict[str, Any]:
     """A link of a planar arm; `rubbing` multiplies its friction."""
     length = draw(st.floats(0.15, 0.35))
@@ -197,7 +205,7 @@ def bodies(
         for name, side in (("flexor", 1.0), ("extensor", -1.0)):
             blocks |= draw(pulls(name, "joint.elbow", feed, friction))
             blocks[f"transmission.{name}"] = draw(transmissions(side))
-        blocks["joint.elbow"] = joint()
+        blocks["joint.elbow"] = joint(**draw(springs()))
         arm = {
             "inertia": draw(st.floats(0.02, 0.08)),
             "first_moment": draw(st.floats(0.0, 0.2)),
@@ -216,7 +224,8 @@ def bodies(
         for name, on in (("elbow", "base"), ("wrist", "link.elbow")):
             blocks |= draw(pulls(name, f"joint.{name}", feed, friction))
             blocks[f"transmission.{name}"] = draw(transmissions())
-            blocks |= {f"joint.{name}": joint(), f"link.{name}": draw(links(on, rubbing))}
+            hinge = joint(**draw(springs()))
+            blocks |= {f"joint.{name}": hinge, f"link.{name}": draw(links(on, rubbing))}
         blocks["arm"] = {"kind": "planar"}
     return blocks
 

@@ -302,6 +302,13 @@ class Coordinate:
     high: float
     stiffness: float
     damping: float
+    #: Of a spring across a joint: stiffness (N m/rad), angle at which it is at rest (rad).
+    spring: tuple[float, float] = (0.0, 0.0)
+
+    def passive(self, position: float, rate: float) -> float:
+        """Force of stops and spring."""
+        stiffness, rest = self.spring
+        return self.stop(position, rate) - stiffness * (position - rest)
 
     def stop(self, position: float, rate: float) -> float:
         """Force of the stops; a stop pushes, it never pulls."""
@@ -312,7 +319,7 @@ class Coordinate:
         return 0.0
 
 
-#: Accelerations of all coordinates at positions, rates, and forces on them (muscles and stops).
+#: Accelerations of all coordinates at positions, rates, and forces on them (muscles, stops, springs).
 Body = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
 
 
@@ -468,7 +475,13 @@ class Network:
                 Coordinate("", 0.0, low, high, load["stop_stiffness"], load["stop_damping"])
             ], _mass(load)
         keys = ("name", "rest_angle", "min_angle", "max_angle", "stop_stiffness", "stop_damping")
-        joints = [Coordinate(*(joint[key] for key in keys)) for joint in model["joints"]]
+        joints = [
+            Coordinate(
+                *(joint[key] for key in keys),
+                spring=(joint.get("stiffness", 0.0), joint.get("spring_angle", 0.0)),
+            )
+            for joint in model["joints"]
+        ]
         if arm is None:
             return joints, _held
         return joints, _one_link(arm) if arm["kind"] == "one_link" else _planar(arm, joints)
@@ -672,7 +685,7 @@ class Network:
                     (moved - node.alpha * pressure[i] * volume_rate[i]) / volume[i]
                 )
         stopped = [
-            f + c.stop(q, v)
+            f + c.passive(q, v)
             for f, c, q, v in zip(force, self.coordinates, position, rate, strict=True)
         ]
         return [

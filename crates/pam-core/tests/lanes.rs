@@ -93,10 +93,13 @@ fn apart(rig: &Rig, request: &Request<'_>, outcome: &Outcome) -> f64 {
 }
 
 fn one_link_rigs() -> Vec<(&'static str, Rig)> {
+    let mut sprung = rigs::shoulder();
+    (sprung.joints[0].stiffness, sprung.joints[0].spring_angle) = (40.0, 1.2);
     let specs = [
         ("shoulder", rigs::shoulder()),
         ("antagonists", rigs::antagonists()),
         ("regulated", rigs::regulated()),
+        ("sprung", sprung),
     ];
     specs.map(|(name, spec)| (name, Rig::new(spec).unwrap())).into()
 }

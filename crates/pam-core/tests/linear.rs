@@ -57,6 +57,20 @@ fn coefficients_are_those_of_the_equations() {
 }
 
 #[test]
+fn a_spring_across_the_joint_is_stiffness_over_inertia() {
+    let by_angle = |spec: &RigSpec| {
+        let model = linearised(&Rig::new(spec.clone()).unwrap(), Side::Fill);
+        row(&model, "joint_rate").0[place(&model, "joint_angle")]
+    };
+    let (plain, mut sprung) = (shoulder(), shoulder());
+    (sprung.joints[0].stiffness, sprung.joints[0].spring_angle) = (40.0, 1.2);
+    let arm = plain.arm.as_ref().unwrap();
+    let inertia = arm.inertia + arm.payload * arm.length * arm.length;
+    let found = by_angle(&sprung) - by_angle(&plain);
+    assert!((found + 40.0 / inertia).abs() < 1e-9, "{found}");
+}
+
+#[test]
 fn a_side_has_a_name() {
     for (name, side) in [("fill", Side::Fill), ("vent", Side::Vent), ("mean", Side::Mean)] {
         assert_eq!(Side::from_name(name).unwrap(), side);

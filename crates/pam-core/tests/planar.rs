@@ -3,7 +3,7 @@
 
 use nalgebra::{SMatrix, SVector};
 use pam_core::blocks::arm::one_link::OneLink;
-use pam_core::blocks::arm::planar::{Link, PlanarArm, Stops};
+use pam_core::blocks::arm::planar::{Link, PlanarArm, Spring, Stops};
 use pam_core::dual::Slope;
 use pam_core::scalar::{constant, Scalar};
 use pam_core::simulate::integrate::Rk4;
@@ -19,7 +19,18 @@ fn link(numbers: &Numbers, friction: [f64; 2]) -> Link<f64> {
     let &[length, mass, share, inertia, payload] = numbers;
     let [viscous, coulomb] = friction;
     let (centre, coulomb_speed) = (share * length, 0.02);
-    Link { length, mass, centre, inertia, payload, viscous, coulomb, coulomb_speed, stops: None }
+    Link {
+        length,
+        mass,
+        centre,
+        inertia,
+        payload,
+        viscous,
+        coulomb,
+        coulomb_speed,
+        stops: None,
+        spring: Spring::none(),
+    }
 }
 
 /// The same arm in any number type.
@@ -34,6 +45,7 @@ fn arm<S: Scalar, const N: usize>(links: &[Link<f64>; N]) -> PlanarArm<S, N> {
         coulomb: constant(l.coulomb),
         coulomb_speed: l.coulomb_speed,
         stops: l.stops,
+        spring: Spring { stiffness: constant(l.spring.stiffness), angle: constant(l.spring.angle) },
     });
     PlanarArm::new(links, GRAVITY).unwrap()
 }
@@ -205,7 +217,8 @@ proptest! {
         torque in -500.0..500.0_f64,
     ) {
         let stops = Stops { min_angle: 0.26, max_angle: 2.0, stiffness: 2e4, damping: 60.0 };
-        let l = Link { stops: Some(stops), ..link(&numbers, [3.0, 1.5]) };
+        let spring = Spring { stiffness: 35.0, angle: 0.4 };
+        let l = Link { stops: Some(stops), spring, ..link(&numbers, [3.0, 1.5]) };
         let one = OneLink {
             inertia: l.inertia + l.mass * l.centre * l.centre,
             first_moment: l.mass * l.centre,
@@ -215,6 +228,7 @@ proptest! {
             coulomb: l.coulomb,
             coulomb_speed: l.coulomb_speed,
             gravity: GRAVITY,
+            spring,
         };
         let planar = arm::<f64, 1>(&[l]);
         let [q, r, t] = [angle, rate, torque].map(SVector::<f64, 1>::new);

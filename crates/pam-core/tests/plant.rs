@@ -83,7 +83,11 @@ fn sensitivities_agree_with_differences() {
     valve.null_voltage = 5.4; // it vents and fills, both below choking
     (valve.fill_conductance, valve.fill_critical_ratio) = (1.5e-8, 0.1);
     (valve.vent_conductance, valve.vent_critical_ratio) = (1.8e-8, 0.2);
-    let cases: [(&RigSpec, Block, &[&str]); 6] = [
+    let mut sprung = spec();
+    let joint = &mut sprung.joints[0];
+    (joint.stiffness, joint.spring_angle) = (30.0, 1.1);
+    let cases: [(&RigSpec, Block, &[&str]); 7] = [
+        (&sprung, Block::Arm(0), &["joint.stiffness", "joint.spring_angle", "arm.payload"]),
         (
             &conducting,
             Block::Chamber(0),
@@ -266,6 +270,8 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
         "arm.payload" => &mut spec.arm.as_mut().unwrap().payload,
         "arm.coulomb" => &mut spec.arm.as_mut().unwrap().coulomb,
         "muscle.modulus_scale" => &mut spec.muscles[0].muscle.modulus_scale,
+        "joint.stiffness" => &mut spec.joints[0].stiffness,
+        "joint.spring_angle" => &mut spec.joints[0].spring_angle,
         "sensors.angle_zero" => &mut spec.sensors[0].angle_zero,
         _ => &mut spec.sensors[0].pressure_zero,
     }

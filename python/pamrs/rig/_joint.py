@@ -101,7 +101,7 @@ class Joint:
         -------
         Joint
         """
-        return cls(**{key: value for key, value in model.items() if key not in _STOPS})
+        return cls(**{key: value for key, value in model.items() if key not in _NOT_ITS_OWN})
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -219,4 +219,11 @@ class Joint:
         )
 
 
-_STOPS = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
+_NOT_ITS_OWN = (
+    "min_angle",
+    "max_angle",
+    "stop_stiffness",
+    "stop_damping",
+    "stiffness",
+    "spring_angle",
+)

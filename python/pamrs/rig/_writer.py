@@ -34,6 +34,7 @@ __all__ = [
 ]
 
 _STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
+_SPRING: Final = ("stiffness", "spring_angle")
 
 # ---------------------------------------------------------------------------------- TOML
 
@@ -240,13 +241,21 @@ def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
         "transmission": own,
         "rest_angle": table["rest_angle"],
         **{key: table[key] for key in _STOPS},
+        **_told(table, _SPRING),
     }
+
+
+def _told(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+    """What is not zero: the core takes what it is not told as zero."""
+    return {name: table[name] for name in names if table.get(name, 0.0) != 0.0}
 
 
 def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
     """How a muscle pulls on its joint; None where it is the joint's own way."""
     return (
-        None if table is None else {key: value for key, value in table.items() if key not in _STOPS}
+        None
+        if table is None
+        else {key: value for key, value in table.items() if key not in (*_STOPS, *_SPRING)}
     )
 
 

@@ -328,6 +328,15 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("max_angle", "rad", -_TURN, _TURN),
         Key("stop_stiffness", "N m/rad", 0.0, 1e9, 2e4),
         Key("stop_damping", "N m s/rad", 0.0, 1e7, 60.0),
+        Key(
+            "stiffness",
+            "N m/rad",
+            0.0,
+            1e7,
+            0.0,
+            note="of a spring across the joint, beside the muscles; 0: none",
+        ),
+        Key("spring_angle", "rad", -_TURN, _TURN, 0.0, note="where that spring is at rest"),
     ),
     "arm": (
         Key("kind", default="one_link", kind="choice", choices=("one_link", "planar")),

@@ -199,6 +199,11 @@ pub struct JointSpec {
     pub max_angle: f64,
     pub stop_stiffness: f64,
     pub stop_damping: f64,
+    /// Of a spring across the joint, and the angle at which it is at rest.
+    #[serde(default)]
+    pub stiffness: f64,
+    #[serde(default)]
+    pub spring_angle: f64,
 }
 
 /// Arm: `one_link` about the only joint, or `planar` links in series, base first.

@@ -168,6 +168,10 @@ pub(super) struct Body<S: Simd, const R: usize> {
     /// One over the speed that Coulomb friction takes to turn [s/rad].
     pub coulomb_slope: f64,
     pub stops: Option<Stops>,
+    /// Stiffness of the spring across the joint [N m/rad], and where it is at rest [rad].
+    pub spring: [Num<S, R>; 2],
+    /// Some lane has such a spring.
+    pub springs: bool,
 }
 
 impl<S: Simd, const R: usize> Body<S, R> {
@@ -182,6 +186,10 @@ impl<S: Simd, const R: usize> Body<S, R> {
         resists = self.viscous.times_plus(rate, resists);
         if self.rubs {
             resists = self.coulomb.times_plus((rate * self.coulomb_slope).tanh(), resists);
+        }
+        if self.springs {
+            let [stiffness, rest] = self.spring;
+            resists = stiffness.times_plus(angle - rest, resists);
         }
         if let Some(stops) = &self.stops {
             resists = resists - stop_torque(stops, angle, rate);

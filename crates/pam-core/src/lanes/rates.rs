@@ -5,6 +5,7 @@ use super::blocks::{Body, Supply, Tube, Turns};
 use super::num::{side_by_side, Mask, Num, MOST_LANES};
 use super::rk4::Slopes;
 use super::Plan;
+use crate::blocks::arm::one_link::Spring;
 use crate::blocks::supply::Supply as OneSupply;
 use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE};
 use pulp::Simd;
@@ -575,18 +576,19 @@ fn body<'a, S: Simd, const R: usize>(
         OneBody::Mass(load, stops) => (Turns::Not, load.coulomb_speed, *stops),
         _ => (Turns::Not, f64::NAN, None),
     };
-    let of = |number: fn(&OneBody<f64>) -> [f64; 4], k: usize| each(&|p| number(&p.body)[k]);
+    let of = |number: fn(&OneBody<f64>) -> [f64; 6], k: usize| each(&|p| number(&p.body)[k]);
     let numbers = |body: &OneBody<f64>| match body {
         OneBody::OneLink(arm, _) => {
             let weight = (arm.first_moment + arm.payload * arm.length) * arm.gravity;
-            [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb]
+            let Spring { stiffness, angle } = arm.spring;
+            [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb, stiffness, angle]
         }
         OneBody::Mass(load, _) => {
-            [1.0 / load.mass, load.mass * load.gravity, load.viscous, load.coulomb]
+            [1.0 / load.mass, load.mass * load.gravity, load.viscous, load.coulomb, 0.0, 0.0]
         }
-        _ => [f64::NAN; 4],
+        _ => [f64::NAN; 6],
     };
-    let coulomb = of(numbers, 3);
+    let (coulomb, stiffness) = (of(numbers, 3), of(numbers, 4));
     Body {
         mobility: of(numbers, 0),
         weight: of(numbers, 1),
@@ -596,5 +598,7 @@ fn body<'a, S: Simd, const R: usize>(
         rubs: coulomb.numbers().iter().any(|c| *c != 0.0),
         coulomb_slope: 1.0 / coulomb_speed,
         stops,
+        spring: [stiffness, of(numbers, 5)],
+        springs: stiffness.numbers().iter().any(|k| *k != 0.0),
     }
 }

@@ -3,7 +3,7 @@
 use super::units::{BodyUnit, Coordinate, LinkUnit};
 use super::Values;
 use crate::blocks::arm::linear::HangingMass;
-use crate::blocks::arm::one_link::{OneLink, Stops};
+use crate::blocks::arm::one_link::{OneLink, Spring, Stops};
 use crate::blocks::arm::planar::{Link, PlanarArm};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
@@ -58,6 +58,7 @@ impl<S: Scalar> Body<S> {
                     coulomb: values[*coulomb],
                     coulomb_speed: *coulomb_speed,
                     gravity: *gravity,
+                    spring: spring(coordinates.first(), values),
                 },
                 stops,
             ),
@@ -98,12 +99,14 @@ impl<S: Scalar> Body<S> {
 }
 
 impl<S: Scalar> Body<S> {
-    /// Friction and stop of a coordinate [N m].
+    /// Friction, spring and stop of a coordinate [N m].
     pub fn passive(&self, k: usize, angle: S, rate: S) -> S {
         let stop = |stops: Option<Stops>| stops.map_or(constant(0.0), |s| s.torque(angle, rate));
         match self {
             Self::Fixed => constant(0.0),
-            Self::OneLink(arm, stops) => stop(*stops) - arm.friction(rate),
+            Self::OneLink(arm, stops) => {
+                stop(*stops) + arm.spring.torque(angle) - arm.friction(rate)
+            }
             Self::Mass(load, stops) => stop(*stops) - load.friction(rate),
             Self::Planar1(arm) => planar_passive(arm, k, angle, rate),
             Self::Planar2(arm) => planar_passive(arm, k, angle, rate),
@@ -215,8 +218,9 @@ impl Body<f64> {
     /// beside its own on each coordinate, and a base that a torque on the first one moves by so
     /// much [1/(kg m2)].
     pub fn fastest(&self, loads: &[(f64, f64)], base: f64) -> f64 {
-        let one = |inertia: f64, damping: f64, stops: Option<Stops>| {
+        let one = |inertia: f64, damping: f64, spring: f64, stops: Option<Stops>| {
             let (stiffness, stop) = stops.map_or((0.0, 0.0), |s| (s.stiffness, s.damping));
+            let stiffness = stiffness + spring;
             let (more, stiffer) = loads.first().copied().unwrap_or_default();
             let inertia = if base > 0.0 { 1.0 / (1.0 / inertia + base) } else { inertia };
             ((damping + stop + more) / inertia).max(((stiffness + stiffer) / inertia).sqrt())
@@ -224,10 +228,11 @@ impl Body<f64> {
         match self {
             Self::Fixed => 0.0,
             Self::OneLink(arm, stops) => {
-                one(arm.total_inertia(), arm.viscous + arm.coulomb / arm.coulomb_speed, *stops)
+                let damping = arm.viscous + arm.coulomb / arm.coulomb_speed;
+                one(arm.total_inertia(), damping, arm.spring.stiffness, *stops)
             }
             Self::Mass(load, stops) => {
-                one(load.mass, load.viscous + load.coulomb / load.coulomb_speed, *stops)
+                one(load.mass, load.viscous + load.coulomb / load.coulomb_speed, 0.0, *stops)
             }
             Self::Planar1(arm) => planar_fastest(arm, loads, base),
             Self::Planar2(arm) => planar_fastest(arm, loads, base),
@@ -264,7 +269,16 @@ fn planar_passive<S: Scalar, const N: usize>(
 ) -> S {
     let link = &arm.links()[k];
     let friction = link.viscous * rate + link.coulomb * (rate / link.coulomb_speed).tanh();
-    link.stops.map_or(constant(0.0), |s| s.torque(angle, rate)) - friction
+    let stop = link.stops.map_or(constant(0.0), |s| s.torque(angle, rate));
+    stop + link.spring.torque(angle) - friction
+}
+
+/// The spring across a joint; none on a load.
+fn spring<S: Scalar>(coordinate: Option<&Coordinate>, values: &Values<S>) -> Spring<S> {
+    match coordinate.and_then(|c| c.spring) {
+        Some([stiffness, angle]) => Spring { stiffness: values[stiffness], angle: values[angle] },
+        None => Spring::none(),
+    }
 }
 
 fn planar_response<S: Scalar, const N: usize>(
@@ -296,6 +310,7 @@ fn planar<S: Scalar, const N: usize>(
             coulomb: values[unit.coulomb],
             coulomb_speed: unit.coulomb_speed,
             stops: coordinate.and_then(|c| c.stops),
+            spring: spring(coordinate, values),
         }
     });
     PlanarArm::new(links, gravity)
@@ -337,7 +352,7 @@ fn planar_fastest<const N: usize>(arm: &PlanarArm<f64, N>, loads: &[(f64, f64)],
             let (more, stiffer) = loads.get(k).copied().unwrap_or_default();
             let moves = mobility[(k, k)] + if k == 0 { base } else { 0.0 };
             damping += moves * (link.viscous + link.coulomb / link.coulomb_speed + stop + more);
-            stiffness += moves * (spring + stiffer);
+            stiffness += moves * (spring + link.spring.stiffness + stiffer);
         }
         fastest = fastest.max(damping).max(stiffness.sqrt());
     }

@@ -117,6 +117,8 @@ pub(crate) struct Group {
 pub(crate) struct Coordinate {
     pub rest: f64,
     pub stops: Option<Stops>,
+    /// Stiffness of a spring across a joint, and the angle at which it is at rest.
+    pub spring: Option<[ParameterId; 2]>,
     pub zero: Option<ParameterId>,
 }
 

@@ -99,7 +99,7 @@ impl Wiring {
                 }
             }
         }
-        let coordinates = coordinates(spec)?;
+        let coordinates = coordinates(spec, &mut table)?;
         let groups = groups(spec, known, &mut table)?;
         let body = body(spec, &mut table)?;
         sensors(spec, &mut table, &mut gases)?;

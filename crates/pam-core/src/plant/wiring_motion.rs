@@ -5,12 +5,12 @@ use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
 use super::wiring::model;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
-use crate::description::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
+use crate::description::{dotted, ArmSpec, JointSpec, LinkSpec, LoadSpec, RigSpec};
 use crate::muscle::spec::MODULUS_SCALE;
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
 
-pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
+pub(super) fn coordinates(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<Coordinate>> {
     if let Some(load) = &spec.load {
         if !spec.joints.is_empty() || spec.arm.is_some() {
             return model("a rig has either [joint] and [arm] or [load], not both");
@@ -22,18 +22,9 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
         if spec.muscles.iter().any(|m| m.muscle.rest_length != rest) {
             return model("muscles on one load must have the same rest_length");
         }
-        return Ok(vec![Coordinate { rest: 0.0, stops: load_stops(load, rest), zero: None }]);
+        let stops = load_stops(load, rest);
+        return Ok(vec![Coordinate { rest: 0.0, stops, spring: None, zero: None }]);
     }
-    let coordinate = |joint: &crate::description::JointSpec| Coordinate {
-        rest: joint.rest_angle,
-        stops: Some(Stops {
-            min_angle: joint.min_angle,
-            max_angle: joint.max_angle,
-            stiffness: joint.stop_stiffness,
-            damping: joint.stop_damping,
-        }),
-        zero: None,
-    };
     let named = |port: &str| spec.joints.iter().position(|j| dotted("joint", &j.name) == port);
     match &spec.arm {
         None if spec.joints.is_empty() && spec.muscles.is_empty() => Ok(Vec::new()),
@@ -43,7 +34,7 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
         None => model("a rig with [joint] needs [arm]"),
         Some(_) if spec.joints.is_empty() => model("a rig with [arm] needs [joint]"),
         Some(arm) if arm.kind == "one_link" => match spec.joints.as_slice() {
-            [joint] => Ok(vec![coordinate(joint)]),
+            [joint] => Ok(vec![coordinate(joint, table)?]),
             _ => model(format!(
                 "a one-link arm has one joint, and the rig has {}",
                 spec.joints.len()
@@ -69,9 +60,30 @@ pub(super) fn coordinates(spec: &RigSpec) -> Result<Vec<Coordinate>> {
                 };
                 order.push(k);
             }
-            Ok(order.iter().map(|k| coordinate(&spec.joints[*k])).collect())
+            order.iter().map(|k| coordinate(&spec.joints[*k], table)).collect()
         }
     }
+}
+
+/// A joint with its stops and its spring.
+fn coordinate(joint: &JointSpec, table: &mut Parameters) -> Result<Coordinate> {
+    let mut add = |key: &str, value, bounds| {
+        table.add(format!("{}.{key}", dotted("joint", &joint.name)), value, bounds)
+    };
+    Ok(Coordinate {
+        rest: joint.rest_angle,
+        stops: Some(Stops {
+            min_angle: joint.min_angle,
+            max_angle: joint.max_angle,
+            stiffness: joint.stop_stiffness,
+            damping: joint.stop_damping,
+        }),
+        spring: Some([
+            add("stiffness", joint.stiffness, (0.0, 1e9, "N m/rad"))?,
+            add("spring_angle", joint.spring_angle, (-7.0, 7.0, "rad"))?,
+        ]),
+        zero: None,
+    })
 }
 
 /// The coordinate that a joint's port names, in the order of the links.

@@ -94,6 +94,7 @@ _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _MUSCLE = ("modulus_scale",)
 _ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
+_JOINT = ("stiffness", "spring_angle")
 _LOAD = ("mass", "viscous", "coulomb")
 _LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
 
@@ -352,6 +353,11 @@ class _Map:
             return None
         names = {f"arm.{key}" for key in _ARM} | {
             f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
+        }
+        names |= {
+            f"{qualified('joint', name)}.{key}"
+            for name in self.rig.tables("joint")
+            for key in _JOINT
         }
         names |= {
             f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK

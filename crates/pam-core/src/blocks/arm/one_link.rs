@@ -1,8 +1,8 @@
 //! One-link arm with payload, friction and elastic stops.
 //!
 //! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) +
-//! tau_stop`, angle from the gravity vector (physics of dissertation ch. 5; stops as one-sided
-//! spring and damper).
+//! tau_stop - k (theta - theta_k)`, angle from the gravity vector (physics of dissertation ch. 5;
+//! stops as one-sided spring and damper; a spring beside the muscles, `k`, at rest at `theta_k`).
 
 use crate::scalar::{constant, Scalar};
 
@@ -25,6 +25,30 @@ pub struct OneLink<S> {
     pub coulomb_speed: f64,
     /// Gravity [m/s2].
     pub gravity: f64,
+    /// Spring across the joint.
+    pub spring: Spring<S>,
+}
+
+/// A linear spring across a joint, beside the muscles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spring<S> {
+    /// Stiffness [N m/rad].
+    pub stiffness: S,
+    /// Angle at which it is at rest [rad].
+    pub angle: S,
+}
+
+impl<S: Scalar> Spring<S> {
+    /// None at all.
+    pub fn none() -> Self {
+        Self { stiffness: constant(0.0), angle: constant(0.0) }
+    }
+
+    /// Its torque on the joint [N m], towards its rest.
+    #[inline]
+    pub fn torque(&self, angle: S) -> S {
+        self.stiffness * (self.angle - angle)
+    }
 }
 
 /// Elastic stops at both ends of the range.
@@ -87,7 +111,8 @@ impl<S: Scalar> OneLink<S> {
     /// Angular acceleration [rad/s2] under a joint torque and a stop torque [N m].
     #[inline]
     pub fn acceleration(&self, angle: S, rate: S, torque: S, stop_torque: S) -> S {
-        (torque - self.friction(rate) - self.weight(angle) + stop_torque) / self.total_inertia()
+        let own = self.spring.torque(angle) - self.friction(rate);
+        (torque + own - self.weight(angle) + stop_torque) / self.total_inertia()
     }
 }
 
@@ -114,9 +139,17 @@ mod tests {
             coulomb: 1.5,
             coulomb_speed: 0.02,
             gravity: 9.80665,
+            spring: Spring::none(),
         };
         assert_eq!(arm.acceleration(0.0, 0.0, 0.0, 0.0), 0.0);
         let weight = (1.8 + 9.0 * 0.9) * 9.80665;
         assert!(arm.acceleration(std::f64::consts::FRAC_PI_2, 0.0, weight, 0.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_spring_pulls_to_its_rest() {
+        let spring = Spring { stiffness: 40.0_f64, angle: 0.5 };
+        assert_eq!((spring.torque(0.5), Spring::none().torque(0.3)), (0.0, 0.0));
+        assert!((spring.torque(0.75) + 10.0).abs() < 1e-12 && spring.torque(0.0) > 0.0);
     }
 }

@@ -1,6 +1,6 @@
 //! Planar arm of `N` links in series, with payloads, friction and elastic stops.
 //!
-//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop` (Spong, Hutchinson &
+//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop - k (q - q_k)` (Spong, Hutchinson &
 //! Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as
 //! in the one-link arm, `q_k` from the link before; positive torque raises `q`. In the links'
 //! directions `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its
@@ -18,7 +18,7 @@
 //! method without square roots (`L D L^T`), written here because nalgebra's asks for more of a
 //! number than [`Scalar`] does; for one link it is the division of [`super::one_link::OneLink`].
 
-pub use super::one_link::Stops;
+pub use super::one_link::{Spring, Stops};
 use crate::error::{check_range, Error, Result};
 use crate::scalar::{constant, Scalar};
 use nalgebra::{SMatrix, SVector};
@@ -44,6 +44,8 @@ pub struct Link<S> {
     pub coulomb_speed: f64,
     /// Stops of the joint angle; `None` for a joint that turns freely.
     pub stops: Option<Stops>,
+    /// Spring across the joint.
+    pub spring: Spring<S>,
 }
 
 /// A planar arm of `N` links.
@@ -173,6 +175,12 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         })
     }
 
+    /// Torques of the springs across the joints [N m], towards their rest.
+    #[inline]
+    pub fn spring_torque(&self, angle: &SVector<S, N>) -> SVector<S, N> {
+        SVector::from_fn(|i, _| self.links[i].spring.torque(angle[i]))
+    }
+
     /// Torques of the stops [N m].
     #[inline]
     pub fn stop_torque(&self, angle: &SVector<S, N>, rate: &SVector<S, N>) -> SVector<S, N> {
@@ -196,7 +204,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     }
 
     /// Potential energy of gravity [J], zero with every mass at the height of the first joint;
-    /// without the stops'.
+    /// without that of springs and stops.
     pub fn potential_energy(&self, angle: &SVector<S, N>) -> S {
         let pose = Pose::new(angle);
         (0..N).fold(constant(0.0), |sum, i| sum - self.moment[i] * self.gravity * pose.cos[i])
@@ -217,8 +225,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         ends
     }
 
-    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction and stops
-    /// are added here.
+    /// Angular accelerations [rad/s2] of the joints under joint torques [N m]; friction, springs and
+    /// stops are added here.
     ///
     /// # Errors
     /// [`Error::Parameter`] that names the argument that is not finite, or the pivot of a mass
@@ -232,7 +240,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         let pose = Pose::new(angle);
         let (friction, stop) = (self.friction_torque(rate), self.stop_torque(angle, rate));
         let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
-        let (drive, stop) = (reactions(torque.zip_map(&friction, |t, f| t - f)), reactions(stop));
+        let own = self.spring_torque(angle).zip_map(&friction, |s, f| s - f);
+        let (drive, stop) = (reactions(torque.zip_map(&own, |t, o| t + o)), reactions(stop));
         let net = SVector::from_fn(|i, _| drive[i] - velocity[i] - weight[i] + stop[i]);
         let turn =
             solve(&self.mass_of_links(&pose), net).map_err(|e| named(e, angle, rate, torque))?;
@@ -254,7 +263,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         Ok(SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] }))
     }
 
-    /// Joint torques [N m] that give joint accelerations [rad/s2], friction and stops overcome.
+    /// Joint torques [N m] that give joint accelerations [rad/s2], friction, springs and stops
+    /// overcome.
     pub fn inverse_dynamics(
         &self,
         angle: &SVector<S, N>,
@@ -270,7 +280,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
                 + velocity[i]
                 + weight[i]
         }));
-        SVector::from_fn(|i, _| joints[i] + friction[i] - stop[i])
+        let spring = self.spring_torque(angle);
+        SVector::from_fn(|i, _| joints[i] + friction[i] - spring[i] - stop[i])
     }
 
     /// Mass matrix of the links' directions.
@@ -320,6 +331,8 @@ impl<S: Scalar> Link<S> {
         range("viscous", self.viscous.re(), 0.0, 1e6, "N m s/rad")?;
         range("coulomb", self.coulomb.re(), 0.0, 1e6, "N m")?;
         range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")?;
+        range("spring.stiffness", self.spring.stiffness.re(), 0.0, 1e9, "N m/rad")?;
+        range("spring.angle", self.spring.angle.re(), -100.0, 100.0, "rad")?;
         if let Some(stops) = &self.stops {
             range("stops.min_angle", stops.min_angle, -100.0, 100.0, "rad")?;
             range("stops.max_angle", stops.max_angle, stops.min_angle, 100.0, "rad")?;
