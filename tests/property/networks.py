@@ -171,6 +171,13 @@ def springs(draw: st.DrawFn) -> dict[str, Any]:
 
 
 @st.composite
+def mountings(draw: st.DrawFn, *names: str) -> dict[str, Any]:
+    """Angles at which an arm is mounted, or straight down."""
+    tilted = draw(st.booleans())
+    return {name: draw(st.floats(-3.0, 3.0)) for name in names} if tilted else {}
+
+
+@st.composite
 def links(draw: st.DrawFn, on: str, rubbing: float) -> dict[str, Any]:
     """A link of a planar arm; `rubbing` multiplies its friction."""
     length = draw(st.floats(0.15, 0.35))
@@ -217,6 +224,7 @@ def bodies(
         }
         blocks["arm"] = {
             **arm,
+            **draw(mountings("base_angle", "centre_angle")),
             "coulomb": rubbing * draw(st.floats(0.0, 0.1)),
             "coulomb_speed": 0.1,
         }
@@ -226,7 +234,7 @@ def bodies(
             blocks[f"transmission.{name}"] = draw(transmissions())
             hinge = joint(**draw(springs()))
             blocks |= {f"joint.{name}": hinge, f"link.{name}": draw(links(on, rubbing))}
-        blocks["arm"] = {"kind": "planar"}
+        blocks["arm"] = {"kind": "planar", **draw(mountings("base_angle"))}
     return blocks
 
 

@@ -196,7 +196,8 @@ def mechanical_energy(blocks: Blocks, run: Run, got: pamrs.Simulation) -> Array:
         mass = blocks["load"]["mass"]
         return np.asarray(mass * (0.5 * got["length_rate"] ** 2 - GRAVITY * got["length"]))
     if "link.elbow" in blocks:
-        arm = PlanarArm([Link.from_model(link) for link in run.model["arm"]["links"]])
+        links = [Link.from_model(link) for link in run.model["arm"]["links"]]
+        arm = PlanarArm(links, base_angle=blocks["arm"].get("base_angle", 0.0))
         angles, rates = (
             np.column_stack([got[f"{word}.{name}"] for name in ("elbow", "wrist")])
             for word in ("joint_angle", "joint_rate")
@@ -209,11 +210,10 @@ def mechanical_energy(blocks: Blocks, run: Run, got: pamrs.Simulation) -> Array:
         )
     arm_of = blocks["arm"]
     inertia = arm_of["inertia"] + arm_of["payload"] * arm_of["length"] ** 2
-    moment = arm_of["first_moment"] + arm_of["payload"] * arm_of["length"]
-    return np.asarray(
-        0.5 * inertia * got["joint_rate.elbow"] ** 2
-        - moment * GRAVITY * np.cos(got["joint_angle.elbow"])
-    )
+    direction = got["joint_angle.elbow"] + arm_of.get("base_angle", 0.0)
+    height = -arm_of["first_moment"] * np.cos(direction + arm_of.get("centre_angle", 0.0))
+    height -= arm_of["payload"] * arm_of["length"] * np.cos(direction)
+    return np.asarray(0.5 * inertia * got["joint_rate.elbow"] ** 2 + GRAVITY * height)
 
 
 @SOME

@@ -324,14 +324,15 @@ Body = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]
 
 
 def _one_link(model: Mapping[str, Any]) -> Body:
-    arm = Arm(**{key.name: model[key.name] for key in fields(Arm)})
+    arm = Arm(**{key.name: model[key.name] for key in fields(Arm) if key.name in model})
     return lambda q, v, f: [arm.acceleration(q[0], v[0], f[0])]
 
 
 def _planar(model: Mapping[str, Any], joints: Sequence[Coordinate]) -> Body:
     names = [_port("joint", joint.name) for joint in joints]
     order = [names.index(link["joint"]) for link in model["links"]]
-    arm = PlanarArm([Link.from_model(link) for link in model["links"]], model["gravity"])
+    links = [Link.from_model(link) for link in model["links"]]
+    arm = PlanarArm(links, model["gravity"], model.get("base_angle", 0.0))
 
     def accelerate(q: Sequence[float], v: Sequence[float], f: Sequence[float]) -> list[float]:
         found = arm.acceleration(*([values[i] for i in order] for values in (q, v, f)))

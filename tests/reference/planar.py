@@ -45,6 +45,8 @@ class PlanarArm:
 
     links: Sequence[Link]
     gravity: float = 9.80665
+    #: Of the first link from the direction of gravity where its joint's angle is zero, rad.
+    base_angle: float = 0.0
 
     def inverse_dynamics(
         self,
@@ -57,8 +59,9 @@ class PlanarArm:
         arm's own.
         """
         phi = omega = alpha = 0.0
-        # The base rises with g instead of every body falling.
-        ax, ay = 0.0, self.gravity if gravity is None else gravity
+        # The base rises with g instead of every body falling; the axes turn with a tilted base.
+        rise = self.gravity if gravity is None else gravity
+        ax, ay = rise * math.sin(self.base_angle), rise * math.cos(self.base_angle)
         moved = []
         for link, q, v, a in zip(self.links, angle, rate, acceleration, strict=True):
             phi, omega, alpha = phi + q, omega + v, alpha + a
@@ -126,7 +129,8 @@ class PlanarArm:
         """Potential energy above the height of the first joint, J; complex angles are allowed."""
         total: Any = 0.0
         height: Any = 0.0
-        for link, x in zip(self.links, np.cos(np.cumsum(np.asarray(angle))), strict=True):
+        along = np.cumsum(np.asarray(angle)) + self.base_angle
+        for link, x in zip(self.links, np.cos(along), strict=True):
             total += link.mass * (height - link.centre * x)
             height = height - link.length * x
             total += link.payload * height

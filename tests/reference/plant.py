@@ -100,11 +100,19 @@ class Arm:
     coulomb: float = 1.5
     coulomb_speed: float = 0.02
     gravity: float = 9.80665
+    #: Of the link from the direction of gravity at the joint's zero, and of the centre of mass off
+    #: the line of the link.
+    base_angle: float = 0.0
+    centre_angle: float = 0.0
 
     def acceleration(self, angle: float, rate: float, torque: float) -> float:
         """Angular acceleration, rad/s^2, under the sum of joint torques `torque`."""
         friction = self.viscous * rate + self.coulomb * math.tanh(rate / self.coulomb_speed)
-        weight = (self.first_moment + self.payload * self.length) * self.gravity * math.sin(angle)
+        link = angle + self.base_angle
+        weight = self.gravity * (
+            self.first_moment * math.sin(link + self.centre_angle)
+            + self.payload * self.length * math.sin(link)
+        )
         return (torque - friction - weight) / (self.inertia + self.payload * self.length**2)
 
 

@@ -2,7 +2,7 @@
 //! links, errors.
 
 use nalgebra::{SMatrix, SVector};
-use pam_core::blocks::arm::one_link::OneLink;
+use pam_core::blocks::arm::one_link::{Mounting, OneLink};
 use pam_core::blocks::arm::planar::{Link, PlanarArm, Spring, Stops};
 use pam_core::dual::Slope;
 use pam_core::scalar::{constant, Scalar};
@@ -229,12 +229,17 @@ proptest! {
             coulomb_speed: l.coulomb_speed,
             gravity: GRAVITY,
             spring,
+            mounting: Mounting::plumb(),
         };
         let planar = arm::<f64, 1>(&[l]);
         let [q, r, t] = [angle, rate, torque].map(SVector::<f64, 1>::new);
         let expected = one.acceleration(angle, rate, torque, stops.torque(angle, rate));
         prop_assert_eq!(planar.acceleration(&q, &r, &t).unwrap()[0], expected);
         prop_assert_eq!(planar.mass_matrix(&q)[0], one.total_inertia());
+        let tilted = OneLink { mounting: Mounting::new(0.4, 0.0), ..one };
+        let expected = tilted.acceleration(angle, rate, torque, stops.torque(angle, rate));
+        let found = planar.tilted(0.4).acceleration(&q, &r, &t).unwrap()[0];
+        prop_assert!((found - expected).abs() < 1e-12 * expected.abs().max(1e3));
     }
 
     /// Spong, Hutchinson & Vidyasagar, ch. 7, planar elbow manipulator: the first angle from the

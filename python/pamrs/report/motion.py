@@ -293,6 +293,7 @@ class _Scene:
         )[0]
         self.text: Any = axes.set_title("")
         self.base = np.array([0.0, 0.0])
+        self.tilt = sum(float(arm.get("base_angle", 0.0)) for arm in rig.tables("arm").values())
         self.top = top
 
     def _joint_of(self, name: str, joints: list[str]) -> int:
@@ -302,7 +303,7 @@ class _Scene:
     def draw(self, row: int) -> tuple[Any, ...]:
         """Put one sample into the picture."""
         points, along = [self.base], [np.array([0.0, 1.0])]
-        direction = 0.0
+        direction = self.tilt
         for angle, length in zip(self.angles, self.lengths, strict=True):
             direction += float(angle[row])
             down = np.array([math.sin(direction), -math.cos(direction)])

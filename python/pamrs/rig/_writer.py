@@ -35,6 +35,7 @@ __all__ = [
 
 _STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
 _SPRING: Final = ("stiffness", "spring_angle")
+_MOUNTING: Final = ("base_angle", "centre_angle")
 
 # ---------------------------------------------------------------------------------- TOML
 
@@ -263,8 +264,10 @@ def _arm(model: Mapping[str, Any], ports: Ports) -> dict[str, Any] | None:
     if model["arm"] is None:
         return None
     tables = tables_of(model, "link")
+    arm = model["arm"]
     return {
-        **model["arm"],
+        **{key: value for key, value in arm.items() if key not in _MOUNTING},
+        **_told(arm, _MOUNTING),
         "links": [
             {"name": name, "joint": ends["joint"], **tables[name]}
             for name, ends in ports["link"].items()

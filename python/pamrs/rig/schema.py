@@ -348,6 +348,23 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("coulomb", "N m", 0.0, 1e6, 0.0, only=_ONE_LINK),
         Key("coulomb_speed", "rad/s", 1e-9, 100.0, 0.02, only=_ONE_LINK),
         Key("gravity", "m/s2", -50.0, 50.0, 9.80665),
+        Key(
+            "base_angle",
+            "rad",
+            -_TURN,
+            _TURN,
+            0.0,
+            note="of the (first) link from the direction of gravity where its joint's angle is zero",
+        ),
+        Key(
+            "centre_angle",
+            "rad",
+            -_TURN,
+            _TURN,
+            0.0,
+            only=_ONE_LINK,
+            note="of the centre of mass off the line of the link, positive as the joint's angle",
+        ),
     ),
     "link": (
         Key("length", "m", 0.0, 100.0),

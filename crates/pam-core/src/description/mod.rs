@@ -227,6 +227,12 @@ pub struct ArmSpec {
     #[serde(default = "default_coulomb_speed")]
     pub coulomb_speed: f64,
     pub gravity: f64,
+    /// Of the first link from the direction of gravity, where its joint's angle is zero.
+    #[serde(default)]
+    pub base_angle: f64,
+    /// Of the centre of mass off the line from the joint to the payload.
+    #[serde(default)]
+    pub centre_angle: f64,
     #[serde(default)]
     pub links: Vec<LinkSpec>,
 }

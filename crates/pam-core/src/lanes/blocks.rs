@@ -161,6 +161,10 @@ pub(super) struct Body<S: Simd, const R: usize> {
     pub weight: Num<S, R>,
     /// How the weight follows the angle.
     pub turns: Turns,
+    /// How far it is from straight down where the angle is zero [rad].
+    pub tilt: Num<S, R>,
+    /// Some lane is so.
+    pub tilted: bool,
     pub viscous: Num<S, R>,
     pub coulomb: Num<S, R>,
     /// Some lane has Coulomb friction.
@@ -178,11 +182,17 @@ impl<S: Simd, const R: usize> Body<S, R> {
     #[inline(always)]
     pub fn acceleration(&self, angle: Num<S, R>, rate: Num<S, R>, torque: Num<S, R>) -> Num<S, R> {
         // What resists is known before the torque is.
-        let mut resists = match self.turns {
-            Turns::Not => self.weight,
-            Turns::Near => self.weight * angle.sin_near(),
-            Turns::Far => self.weight * angle.sin(),
+        let mut across = match self.turns {
+            Turns::Not => rate.constant(1.0),
+            Turns::Near => angle.sin_near(),
+            Turns::Far => angle.sin(),
         };
+        if self.tilted {
+            // what is not tilted keeps the bits that it has alone
+            let plumb = self.tilt.abs().at_most(angle.constant(0.0));
+            across = plumb.select(across, (angle + self.tilt).sin());
+        }
+        let mut resists = self.weight * across;
         resists = self.viscous.times_plus(rate, resists);
         if self.rubs {
             resists = self.coulomb.times_plus((rate * self.coulomb_slope).tanh(), resists);

@@ -576,29 +576,36 @@ fn body<'a, S: Simd, const R: usize>(
         OneBody::Mass(load, stops) => (Turns::Not, load.coulomb_speed, *stops),
         _ => (Turns::Not, f64::NAN, None),
     };
-    let of = |number: fn(&OneBody<f64>) -> [f64; 6], k: usize| each(&|p| number(&p.body)[k]);
+    let of = |number: fn(&OneBody<f64>) -> [f64; 7], k: usize| each(&|p| number(&p.body)[k]);
     let numbers = |body: &OneBody<f64>| match body {
         OneBody::OneLink(arm, _) => {
-            let weight = (arm.first_moment + arm.payload * arm.length) * arm.gravity;
+            let (weight, tilt) = match arm.weights() {
+                [level, 0.0] => (level, 0.0),
+                [level, side] => (level.hypot(side), side.atan2(level)),
+            };
             let Spring { stiffness, angle } = arm.spring;
-            [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb, stiffness, angle]
+            [1.0 / arm.total_inertia(), weight, arm.viscous, arm.coulomb, stiffness, angle, tilt]
         }
         OneBody::Mass(load, _) => {
-            [1.0 / load.mass, load.mass * load.gravity, load.viscous, load.coulomb, 0.0, 0.0]
+            let weight = load.mass * load.gravity;
+            [1.0 / load.mass, weight, load.viscous, load.coulomb, 0.0, 0.0, 0.0]
         }
-        _ => [f64::NAN; 6],
+        _ => [f64::NAN; 7],
     };
-    let (coulomb, stiffness) = (of(numbers, 3), of(numbers, 4));
+    let (coulomb, stiffness, tilt) = (of(numbers, 3), of(numbers, 4), of(numbers, 6));
+    let some = |numbers: &Num<S, R>| numbers.numbers().iter().any(|number| *number != 0.0);
     Body {
         mobility: of(numbers, 0),
         weight: of(numbers, 1),
         turns,
+        tilted: some(&tilt),
+        tilt,
         viscous: of(numbers, 2),
         coulomb,
-        rubs: coulomb.numbers().iter().any(|c| *c != 0.0),
+        rubs: some(&coulomb),
         coulomb_slope: 1.0 / coulomb_speed,
         stops,
         spring: [stiffness, of(numbers, 5)],
-        springs: stiffness.numbers().iter().any(|k| *k != 0.0),
+        springs: some(&stiffness),
     }
 }

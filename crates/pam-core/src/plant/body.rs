@@ -3,7 +3,7 @@
 use super::units::{BodyUnit, Coordinate, LinkUnit};
 use super::Values;
 use crate::blocks::arm::linear::HangingMass;
-use crate::blocks::arm::one_link::{OneLink, Spring, Stops};
+use crate::blocks::arm::one_link::{Mounting, OneLink, Spring, Stops};
 use crate::blocks::arm::planar::{Link, PlanarArm};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
@@ -45,6 +45,8 @@ impl<S: Scalar> Body<S> {
                 payload,
                 viscous,
                 coulomb,
+                base_angle,
+                centre_angle,
                 length,
                 coulomb_speed,
                 gravity,
@@ -59,15 +61,19 @@ impl<S: Scalar> Body<S> {
                     coulomb_speed: *coulomb_speed,
                     gravity: *gravity,
                     spring: spring(coordinates.first(), values),
+                    mounting: Mounting::new(values[*base_angle], values[*centre_angle]),
                 },
                 stops,
             ),
-            BodyUnit::Planar { gravity, links } => match links.len() {
-                1 => Self::Planar1(planar(*gravity, links, coordinates, values)?),
-                2 => Self::Planar2(planar(*gravity, links, coordinates, values)?),
-                3 => Self::Planar3(planar(*gravity, links, coordinates, values)?),
-                _ => Self::Planar4(planar(*gravity, links, coordinates, values)?),
-            },
+            BodyUnit::Planar { gravity, base_angle, links } => {
+                let mounted = (*gravity, values[*base_angle]);
+                match links.len() {
+                    1 => Self::Planar1(planar(mounted, links, coordinates, values)?),
+                    2 => Self::Planar2(planar(mounted, links, coordinates, values)?),
+                    3 => Self::Planar3(planar(mounted, links, coordinates, values)?),
+                    _ => Self::Planar4(planar(mounted, links, coordinates, values)?),
+                }
+            }
         })
     }
 
@@ -184,7 +190,7 @@ impl<S: Scalar> Body<S> {
     pub fn end(&self, link: usize, angle: &[S], rate: &[S]) -> (Vec<[S; 2]>, [S; 2]) {
         let mut sides = vec![[constant(0.0); 2]; angle.len()];
         let mut own = [constant::<S>(0.0); 2];
-        let (mut direction, mut turn) = (constant::<S>(0.0), constant::<S>(0.0));
+        let (mut direction, mut turn) = (self.base_angle(), constant::<S>(0.0));
         for i in 0..=link.min(angle.len().saturating_sub(1)) {
             direction += angle[i];
             turn += rate[i];
@@ -199,6 +205,18 @@ impl<S: Scalar> Body<S> {
             own[1] += inwards * cos;
         }
         (sides, own)
+    }
+
+    /// Angle of the first link from the gravity vector where its joint's is zero [rad].
+    fn base_angle(&self) -> S {
+        match self {
+            Self::Fixed | Self::Mass(..) => constant(0.0),
+            Self::OneLink(arm, _) => arm.mounting.base_angle(),
+            Self::Planar1(arm) => arm.base_angle(),
+            Self::Planar2(arm) => arm.base_angle(),
+            Self::Planar3(arm) => arm.base_angle(),
+            Self::Planar4(arm) => arm.base_angle(),
+        }
     }
 
     fn length(&self, link: usize) -> S {
@@ -293,7 +311,7 @@ fn planar_response<S: Scalar, const N: usize>(
 }
 
 fn planar<S: Scalar, const N: usize>(
-    gravity: f64,
+    (gravity, base_angle): (f64, S),
     units: &[LinkUnit],
     coordinates: &[Coordinate],
     values: &Values<S>,
@@ -313,7 +331,7 @@ fn planar<S: Scalar, const N: usize>(
             spring: spring(coordinate, values),
         }
     });
-    PlanarArm::new(links, gravity)
+    Ok(PlanarArm::new(links, gravity)?.tilted(base_angle))
 }
 
 #[inline]

@@ -144,12 +144,15 @@ pub(crate) enum BodyUnit {
         payload: ParameterId,
         viscous: ParameterId,
         coulomb: ParameterId,
+        base_angle: ParameterId,
+        centre_angle: ParameterId,
         length: f64,
         coulomb_speed: f64,
         gravity: f64,
     },
     Planar {
         gravity: f64,
+        base_angle: ParameterId,
         links: Vec<LinkUnit>,
     },
     Mass {

@@ -10,6 +10,9 @@ use crate::muscle::spec::MODULUS_SCALE;
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
 
+/// Bounds of an angle that an arm is mounted at.
+const TURNED: (f64, f64, &str) = (-7.0, 7.0, "rad");
+
 pub(super) fn coordinates(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<Coordinate>> {
     if let Some(load) = &spec.load {
         if !spec.joints.is_empty() || spec.arm.is_some() {
@@ -211,6 +214,8 @@ pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
         payload: table.add("arm.payload".into(), arm.payload, (0.0, 1e6, "kg"))?,
         viscous: table.add("arm.viscous".into(), arm.viscous, (0.0, 1e6, "N m s/rad"))?,
         coulomb: table.add("arm.coulomb".into(), arm.coulomb, (0.0, 1e6, "N m"))?,
+        base_angle: table.add("arm.base_angle".into(), arm.base_angle, TURNED)?,
+        centre_angle: table.add("arm.centre_angle".into(), arm.centre_angle, TURNED)?,
         length: arm.length,
         coulomb_speed: arm.coulomb_speed,
         gravity: arm.gravity,
@@ -234,5 +239,6 @@ fn planar(arm: &ArmSpec, table: &mut Parameters) -> Result<BodyUnit> {
         })
     };
     let links = arm.links.iter().map(&mut unit).collect::<Result<_>>()?;
-    Ok(BodyUnit::Planar { gravity: arm.gravity, links })
+    let base_angle = table.add("arm.base_angle".into(), arm.base_angle, TURNED)?;
+    Ok(BodyUnit::Planar { gravity: arm.gravity, base_angle, links })
 }

@@ -93,7 +93,15 @@ _VALVE = (
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _MUSCLE = ("modulus_scale",)
-_ARM = ("inertia", "first_moment", "payload", "viscous", "coulomb")
+_ARM = (
+    "inertia",
+    "first_moment",
+    "payload",
+    "viscous",
+    "coulomb",
+    "base_angle",
+    "centre_angle",
+)
 _JOINT = ("stiffness", "spring_angle")
 _LOAD = ("mass", "viscous", "coulomb")
 _LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")

@@ -3,6 +3,8 @@
 //! `(Iz + mp l^2) theta'' = tau - c theta' - f tanh(theta'/w) - (m lc + mp l) g sin(theta) +
 //! tau_stop - k (theta - theta_k)`, angle from the gravity vector (physics of dissertation ch. 5;
 //! stops as one-sided spring and damper; a spring beside the muscles, `k`, at rest at `theta_k`).
+//! On a tilted base, and with a centre of mass off the line of the link, the weight is
+//! `m lc g sin(theta + b + e) + mp l g sin(theta + b)`.
 
 use crate::scalar::{constant, Scalar};
 
@@ -27,6 +29,37 @@ pub struct OneLink<S> {
     pub gravity: f64,
     /// Spring across the joint.
     pub spring: Spring<S>,
+    /// How it hangs.
+    pub mounting: Mounting<S>,
+}
+
+/// Directions of an arm's own centre of mass, and of its payload, where the joint's angle is zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mounting<S> {
+    /// Cosine and sine of the angle of the centre of mass from the gravity vector.
+    own: [S; 2],
+    /// The same of the payload.
+    payload: [S; 2],
+    base_angle: S,
+}
+
+impl<S: Scalar> Mounting<S> {
+    /// A base whose zero is `base_angle` off the gravity vector, and a centre of mass that is
+    /// `centre_angle` off the line to the payload [rad].
+    pub fn new(base_angle: S, centre_angle: S) -> Self {
+        let at = |angle: S| [angle.cos(), angle.sin()];
+        Self { own: at(base_angle + centre_angle), payload: at(base_angle), base_angle }
+    }
+
+    /// Angle of the line to the payload from the gravity vector, where the joint's is zero [rad].
+    pub fn base_angle(&self) -> S {
+        self.base_angle
+    }
+
+    /// Straight down.
+    pub fn plumb() -> Self {
+        Self::new(constant(0.0), constant(0.0))
+    }
 }
 
 /// A linear spring across a joint, beside the muscles.
@@ -102,10 +135,23 @@ impl<S: Scalar> OneLink<S> {
         self.viscous * rate + self.coulomb * (rate / self.coulomb_speed).tanh()
     }
 
+    /// Largest torque of its weight by the sine and by the cosine of the joint's angle [N m].
+    #[inline]
+    pub fn weights(&self) -> [S; 2] {
+        let Mounting { own, payload, .. } = self.mounting;
+        let hanging = self.payload * self.length;
+        [0, 1].map(|k| (self.first_moment * own[k] + hanging * payload[k]) * self.gravity)
+    }
+
     /// Torque that holds the arm against gravity [N m].
     #[inline]
     pub fn weight(&self, angle: S) -> S {
-        (self.first_moment + self.payload * self.length) * self.gravity * angle.sin()
+        let [level, side] = self.weights();
+        let plumb = level * angle.sin();
+        if side.same(&constant(0.0)) {
+            return plumb; // as most are, and a cosine is dear
+        }
+        plumb + side * angle.cos()
     }
 
     /// Angular acceleration [rad/s2] under a joint torque and a stop torque [N m].
@@ -140,10 +186,37 @@ mod tests {
             coulomb_speed: 0.02,
             gravity: 9.80665,
             spring: Spring::none(),
+            mounting: Mounting::plumb(),
         };
         assert_eq!(arm.acceleration(0.0, 0.0, 0.0, 0.0), 0.0);
         let weight = (1.8 + 9.0 * 0.9) * 9.80665;
         assert!(arm.acceleration(std::f64::consts::FRAC_PI_2, 0.0, weight, 0.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_tilt_is_an_angle_of_the_joint_and_the_centre_of_mass_has_one_of_its_own() {
+        let arm = |base: f64, centre: f64, payload: f64| OneLink {
+            inertia: 0.6,
+            first_moment: 1.8,
+            length: 0.9,
+            payload,
+            viscous: 0.0,
+            coulomb: 0.0,
+            coulomb_speed: 0.02,
+            gravity: 9.80665,
+            spring: Spring::none(),
+            mounting: Mounting::new(base, centre),
+        };
+        let (quarter, near) = (std::f64::consts::FRAC_PI_2, |a: f64, b: f64| (a - b).abs() < 1e-12);
+        for angle in [-1.3_f64, 0.0, 0.4, 2.0] {
+            let plumb = arm(0.0, 0.0, 5.0).weight(angle);
+            assert!(near(arm(0.3, 0.0, 5.0).weight(angle - 0.3), plumb));
+            let across = (1.8 + 5.0 * 0.9) * 9.80665 * angle.cos();
+            assert!(near(arm(quarter, 0.0, 5.0).weight(angle), across));
+            let both = arm(0.2, 0.5, 0.0).weight(angle) + 5.0 * 0.9 * 9.80665 * (angle + 0.2).sin();
+            assert!(near(arm(0.2, 0.5, 5.0).weight(angle), both));
+            assert!(near(arm(0.2, 0.5, 0.0).weight(angle), arm(0.7, 0.0, 0.0).weight(angle)));
+        }
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Planar arm of `N` links in series, with payloads, friction and elastic stops.
 //!
 //! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop - k (q - q_k)` (Spong, Hutchinson &
-//! Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector, as
-//! in the one-link arm, `q_k` from the link before; positive torque raises `q`. In the links'
+//! Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector (of
+//! a tilted base from an angle to it), as in the one-link arm, `q_k` from the link before; positive torque raises `q`. In the links'
 //! directions `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its
 //! payload and every link beyond),
 //!
@@ -53,6 +53,8 @@ pub struct Link<S> {
 pub struct PlanarArm<S, const N: usize> {
     links: [Link<S>; N],
     gravity: f64,
+    /// Angle of the first link from the gravity vector where its joint's is zero [rad].
+    base_angle: S,
     /// `A`, both triangles [kg m2].
     coupling: SMatrix<S, N, N>,
     /// `B` [kg m].
@@ -66,9 +68,9 @@ struct Pose<S, const N: usize> {
 }
 
 impl<S: Scalar, const N: usize> Pose<S, N> {
-    fn new(angle: &SVector<S, N>) -> Self {
+    fn new(angle: &SVector<S, N>, base: S) -> Self {
         let (mut sin, mut cos) = (zeros(), zeros());
-        let mut direction = constant::<S>(0.0);
+        let mut direction = base;
         for i in 0..N {
             direction += angle[i];
             (sin[i], cos[i]) = direction.sin_cos();
@@ -100,7 +102,18 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         for (k, link) in links.iter().enumerate() {
             link.check(k)?;
         }
-        Ok(Self::assembled(links, gravity))
+        Ok(Self::assembled(links, gravity, constant(0.0)))
+    }
+
+    /// The same on a base whose zero is an angle [rad] off the gravity vector.
+    #[must_use]
+    pub fn tilted(self, base_angle: S) -> Self {
+        Self { base_angle, ..self }
+    }
+
+    /// Angle of the first link from the gravity vector where its joint's is zero [rad].
+    pub fn base_angle(&self) -> S {
+        self.base_angle
     }
 
     /// The same with another payload at the end of a link; one that cannot be shows in the mass
@@ -111,10 +124,10 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         if let Some(link) = links.get_mut(link) {
             link.payload = payload;
         }
-        Self::assembled(links, self.gravity)
+        Self::assembled(links, self.gravity, self.base_angle)
     }
 
-    fn assembled(links: [Link<S>; N], gravity: f64) -> Self {
+    fn assembled(links: [Link<S>; N], gravity: f64, base_angle: S) -> Self {
         let (mut coupling, mut moment) = (SMatrix::from_element(constant(0.0)), zeros());
         let mut beyond = constant::<S>(0.0);
         for i in (0..N).rev() {
@@ -128,7 +141,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
             }
             beyond = carried + mass;
         }
-        Self { links, gravity, coupling, moment }
+        Self { links, gravity, base_angle, coupling, moment }
     }
 
     /// The links, base first.
@@ -143,7 +156,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
     /// Mass matrix `H` [kg m2] at joint angles [rad].
     pub fn mass_matrix(&self, angle: &SVector<S, N>) -> SMatrix<S, N, N> {
-        let mut mass = outward_sums(self.mass_of_links(&Pose::new(angle)));
+        let mut mass = outward_sums(self.mass_of_links(&Pose::new(angle, self.base_angle)));
         mass.fill_lower_triangle_with_upper_triangle(); // the two differ by the order of rounding
         mass
     }
@@ -151,7 +164,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     /// Coriolis matrix `C` [kg m2/s] of the Christoffel symbols, at joint angles [rad] and rates
     /// [rad/s].
     pub fn coriolis_matrix(&self, angle: &SVector<S, N>, rate: &SVector<S, N>) -> SMatrix<S, N, N> {
-        let (pose, turn) = (Pose::new(angle), running_sum(rate));
+        let (pose, turn) = (Pose::new(angle, self.base_angle), running_sum(rate));
         let mut c = SMatrix::from_element(constant(0.0));
         for i in 0..N {
             for j in (0..N).filter(|&j| j != i) {
@@ -163,7 +176,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
     /// Gravity torques `G` [N m]: what holds the arm at rest.
     pub fn gravity_torque(&self, angle: &SVector<S, N>) -> SVector<S, N> {
-        outward_sum(self.weight_on_links(&Pose::new(angle)))
+        outward_sum(self.weight_on_links(&Pose::new(angle, self.base_angle)))
     }
 
     /// Friction torques [N m] at joint rates [rad/s], positive against positive rates.
@@ -192,7 +205,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
 
     /// Kinetic energy [J].
     pub fn kinetic_energy(&self, angle: &SVector<S, N>, rate: &SVector<S, N>) -> S {
-        let (pose, turn) = (Pose::new(angle), running_sum(rate));
+        let (pose, turn) = (Pose::new(angle, self.base_angle), running_sum(rate));
         let mut twice = constant::<S>(0.0);
         for i in 0..N {
             twice += self.coupling[(i, i)] * turn[i] * turn[i];
@@ -206,7 +219,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     /// Potential energy of gravity [J], zero with every mass at the height of the first joint;
     /// without that of springs and stops.
     pub fn potential_energy(&self, angle: &SVector<S, N>) -> S {
-        let pose = Pose::new(angle);
+        let pose = Pose::new(angle, self.base_angle);
         (0..N).fold(constant(0.0), |sum, i| sum - self.moment[i] * self.gravity * pose.cos[i])
     }
 
@@ -214,7 +227,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     /// `k + 1`, both counted from 0, the last column the tip. Rows: across (where positive angles
     /// point) and up.
     pub fn positions(&self, angle: &SVector<S, N>) -> SMatrix<S, 2, N> {
-        let pose = Pose::new(angle);
+        let pose = Pose::new(angle, self.base_angle);
         let (mut across, mut up) = (constant::<S>(0.0), constant::<S>(0.0));
         let mut ends = SMatrix::from_element(constant(0.0));
         for i in 0..N {
@@ -237,7 +250,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         rate: &SVector<S, N>,
         torque: &SVector<S, N>,
     ) -> Result<SVector<S, N>> {
-        let pose = Pose::new(angle);
+        let pose = Pose::new(angle, self.base_angle);
         let (friction, stop) = (self.friction_torque(rate), self.stop_torque(angle, rate));
         let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
         let own = self.spring_torque(angle).zip_map(&friction, |s, f| s - f);
@@ -259,7 +272,8 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
     /// # Errors
     /// As [`Self::acceleration`].
     pub fn response(&self, angle: &SVector<S, N>, torque: &SVector<S, N>) -> Result<SVector<S, N>> {
-        let turn = solve(&self.mass_of_links(&Pose::new(angle)), reactions(*torque))?;
+        let turn =
+            solve(&self.mass_of_links(&Pose::new(angle, self.base_angle)), reactions(*torque))?;
         Ok(SVector::<S, N>::from_fn(|i, _| if i > 0 { turn[i] - turn[i - 1] } else { turn[i] }))
     }
 
@@ -271,7 +285,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         rate: &SVector<S, N>,
         acceleration: &SVector<S, N>,
     ) -> SVector<S, N> {
-        let pose = Pose::new(angle);
+        let pose = Pose::new(angle, self.base_angle);
         let (friction, stop) = (self.friction_torque(rate), self.stop_torque(angle, rate));
         let (velocity, weight) = (self.velocity_on_links(&pose, rate), self.weight_on_links(&pose));
         let (mass, turn) = (self.mass_of_links(&pose), running_sum(acceleration));
