@@ -144,6 +144,11 @@ def pulls(draw: st.DrawFn, name: str, joint: str, feed: str, friction: bool) -> 
         },
         f"muscle.{name}": {"joint": joint, **MUSCLE, "count": draw(st.integers(1, 2))},
     }
+    if draw(st.booleans()):
+        blocks[f"muscle.{name}"] |= {
+            "softening": draw(st.floats(-5e-3, 5e-3)),
+            "temperature": draw(st.floats(270.0, 330.0)),
+        }
     if friction:
         blocks[f"muscle.{name}"] |= {"friction_coefficient": 0.1, "friction_presliding": 5e-4}
     if draw(st.booleans()):

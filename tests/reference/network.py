@@ -233,6 +233,8 @@ def muscle_of(model: Mapping[str, Any]) -> MuscleReference:
         for key in fields(MuscleReference)
         if key.name in model and key.name != "geometry"
     }
+    warmer = model.get("temperature", 0.0) - model.get("reference_temperature", 0.0)
+    own["modulus_scale"] *= 1.0 - model.get("softening", 0.0) * warmer
     own = {key: tuple(value) if isinstance(value, list) else value for key, value in own.items()}
     muscle = MuscleReference(GeometryReference(**shape, kind=model["geometry"]), **own)
     friction = (muscle.friction_coefficient, muscle.friction_pressure_slope, muscle.friction_floor)
@@ -319,7 +321,8 @@ class Coordinate:
         return 0.0
 
 
-#: Accelerations of all coordinates at positions, rates, and forces on them (muscles, stops, springs).
+#: Accelerations of all coordinates at positions, rates, and forces on them (muscles, stops,
+#: springs).
 Body = Callable[[Sequence[float], Sequence[float], Sequence[float]], list[float]]
 
 

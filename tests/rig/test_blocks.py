@@ -576,7 +576,7 @@ def test_rig_check_says_what_is_connected(
     assert any(
         line.split()[:3] == ["valve.flexor.discharge_area_max", "1.2e-06", "±"] for line in out
     )
-    assert out[-1].endswith("is valid, 76 parameters, 0 effects")
+    assert out[-1].endswith("is valid, 82 parameters, 0 effects")
 
 
 def test_help_and_template_know_every_rig_and_key(

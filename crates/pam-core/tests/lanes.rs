@@ -95,11 +95,19 @@ fn apart(rig: &Rig, request: &Request<'_>, outcome: &Outcome) -> f64 {
 fn one_link_rigs() -> Vec<(&'static str, Rig)> {
     let mut sprung = rigs::shoulder();
     (sprung.joints[0].stiffness, sprung.joints[0].spring_angle) = (40.0, 1.2);
+    let mut tilted = rigs::shoulder();
+    let arm = tilted.arm.as_mut().unwrap();
+    (arm.base_angle, arm.centre_angle) = (-0.7, 0.2);
+    let mut warm = rigs::shoulder();
+    let muscle = &mut warm.muscles[0].muscle;
+    (muscle.softening, muscle.temperature) = (4e-3, 333.15);
     let specs = [
         ("shoulder", rigs::shoulder()),
         ("antagonists", rigs::antagonists()),
         ("regulated", rigs::regulated()),
         ("sprung", sprung),
+        ("tilted", tilted),
+        ("warm", warm),
     ];
     specs.map(|(name, spec)| (name, Rig::new(spec).unwrap())).into()
 }

@@ -86,8 +86,15 @@ fn sensitivities_agree_with_differences() {
     let mut sprung = spec();
     let joint = &mut sprung.joints[0];
     (joint.stiffness, joint.spring_angle) = (30.0, 1.1);
-    let cases: [(&RigSpec, Block, &[&str]); 7] = [
+    let mut tilted = spec();
+    tilted.arm.as_mut().unwrap().base_angle = -0.3; // a centre that is on the line has a slope too
+    let mut warm = spec();
+    let muscle = &mut warm.muscles[0].muscle;
+    (muscle.softening, muscle.temperature) = (3e-3, 313.15);
+    let cases: [(&RigSpec, Block, &[&str]); 9] = [
         (&sprung, Block::Arm(0), &["joint.stiffness", "joint.spring_angle", "arm.payload"]),
+        (&warm, Block::Arm(0), &["muscle.softening", "muscle.temperature"]),
+        (&tilted, Block::Arm(0), &["arm.base_angle", "arm.centre_angle", "arm.payload"]),
         (
             &conducting,
             Block::Chamber(0),
@@ -270,6 +277,10 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
         "arm.payload" => &mut spec.arm.as_mut().unwrap().payload,
         "arm.coulomb" => &mut spec.arm.as_mut().unwrap().coulomb,
         "muscle.modulus_scale" => &mut spec.muscles[0].muscle.modulus_scale,
+        "muscle.softening" => &mut spec.muscles[0].muscle.softening,
+        "muscle.temperature" => &mut spec.muscles[0].muscle.temperature,
+        "arm.base_angle" => &mut spec.arm.as_mut().unwrap().base_angle,
+        "arm.centre_angle" => &mut spec.arm.as_mut().unwrap().centre_angle,
         "joint.stiffness" => &mut spec.joints[0].stiffness,
         "joint.spring_angle" => &mut spec.joints[0].spring_angle,
         "sensors.angle_zero" => &mut spec.sensors[0].angle_zero,

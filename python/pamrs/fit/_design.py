@@ -238,7 +238,7 @@ def _parts(
         return gas, ((loaded - gas) / _UNIT_MODULUS)[:, None]
     # A map repeats its lengths at every level, and the braid solve is what costs.
     distinct, at = np.unique(contraction, return_inverse=True)
-    basis = muscle.parameters["modulus_scale"] * muscle.elastic_basis(distinct)
+    basis = muscle.elastic_scale * muscle.elastic_basis(distinct)
     return pressure * muscle.gas_area(distinct)[at], basis[at]
 
 

@@ -51,6 +51,12 @@ def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
     if factors and len(factors) != 3:
         problems.append(f"{label}.extension_factors has {len(factors)} values; three are needed")
     problems += _map_problems(f"{label}.map", muscle) if "map_force" in muscle else []
+    warmer = muscle.get("temperature", 0.0) - muscle.get("reference_temperature", 0.0)
+    if muscle.get("softening", 0.0) * warmer > 1.0:
+        problems.append(
+            f"{label}.softening = {muscle['softening']:g} 1/K is not allowed: a size of at most "
+            f"{1.0 / abs(warmer):g} 1/K is needed, {warmer:g} K above {label}.reference_temperature"
+        )
     thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
     if not thickness < diameter / 2:
         problems.append(

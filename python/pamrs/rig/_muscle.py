@@ -22,7 +22,7 @@ class Muscle:
     """A braided muscle with one of the quasi-static force models of the dissertation (ch. 2 to 4),
     or with a table of forces.
 
-    Every model but ``map`` is ``F = P gas_area(e) + modulus_scale sum_j (slope_j P + offset_j)
+    Every model but ``map`` is ``F = P gas_area(e) + elastic_scale sum_j (slope_j P + offset_j)
     elastic_basis(e)[j]``. A ``map`` is ``F = modulus_scale map(P, e)``, interpolated monotonically;
     the geometry then gives the volume alone. :meth:`from_law` and
     :func:`pamrs.fit.fit_map` make one.
@@ -68,6 +68,11 @@ class Muscle:
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float
         Factor on every elastic parameter, of a ``map`` on its force [1].
+    softening : float
+        Relative loss of every modulus per kelvin above ``reference_temperature`` [1/K], of every
+        model but ``map``.
+    temperature, reference_temperature : float
+        Of the muscle, and at which its moduli hold [K].
     k0, contraction_slope, extension_slope, neck_floor : float
         Axis ratio of the elliptic ends at rest, its slopes per unit contraction, and the smallest
         radius in extension relative to rest [1].
@@ -113,6 +118,9 @@ class Muscle:
         buckling_load: float = 1e9,
         count: int = 1,
         modulus_scale: float = 1.0,
+        softening: float = 0.0,
+        temperature: float = 293.15,
+        reference_temperature: float = 293.15,
         k0: float = 1.64,
         contraction_slope: float = 2.405,
         extension_slope: float = 6.105,
@@ -136,6 +144,9 @@ class Muscle:
             "map_contraction": [float(v) for v in map_contraction],
             "map_force": [float(v) for v in map_force],
             "modulus_scale": modulus_scale,
+            "softening": softening,
+            "temperature": temperature,
+            "reference_temperature": reference_temperature,
             "friction_coefficient": friction_coefficient,
             "friction_pressure_slope": friction_pressure_slope,
             "friction_floor": friction_floor,
@@ -281,6 +292,13 @@ class Muscle:
             name: list(value) if isinstance(value, list) else value
             for name, value in self._model.items()
         }
+
+    @property
+    def elastic_scale(self) -> float:
+        """Factor on every modulus at the muscle's temperature, ``modulus_scale`` included [1]."""
+        own = self._model
+        warmer = float(own["temperature"]) - float(own["reference_temperature"])
+        return float(own["modulus_scale"]) * (1.0 - float(own["softening"]) * warmer)
 
     @property
     def fibre_length(self) -> float:

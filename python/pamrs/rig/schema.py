@@ -109,6 +109,7 @@ _TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
 _ONE_LINK = ("one_link",)
 _ISO = ("iso_6358",)
 _MAP = ("map",)
+_ELASTIC = tuple(model for model in ALL_MODELS if model != "map")
 _COEFFICIENTS = ("coefficients",)
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
@@ -298,6 +299,25 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             note="a row over the contractions for each pressure, one after the other",
         ),
         Key("modulus_scale", "1", 0.0, 100.0, 1.0),
+        Key(
+            "softening",
+            "1/K",
+            -0.1,
+            0.1,
+            0.0,
+            only=_ELASTIC,
+            note="relative loss of every modulus per kelvin above reference_temperature",
+        ),
+        Key("temperature", "K", 150.0, 500.0, 293.15, only=_ELASTIC, note="of the muscle"),
+        Key(
+            "reference_temperature",
+            "K",
+            150.0,
+            500.0,
+            293.15,
+            only=_ELASTIC,
+            note="at which the moduli hold",
+        ),
         Key("k0", "1", 0.0, 100.0, 1.64, path=("end_ratio", "k0")),
         Key("contraction_slope", "1", -1e3, 1e3, 2.405, path=("end_ratio", "contraction_slope")),
         Key("extension_slope", "1", -1e3, 1e3, 6.105, path=("end_ratio", "extension_slope")),
@@ -354,7 +374,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             -_TURN,
             _TURN,
             0.0,
-            note="of the (first) link from the direction of gravity where its joint's angle is zero",
+            note="of the (first) link from the direction of gravity at its joint's zero",
         ),
         Key(
             "centre_angle",

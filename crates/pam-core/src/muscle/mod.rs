@@ -109,7 +109,7 @@ impl Muscle {
     /// length.
     pub fn force(&self, pressure: f64, e: f64) -> Result<f64> {
         check_pressure(pressure)?;
-        let scale = self.spec.modulus_scale;
+        let scale = self.spec.elastic_scale();
         if let Some(map) = &self.map {
             self.shape(e)?;
             return Ok(scale * map.force(pressure, e));
@@ -126,7 +126,7 @@ impl Muscle {
         check_pressure(pressure)?;
         check_direction(direction)?;
         let (braid, shape, scale) =
-            (self.geometry.braid(), self.shape(e)?, self.spec.modulus_scale);
+            (self.geometry.braid(), self.shape(e)?, self.spec.elastic_scale());
         let force = |branch: &Elasticity| branch.coefficients(braid, &shape).force(pressure, scale);
         let lengthening = self.lengthening.as_ref().map(force);
         let mapped = self.map.as_ref().map_or(0.0, |map| scale * map.force(pressure, e));
@@ -255,7 +255,7 @@ impl CompiledMuscle {
         check_pressure(pressure)?;
         let (low, high) = (self.table.e_min, self.table.e_max);
         check_range("muscle.contraction_ratio", e, low, high, "(the table's range)")?;
-        let scale = self.exact.spec.modulus_scale;
+        let scale = self.exact.spec.elastic_scale();
         let force = self.pull(&self.table.eval(e), pressure, e, scale);
         match direction {
             Some(d) => Ok(self.moving(force, e, pressure, scale, check_direction(d)?)),

@@ -7,13 +7,44 @@ use super::friction::Friction;
 use super::model::ForceModel;
 use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
+use crate::scalar::Scalar;
 
 /// Bounds of the factor on every modulus, with its unit.
 pub const MODULUS_SCALE: (f64, f64, &str) = (0.0, 1e3, "(1)");
+/// Possible values of [`MuscleSpec::softening`].
+pub const SOFTENING: (f64, f64, &str) = (-0.1, 0.1, "1/K");
+/// Possible temperatures of a muscle.
+pub const TEMPERATURE: (f64, f64, &str) = (150.0, 500.0, "K");
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
 /// Buckling load of a muscle that pushes like a strut, whatever it is pushed with [N].
 pub const STRUT: f64 = 1e9;
+
+/// Share of its moduli at the reference temperature that a muscle has at a temperature [1].
+#[inline]
+pub fn softened<S: Scalar>(softening: S, temperature: S, reference: f64) -> S {
+    -(softening * (temperature - reference)) + 1.0
+}
+
+/// Refuse moduli below zero of a muscle that is called so.
+///
+/// # Errors
+/// [`Error::Parameter`] that names the softening.
+pub(crate) fn check_softened(
+    muscle: &str,
+    softening: f64,
+    temperature: f64,
+    reference: f64,
+) -> Result<()> {
+    if softened(softening, temperature, reference) >= 0.0 {
+        return Ok(());
+    }
+    let warmer = temperature - reference;
+    let most = 1.0 / warmer.abs();
+    let allowed =
+        format!("a size of at most {most} 1/K, {warmer} K above {muscle}.reference_temperature");
+    Err(Error::parameter(format!("{muscle}.softening"), softening, allowed))
+}
 
 /// Parameters of one kind of muscle, SI units and radians.
 ///
@@ -67,6 +98,15 @@ pub struct MuscleSpec {
     /// Factor on every modulus, of a map on its force [1].
     #[serde(default = "default_scale")]
     pub modulus_scale: f64,
+    /// Relative loss of every modulus per kelvin above the reference temperature [1/K].
+    #[serde(default)]
+    pub softening: f64,
+    /// Temperature of the muscle [K].
+    #[serde(default = "default_temperature")]
+    pub temperature: f64,
+    /// Temperature at which the moduli hold [K].
+    #[serde(default = "default_temperature")]
+    pub reference_temperature: f64,
     /// `c0` of the friction hysteresis [1].
     #[serde(default)]
     pub friction_coefficient: f64,
@@ -94,6 +134,10 @@ pub struct MuscleSpec {
     /// Smallest outer radius in extension as a fraction of the rest radius [1].
     #[serde(default = "default_neck_floor")]
     pub neck_floor: f64,
+}
+
+fn default_temperature() -> f64 {
+    293.15
 }
 
 fn default_factors() -> Factors {
@@ -143,6 +187,9 @@ impl MuscleSpec {
             map_contraction: Vec::new(),
             map_force: Vec::new(),
             modulus_scale: default_scale(),
+            softening: 0.0,
+            temperature: default_temperature(),
+            reference_temperature: default_temperature(),
             friction_coefficient: 0.0,
             friction_pressure_slope: 0.0,
             friction_floor: 0.0,
@@ -207,12 +254,22 @@ impl MuscleSpec {
         friction.acts().then_some(friction)
     }
 
+    /// Factor on every modulus at the muscle's temperature [1].
+    #[must_use]
+    pub fn elastic_scale(&self) -> f64 {
+        let Self { softening, temperature, reference_temperature, .. } = self;
+        self.modulus_scale * softened(*softening, *temperature, *reference_temperature)
+    }
+
     /// The same muscle without what the compiled table does not depend on.
     #[must_use]
     pub fn tabulated(&self) -> Self {
         Self {
             count: 1,
             modulus_scale: 1.0,
+            softening: 0.0,
+            temperature: default_temperature(),
+            reference_temperature: default_temperature(),
             friction_coefficient: 0.0,
             friction_pressure_slope: 0.0,
             friction_floor: 0.0,
@@ -253,6 +310,12 @@ impl MuscleSpec {
         self.check_elastic(model)?;
         let (low, high, unit) = MODULUS_SCALE;
         check_range("muscle.modulus_scale", self.modulus_scale, low, high, unit)?;
+        let (low, high, unit) = SOFTENING;
+        check_range("muscle.softening", self.softening, low, high, unit)?;
+        let (low, high, unit) = TEMPERATURE;
+        check_range("muscle.temperature", self.temperature, low, high, unit)?;
+        check_range("muscle.reference_temperature", self.reference_temperature, low, high, unit)?;
+        check_softened("muscle", self.softening, self.temperature, self.reference_temperature)?;
         for (factor, name) in self.extension_factors.iter().zip(["0", "1", "2"]) {
             check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
         }
@@ -297,6 +360,8 @@ impl MuscleSpec {
                 elbow || self.bladder_modulus == 0.0,
             ),
             ("extension_factors", format!("{:?}", self.extension_factors), elbow || default),
+            // a map has no elastic terms of its own
+            ("softening", self.softening.to_string(), !map || self.softening == 0.0),
             ("map_pressure", numbers(&self.map_pressure), map || self.map_pressure.is_empty()),
             (
                 "map_contraction",

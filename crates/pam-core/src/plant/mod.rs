@@ -235,6 +235,7 @@ impl Rig {
     fn find_steps(&mut self) -> Result<()> {
         let plant = Plant::new(self, self.parameters.lift::<f64>(), false)?;
         plant.check_masses()?;
+        plant.check_moduli()?;
         let steps = self.stable_steps(&plant)?;
         let first_order = plant.first_order();
         (self.gas_step, self.body_step) = steps;

@@ -7,9 +7,11 @@ use super::body::Body;
 use super::ports::{Acting, Place};
 use super::rates::{Plant, Scratch};
 use super::units::{BodyUnit, Group};
+use crate::description::dotted;
 use crate::effects::{Cord, Extremes};
 use crate::error::check_range;
 use crate::muscle::slip::STUCK;
+use crate::muscle::spec::check_softened;
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use std::borrow::Cow;
@@ -176,6 +178,20 @@ impl Plant<'_, f64> {
                     allowed,
                 ));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuse muscles that are softer than nothing at their temperature.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] that names what their moduli are made of.
+    pub(crate) fn check_moduli(&self) -> Result<()> {
+        for (group, spec) in self.wiring.groups.iter().zip(&self.rig.spec.muscles) {
+            let [softening, temperature] =
+                [group.softening, group.temperature].map(|id| self.values[id]);
+            let reference = group.reference_temperature;
+            check_softened(&dotted("muscle", &spec.name), softening, temperature, reference)?;
         }
         Ok(())
     }

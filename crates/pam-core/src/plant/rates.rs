@@ -306,7 +306,7 @@ impl<'a, S: Number> Plant<'a, S> {
                 .map(|valve| Valve { paths: paths(valve), null: values[valve.null] })
                 .collect(),
             lines,
-            scales: wiring.groups.iter().map(|group| values[group.scale]).collect(),
+            scales: wiring.groups.iter().map(|group| group.elastic_scale(&values)).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
             altered: Altered::at(wiring),
             wiring,

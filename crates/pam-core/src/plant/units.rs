@@ -1,11 +1,13 @@
 //! The blocks of a rig with their ports resolved to indices and their numbers to parameters.
 
-use super::parameters::ParameterId;
+use super::parameters::{ParameterId, Values};
 use super::ports::Ports;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::blocks::valve::AreaTable;
+use crate::muscle::spec::softened;
 use crate::muscle::CompiledMuscle;
+use crate::scalar::Scalar;
 
 /// Most links of a planar arm.
 pub const MOST_LINKS: usize = 4;
@@ -107,9 +109,20 @@ pub(crate) struct Group {
     pub joint: Joint,
     pub muscle: CompiledMuscle,
     pub scale: ParameterId,
+    pub softening: ParameterId,
+    pub temperature: ParameterId,
+    pub reference_temperature: f64,
     pub count: f64,
     pub rest_length: f64,
     pub direction: bool,
+}
+
+impl Group {
+    /// Factor on every modulus of the muscles at their temperature [1].
+    pub fn elastic_scale<S: Scalar>(&self, values: &Values<S>) -> S {
+        let [softening, temperature] = [self.softening, self.temperature].map(|id| values[id]);
+        values[self.scale] * softened(softening, temperature, self.reference_temperature)
+    }
 }
 
 /// What moves: a joint angle, or the shortening of a linear load.

@@ -6,7 +6,7 @@ use super::wiring::model;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, ArmSpec, JointSpec, LinkSpec, LoadSpec, RigSpec};
-use crate::muscle::spec::MODULUS_SCALE;
+use crate::muscle::spec::{MODULUS_SCALE, SOFTENING, TEMPERATURE};
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
 
@@ -169,15 +169,16 @@ pub(super) fn groups(
                 None => CompiledMuscle::new(Muscle::new(&group.muscle)?)?,
             },
         };
+        let own = &group.muscle;
+        let mut add = |key: &str, value, bounds| table.add(format!("{block}.{key}"), value, bounds);
         units.push(Group {
             chamber,
             coordinate,
             joint,
-            scale: table.add(
-                format!("{block}.modulus_scale"),
-                group.muscle.modulus_scale,
-                MODULUS_SCALE,
-            )?,
+            scale: add("modulus_scale", own.modulus_scale, MODULUS_SCALE)?,
+            softening: add("softening", own.softening, SOFTENING)?,
+            temperature: add("temperature", own.temperature, TEMPERATURE)?,
+            reference_temperature: group.muscle.reference_temperature,
             count: f64::from(group.muscle.count),
             rest_length: group.muscle.rest_length,
             direction: muscle.has_direction(),

@@ -92,7 +92,7 @@ _VALVE = (
 )
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
-_MUSCLE = ("modulus_scale",)
+_MUSCLE = ("modulus_scale", "softening", "temperature")
 _ARM = (
     "inertia",
     "first_moment",
