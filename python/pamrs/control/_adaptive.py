@@ -176,6 +176,7 @@ class AdaptiveSliding(SlidingController):
         torque = estimates[0] * columns[0]
         for k in self._others:
             torque = torque + estimates[k] * columns[k]
+        torque = torque + arm.springs(angle)
         wanted = arm.pressure(torque, angle) - switching
         low, high = arm.limits(angle)
         pressure = clip(wanted, low, high)

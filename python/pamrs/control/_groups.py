@@ -11,12 +11,26 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Feed", "Group", "groups_of", "highest_pressure", "joints_of", "named"]
+__all__ = ["Feed", "Group", "beyond_sine", "groups_of", "highest_pressure", "joints_of", "named"]
 
 
 def named(word: str, name: str) -> str:
     """A channel, or a block in full: the bare word for a block without a name."""
     return f"{word}.{name}" if name else word
+
+
+def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
+    """What makes the torque that holds a joint other than the sine of its angle times a number, as
+    ``key = value``.
+    """
+    arm, own = next(iter(rig.tables("arm").values())), rig.tables("joint")[joint]
+    found = [("arm", arm, key, "rad") for key in ("base_angle", "centre_angle")]
+    found.append((named("joint", joint), own, "stiffness", "N m/rad"))
+    return tuple(
+        f"{block}.{key} = {table[key]:g} {unit}"
+        for block, table, key, unit in found
+        if table.get(key, 0.0) != 0.0
+    )
 
 
 @dataclass(frozen=True)

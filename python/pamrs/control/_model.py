@@ -7,7 +7,7 @@ from __future__ import annotations
 import abc
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pamrs.control._groups import highest_pressure, joints_of
@@ -76,11 +76,18 @@ class JointModel(abc.ABC):
         """Everything that may be an array of a batch."""
         return tuple(p.value for p in self.parameters)
 
+    def springs(self, angle: Value) -> Value:
+        """Torque [N m] that turns the joints against springs across them, ``k (q - q_k)``: taken as
+        known, and estimated by no law.
+        """
+        return 0.0
+
     @abc.abstractmethod
     def inverse_dynamics(
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
     ) -> Value:
-        """Torque [N m] that moves the joints as wanted: ``M(q) a + C(q, q') v + B v + g(q)``.
+        """Torque [N m] that moves the joints as wanted: ``M(q) a + C(q, q') v + B v + g(q)``, and
+        :meth:`springs`.
 
         Parameters
         ----------
@@ -99,7 +106,7 @@ class JointModel(abc.ABC):
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
     ) -> tuple[Value, ...]:
         """``Y``, a column for each of :attr:`parameters`: their sum, each times its parameter, is
-        :meth:`inverse_dynamics`.
+        :meth:`inverse_dynamics` less :meth:`springs`.
         """
 
     def over_joints(self, value: Value) -> Value:
@@ -125,7 +132,8 @@ class JointModel(abc.ABC):
 @dataclasses.dataclass(frozen=True, eq=False)
 class ArmModel(JointModel):
     """Equation of motion (5.4) as a controller has it: ``I theta'' + b theta' + m g r sin(theta) =
-    C1(theta) P + C2(theta)``.
+    C1(theta) P + C2(theta)``, with ``sin(theta + tilt) + k (theta - theta_k)`` on a tilted base and
+    a spring across the joint.
 
     Attributes
     ----------
@@ -141,6 +149,12 @@ class ArmModel(JointModel):
         Largest gauge pressure that may be asked for [Pa]; the smallest is 0.
     angle_range : tuple of (float, float)
         Of the joint [rad].
+    tilt : float
+        Angle of the centre of mass, payload included, from the direction of gravity where the
+        joint's angle is zero [rad].
+    spring : tuple of (float, float)
+        Stiffness of a spring across the joint [N m/rad], and the angle at which it is at rest
+        [rad].
     """
 
     inertia: Value
@@ -149,6 +163,8 @@ class ArmModel(JointModel):
     torque: TorqueModel = dataclasses.field(repr=False)
     pressure_limit: float
     angle_range: tuple[float, float]
+    tilt: float = 0.0
+    spring: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("inertia", "viscous", "weight"):
@@ -162,6 +178,14 @@ class ArmModel(JointModel):
                 f"angle_range = {self.angle_range} is not allowed: two finite angles, the first "
                 "below the second"
             )
+        stiffness, rest = (float(value) for value in self.spring)
+        if not (math.isfinite(stiffness) and math.isfinite(rest) and stiffness >= 0.0):
+            raise ParameterError(
+                f"spring = {self.spring} is not allowed: a finite stiffness of zero or more "
+                "[N m/rad] and a finite angle [rad]"
+            )
+        if not math.isfinite(self.tilt):
+            raise ParameterError(f"tilt = {self.tilt} rad is not allowed: a finite angle")
 
     @classmethod
     def from_rig(
@@ -204,13 +228,16 @@ class ArmModel(JointModel):
                 "has a PlanarArmModel, and a RigModel takes either"
             )
         joint, groups = rig.tables("joint")[names[0]], active_groups(rig, active)
+        weight, tilt = _weight(arm)
         return cls(
             inertia=arm["inertia"] + arm["payload"] * arm["length"] ** 2,
             viscous=arm["viscous"],
-            weight=(arm["first_moment"] + arm["payload"] * arm["length"]) * arm["gravity"],
+            weight=weight,
             torque=joint_torque(rig, names[0], torque, groups, active is None),
             pressure_limit=highest_pressure(rig) if pressure_limit is None else pressure_limit,
             angle_range=(joint["min_angle"], joint["max_angle"]),
+            tilt=tilt,
+            spring=(joint.get("stiffness", 0.0), joint.get("spring_angle", 0.0)),
         )
 
     def replace(self, **changes: Any) -> ArmModel:
@@ -244,11 +271,32 @@ class ArmModel(JointModel):
     def inverse_dynamics(
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
     ) -> Value:
-        """``I a + b v + m g r sin(theta)``; see :meth:`JointModel.inverse_dynamics`."""
-        return self.inertia * acceleration + self.viscous * wanted_rate + self.weight * sin(angle)
+        """``I a + b v + m g r sin(theta + tilt) + k (theta - theta_k)``; see
+        :meth:`JointModel.inverse_dynamics`.
+        """
+        moved = self.inertia * acceleration + self.viscous * wanted_rate
+        return moved + self.weight * sin(angle + self.tilt) + self.springs(angle)
+
+    def springs(self, angle: Value) -> Value:
+        """``k (theta - theta_k)``; see :meth:`JointModel.springs`."""
+        stiffness, rest = self.spring
+        return stiffness * (angle - rest) if stiffness else 0.0
 
     def regressor(
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
     ) -> tuple[Value, ...]:
-        """``a``, ``v`` and ``sin(theta)``; see :meth:`JointModel.regressor`."""
-        return acceleration, wanted_rate, sin(angle)
+        """``a``, ``v`` and ``sin(theta + tilt)``; see :meth:`JointModel.regressor`."""
+        return acceleration, wanted_rate, sin(angle + self.tilt)
+
+
+def _weight(arm: Mapping[str, Any]) -> tuple[float, float]:
+    """Largest torque of gravity [N m], and the angle of all mass from its direction where the
+    joint's angle is zero [rad].
+    """
+    hanging, base = arm["payload"] * arm["length"], arm.get("base_angle", 0.0)
+    own = base + arm.get("centre_angle", 0.0)
+    level = arm["first_moment"] * math.cos(own) + hanging * math.cos(base)
+    side = arm["first_moment"] * math.sin(own) + hanging * math.sin(base)
+    if side == 0.0:
+        return level * arm["gravity"], 0.0
+    return math.hypot(level, side) * arm["gravity"], math.atan2(side, level)

@@ -158,13 +158,13 @@ class Neural(SlidingController):
                 "arm has arrays for estimates: networks start from one arm, whose numbers are "
                 "floats"
             )
-        angle = np.linspace(self._first, last, self._nodes)
+        angle, still = np.linspace(self._first, last, self._nodes), np.zeros(self._nodes)
         parameters = {parameter.name: parameter.value for parameter in arm.parameters}
         c1, c2 = (np.broadcast_to(value, angle.shape) for value in arm.torque.at(angle))
         started = {
             "H": parameters["inertia"] / c1,
             "C": parameters["viscous"] / c1,
-            "G": (parameters["weight"] * np.sin(angle) - c2) / c1,
+            "G": (np.asarray(arm.inverse_dynamics(angle, still, still, still)) - c2) / c1,
         }
         return self._bounded(started)
 

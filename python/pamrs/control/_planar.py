@@ -94,6 +94,11 @@ class PlanarArmModel(JointModel):
         Largest gauge pressure that may be asked for [Pa].
     angle_range : tuple of (ndarray, ndarray), shape (J,)
         Of the joints [rad].
+    tilt : float
+        Angle of the first link from the direction of gravity where its joint's angle is zero [rad].
+    spring : tuple of (ndarray, ndarray), shape (J,)
+        Stiffness of springs across the joints [N m/rad], and the angles at which they are at rest
+        [rad]; none where left out.
     """
 
     names: tuple[str, ...]
@@ -103,6 +108,8 @@ class PlanarArmModel(JointModel):
     torque: TorqueModel = dataclasses.field(repr=False)
     pressure_limit: float
     angle_range: tuple[Array, Array]
+    tilt: float = 0.0
+    spring: tuple[Array, Array] | None = None
 
     def __post_init__(self) -> None:
         n = len(self.names)
@@ -155,6 +162,10 @@ class PlanarArmModel(JointModel):
             np.array([float(tables[name][end]) for name in names])
             for end in ("min_angle", "max_angle")
         ]
+        springs = [
+            np.array([float(tables[name].get(key, 0.0)) for name in names])
+            for key in ("stiffness", "spring_angle")
+        ]
         return cls(
             names,
             coupling,
@@ -163,6 +174,8 @@ class PlanarArmModel(JointModel):
             JointTorques([joint_torque(rig, name, "full", groups, False) for name in names]),
             highest_pressure(rig) if pressure_limit is None else pressure_limit,
             (ends[0], ends[1]),
+            float(next(iter(rig.tables("arm").values())).get("base_angle", 0.0)),
+            (springs[0], springs[1]) if np.any(springs[0]) else None,
         )
 
     def replace(self, **changes: Any) -> PlanarArmModel:
@@ -240,7 +253,15 @@ class PlanarArmModel(JointModel):
         total: Value = 0.0
         for parameter, column in zip(self.parameters, columns, strict=True):
             total = total + parameter.value * column
-        return total
+        return total + self.springs(angle)
+
+    def springs(self, angle: Value) -> Value:
+        """See :meth:`JointModel.springs`."""
+        if self.spring is None:
+            return 0.0
+        stiffness, rest = (np.asarray(values)[:, None] for values in self.spring)
+        turned = np.asarray(angle).reshape(self.joints, -1) - rest
+        return np.asarray(stiffness * turned).reshape(np.shape(angle))
 
     def regressor(
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
@@ -252,7 +273,7 @@ class PlanarArmModel(JointModel):
         def directions(value: Value) -> Array:
             return np.cumsum(np.broadcast_to(value, shape).reshape(n, -1), axis=0)
 
-        phi, turn = directions(angle), directions(rate)
+        phi, turn = directions(angle) + self.tilt, directions(rate)
         wanted, push = directions(wanted_rate), directions(acceleration)
         sine, cosine = np.sin(phi), np.cos(phi)
         still = np.zeros_like(phi)

@@ -118,6 +118,12 @@ class Recruitment(Share):
             raise ParameterError(
                 f"reach = {reach} rad is not allowed: above 0 and below pi is needed"
             )
+        others = [name for group in self.groups for name in getattr(group, "beyond_sine", ())]
+        if reach is not None and others:
+            raise ParameterError(
+                f"reach = {reach} rad is not allowed with {others[0]}: the torque ahead is "
+                "predicted by the sine of the joint's angle alone; leave reach out"
+            )
         self.reach = None if reach is None else float(reach)
         self.angle_range = self.groups[0].angle_range
         self.torque_rate = FilteredDerivative(rate_filter, self.period)

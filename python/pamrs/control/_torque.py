@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control._groups import Group, groups_of, highest_pressure, named
+from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure, named
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._values import positive_gain
@@ -138,6 +138,9 @@ class GroupTorque:
         1 where pressure raises the angle, -1 where it lowers it.
     angle_range : tuple of (float, float)
         Of the joint [rad].
+    beyond_sine : tuple of str
+        Keys of the rig, with their values, for which the torque that holds the joint is not the
+        sine of its angle times a number: springs, a tilted base.
     error : float
         Largest error of the tables half way between their places, relative to the largest values
         [1].
@@ -151,6 +154,8 @@ class GroupTorque:
     def __init__(self, rig: Rig, muscles: tuple[str, ...], *, lengthening: bool = False) -> None:
         table = _parts(rig, muscles[0])[2]
         low, high = self.angle_range = float(table["min_angle"]), float(table["max_angle"])
+        joint = rig.ports("muscle")[muscles[0]]["joint"].partition(".")[2]
+        self.beyond_sine = beyond_sine(rig, joint)
         place = np.linspace(low, high, _NODES)
         between = 0.5 * (place[1:] + place[:-1])
 

@@ -65,7 +65,8 @@ class Lift:
         Torque of the muscles at each angle while they shorten, and the most with which they resist
         being drawn out [N m].
     gravity : ndarray (n,)
-        Torque of the arm's and the payload's weight at each angle [N m].
+        Torque of the arm's and the payload's weight at each angle, with that of a spring across the
+        joint [N m].
     coulomb : float
         Coulomb friction of the arm [N m].
     capacity : ndarray (n,)
@@ -344,9 +345,12 @@ class _Balance:
 
     def __init__(self, rig: Rig, pressure: float) -> None:
         self.arm = rig.tables("arm")[""]
-        own, transmissions = next(iter(rig.tables("joint").values())), rig.tables("transmission")
+        self.joint, transmissions = (
+            next(iter(rig.tables("joint").values())),
+            rig.tables("transmission"),
+        )
         self.groups = [
-            (rig.muscle_of(name), Joint.from_model(transmissions.get(name, own)))
+            (rig.muscle_of(name), Joint.from_model(transmissions.get(name, self.joint)))
             for name in rig.tables("muscle")
         ]
         self.hysteresis = [_hysteresis(rig, name) for name in rig.tables("muscle")]
@@ -380,14 +384,18 @@ class _Balance:
 
     def weight(self, angle: Array) -> Array:
         """Torque of a kilogram at the tip [N m/kg]."""
-        return np.asarray(self.arm["length"] * self.arm["gravity"] * np.sin(angle))
+        direction = angle + self.arm.get("base_angle", 0.0)
+        return np.asarray(self.arm["length"] * self.arm["gravity"] * np.sin(direction))
 
     def own(self, angle: Array) -> Array:
-        """Gravity's torque on the empty arm [N m]."""
-        return np.asarray(self.arm["first_moment"] * self.arm["gravity"] * np.sin(angle))
+        """What holds the empty arm against gravity and a spring across the joint [N m]."""
+        direction = angle + self.arm.get("base_angle", 0.0) + self.arm.get("centre_angle", 0.0)
+        weight = self.arm["first_moment"] * self.arm["gravity"] * np.sin(direction)
+        spring = self.joint.get("stiffness", 0.0) * (angle - self.joint.get("spring_angle", 0.0))
+        return np.asarray(weight + spring)
 
     def gravity(self, angle: Array) -> Array:
-        """Gravity's torque [N m]."""
+        """What holds the arm with its payload [N m]."""
         return np.asarray(self.own(angle) + self.arm["payload"] * self.weight(angle))
 
     def excess(self, angle: Array) -> Array:
