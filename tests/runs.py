@@ -180,6 +180,17 @@ RUNS: dict[str, Run] = {
         {"joint_angle": 40.0 * _DEGREE, "muscle_pressure": 2.6e5},
         _valves(("",), 0.8, 2.5, (0.0,), 121),
     ),
+    "throttled_supply": Run(
+        "throttled_supply",
+        0.005,
+        121,
+        {
+            "joint_angle": 40.0 * _DEGREE,
+            "muscle_pressure.muscle": 2.6e5,
+            "muscle_pressure.feed": 12e5,
+        },
+        _valves(("",), 0.8, 2.5, (0.0,), 121),
+    ),
     "elbow": Run(
         "elbow",
         0.005,

@@ -101,7 +101,7 @@ def test_every_row_is_the_simulator_of_its_commands(name: str) -> None:
 
 def test_lanes_hold_the_rigs_that_simulate_batch_runs_in_them() -> None:
     # the antagonists' friction remembers their direction, and muscles of a pair may go slack
-    lanes = {"shoulder", "elbow", "regulated_joint", "hanging_mass"}
+    lanes = {"shoulder", "elbow", "regulated_joint", "hanging_mass", "throttled_supply"}
     for name in pamrs.rigs.names():
         found = pamrs.Batch(pamrs.rigs.named(name), n=2, sample_time=DT).side_by_side
         np.testing.assert_array_equal(found, [name in lanes] * 2, err_msg=name)

@@ -13,7 +13,14 @@ from pamrs.simulation import core_rig
 SAMPLE = 0.005
 ROWS = 101
 #: Packaged rigs that run in lanes, without drives that only plants by themselves take.
-LANES = ("shoulder", "elbow", "recruitment", "regulated_joint", "hanging_mass")
+LANES = (
+    "shoulder",
+    "elbow",
+    "recruitment",
+    "regulated_joint",
+    "hanging_mass",
+    "throttled_supply",
+)
 
 
 def driven(rig: pamrs.Rig, rows: int = ROWS) -> dict[str, object]:
