@@ -227,44 +227,6 @@ def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
     assert odds[1] < 0.1
 
 
-def test_excess_inside_the_stated_error_of_the_model_is_none() -> None:
-    """An encoder that is off by a curve of half a degree is a mismatch, unless the rig says so."""
-    time = DT * np.arange(ROWS)
-    run = pamrs.simulate(RIG, 5.0 + 0.3 * np.sin(2.0 * time) ** 2, sample_time=DT)
-    angle = run["joint_angle"]
-    off = np.radians(0.5) * np.sqrt(2.0) * np.sin(40.0 * angle)
-    rng = np.random.default_rng(7)
-    channels = {n: run[n] + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
-    channels["joint_angle"] = channels["joint_angle"] + off
-    mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
-    found = Recording("off", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
-    recording = prepare(found, RIG, SETTINGS)
-    blocks = [
-        b
-        for b in available_blocks(RIG, tuple(channels), SETTINGS.prepare)
-        if b.channel == "joint_angle"
-    ]
-    core = core_rig(RIG)
-    problem = Problem(blocks, [recording], core, SETTINGS)
-    left = residuals(problem, RIG)
-
-    def judged(stated: dict[str, dict[str, float]]) -> Excess:
-        level = noise_levels(problem, core, stated)
-        return excess(blocks[0], [recording], left, level, SETTINGS.noise)
-
-    strict = judged({})
-    assert significant(strict)
-    for stated in (
-        {"joint_angle": {"size": np.radians(0.5)}},
-        {"muscle": {"share": 0.03}},
-    ):
-        lenient = judged(stated)
-        assert not significant(lenient)
-        assert lenient.noise == strict.noise  # that of the sensor stays what it is
-    # an error ten times smaller than the mismatch hides nothing
-    assert significant(judged({"joint_angle": {"size": np.radians(0.05)}}))
-
-
 def test_what_relaxes_at_once_is_another_stiffness() -> None:
     """A time constant below its own standard deviation was not seen: the wrong value wins."""
     blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]

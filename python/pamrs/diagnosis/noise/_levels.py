@@ -6,8 +6,8 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from zlib import crc32
 
 import numpy as np
@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from pamrs import _core
-from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Key, Problem, bin_width
+from pamrs.diagnosis.noise._discrepancy import Stated, curves, visited, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import NoiseSettings
 from pamrs.errors import SimulationError
@@ -24,7 +24,6 @@ from pamrs.errors import SimulationError
 __all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
 
 Array = NDArray[np.float64]
-Stated = Mapping[str, Mapping[str, float]]
 
 
 @dataclass(frozen=True)
@@ -42,12 +41,22 @@ class NoiseLevel:
         mean square of the bin means.
     stated : float
         Share of the variance of bin means that is the stated error of the model.
+    beside : float
+        Standard deviation of bin means beside what curves of the stated error tell of them.
+    rest : float
+        Share of that variance that is what no such curve tells.
+    curves : (m, k) array or None
+        What each curve of the stated error, one standard deviation high, does to the bin means;
+        None where no error is stated.
     """
 
     sample: float
     binned: float
     scatter: float = 0.0
     stated: float = 0.0
+    beside: float = 0.0
+    rest: float = 0.0
+    curves: Array | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -108,6 +117,7 @@ def noise_levels(
     """
     found: dict[Key, NoiseLevel] = {}
     settings, known = problem.settings, stated or {}
+    ranges = {b.name: visited(b, problem.recordings) for b in problem.blocks if known}
     for prepared in problem.recordings:
         rng = np.random.default_rng([settings.seed, crc32(prepared.recording.name.encode())])
         for block in problem.blocks:
@@ -141,97 +151,27 @@ def noise_levels(
                 float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
             )
             noise = base.noise**2 * white + drives
-            error = _stated_variance(block, base, prepared, known)
-            error += _carried_variance(block, core, base, prepared, known, rng)
-            found[block.name, prepared.recording.name] = NoiseLevel(
+            key = block.name, prepared.recording.name
+            bent = None
+            if known:
+                bent = curves(block, core, base, prepared, ranges[block.name], known, width)
+            error = 0.0 if bent is None else _power(bent[seen])
+            rest = settings.noise.curve_rest * error
+            found[key] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
                 math.sqrt(noise + error),
                 scatter,
                 error / (noise + error),
+                math.sqrt(noise + rest),
+                rest / (noise + rest),
+                bent,
             )
     return found
 
 
-_FLOWS = {"supply": ("supply", "valve", "line"), "chamber": ("valve", "line", "chamber")}
-"""Blocks of a rig file whose share of error is one of the flow into a block."""
-_PULLS = ("muscle", "transmission", "joint", "arm", "link", "load")
-"""Blocks whose share of error is one of what moves: as if the pressure were off by it."""
-
-
-def _stated_variance(block: Block, base: Residual, prepared: Prepared, stated: Stated) -> float:
-    """Variance of a block's bin means by the error that the rig file states: sizes as they are,
-    shares of what the block's output does after the start of each window.
-    """
-    channel, own = block.channel, block.channel.partition(".")[2]
-    kinds = {channel_of(channel), *_FLOWS.get(block.kind, ())}
-    acting = [
-        error
-        for name, error in stated.items()
-        if channel_of(name) in kinds and name.partition(".")[2] in ("", own)
-    ]
-    if not acting:
-        return 0.0
-    starts = prepared.starts(block.window, block.drives)
-    moved = np.zeros(prepared.n)
-    for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        moved[a:b] = base.prediction[a:b] - base.prediction[a]
-    signal = float(np.mean(moved[base.rows] ** 2)) if base.rows.any() else 0.0
-    return sum(e["share"] ** 2 * signal if "share" in e else e["size"] ** 2 for e in acting)
-
-
-def _drive_errors(block: Block, prepared: Prepared, stated: Stated) -> dict[str, float]:
-    """Stated error of what drives a block [SI]: of the measured signal itself, and of the force
-    that a pressure stands for.
-    """
-    pulls = [e["share"] for name, e in stated.items() if channel_of(name) in _PULLS]
-    found = {}
-    for name in block.drives:
-        if name not in prepared.signals:
-            continue
-        largest = float(np.abs(prepared.signals[name][0]).max())
-        error = stated.get(name, stated.get(channel_of(name), {}))
-        sizes = [error.get("size", 0.0), error.get("share", 0.0) * largest]
-        if block.mechanical and channel_of(name) == "muscle_pressure":
-            sizes += [share * largest for share in pulls]
-        if any(sizes):
-            found[name] = math.hypot(*sizes)
-    return found
-
-
-def _carried_variance(
-    block: Block,
-    core: _core.Rig,
-    base: Residual,
-    prepared: Prepared,
-    stated: Stated,
-    rng: np.random.Generator,
-) -> float:
-    """Variance of a block's bin means by the stated error of what drives it: curves over the
-    measured value, carried through the model by simulation.
-    """
-    drives = _drive_errors(block, prepared, stated)
-    powers = []
-    for _ in range(prepared.settings.noise.replicates if drives else 0):
-        signals = {}
-        for name, size in drives.items():
-            value, slope = prepared.signals[name]
-            more, steeper = _curve(value, size, rng)
-            signals[name] = (value + more, slope * (1.0 + steeper))
-        with contextlib.suppress(SimulationError):  # it leaves the model's range
-            moved = change(block, core, prepared.shaken(signals), base) - base.value
-            means, counts = binned(moved, base.rows, bins_of(prepared))
-            powers.append(float(np.mean(means[counts > 0] ** 2)) if counts.any() else 0.0)
-    return float(np.mean(powers)) if powers else 0.0
-
-
-def _curve(value: Array, size: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """An error of a stated size that is a smooth curve over the value, and its derivative."""
-    low, range_of = float(value.min()), max(float(np.ptp(value)), 1e-12)
-    waves = np.pi * np.arange(3)  # a shift, a slope, a bend
-    phases = rng.uniform(0.0, 2.0 * np.pi, 3)
-    sizes = rng.normal(0.0, size * math.sqrt(2.0 / 3.0), 3)
-    angles = waves * ((value - low) / range_of)[:, None] + phases
-    return np.cos(angles) @ sizes, -np.sin(angles) @ (sizes * waves) / range_of
+def _power(curves: Array) -> float:
+    """Variance of bin means by curves that are one standard deviation high."""
+    return float(np.mean(np.sum(curves**2, axis=1))) if curves.size else 0.0
 
 
 def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
@@ -252,14 +192,66 @@ def excess(
     noise_level: dict[Key, NoiseLevel],
     settings: NoiseSettings,
 ) -> Excess:
-    """Pool a block's residual over recordings and compare it with its noise level."""
+    """Pool a block's residual over recordings and compare it with its noise level.
+
+    Where the rig file states an error of the model, all of the residual is compared with noise and
+    that error together; and what the most probable curves of that error leave of it, with what they
+    cost, with the noise beside them. The one that is farther above its limit counts.
+    """
+    width = {p.recording.name: bins_of(p) for p in recordings}
+    bins = {
+        (key := (block.name, p.recording.name)): binned(
+            found[key].value, found[key].rows, width[p.recording.name]
+        )
+        for p in recordings
+    }
+    whole = {key: noise_level[key] for key in bins}
+    seen = _pooled(recordings, bins, found, whole, settings)
+    if all(level.curves is None for level in whole.values()):
+        return seen
+    apart = {
+        key: replace(level, binned=level.beside, stated=level.rest) for key, level in whole.items()
+    }
+    beside = _pooled(recordings, _beside_curves(bins, apart), found, apart, settings)
+    return max(seen, beside, key=lambda e: e.ratio / e.limit)
+
+
+Bins = dict[Key, tuple[Array, Array]]
+"""Means, and usable samples, of the bins of a block in a recording."""
+
+
+def _beside_curves(bins: Bins, levels: dict[Key, NoiseLevel]) -> Bins:
+    """Bin means without what the most probable curves tell of them, so that noise and such curves
+    alone leave the variance of the noise (one curve for all recordings).
+    """
+    known = [key for key, level in levels.items() if level.curves is not None]
+    seen = {key: bins[key][1] > 0 for key in known}
+    bent = [
+        c[seen[key]] / levels[key].binned for key in known if (c := levels[key].curves) is not None
+    ]
+    rows = [bins[key][0][seen[key]] / levels[key].binned for key in known]
+    white = whitening(np.concatenate(bent))(np.concatenate(rows))
+    out, last = dict(bins), 0
+    for key, part in zip(known, rows, strict=True):
+        means = np.zeros_like(bins[key][0])
+        means[seen[key]] = levels[key].binned * white[last : last + part.size]
+        out[key], last = (means, bins[key][1]), last + part.size
+    return out
+
+
+def _pooled(
+    recordings: list[Prepared],
+    bins: Bins,
+    found: dict[Key, Residual],
+    noise_level: dict[Key, NoiseLevel],
+    settings: NoiseSettings,
+) -> Excess:
+    """Bin means of a block over its recordings against their noise levels."""
     keys: list[Key] = []
     ratios, weights, squares, noises = [], [], [], []
     pieces: list[tuple[float, int]] = []
-    for prepared in recordings:
-        key = (block.name, prepared.recording.name)
+    for prepared, (key, (means, counts)) in zip(recordings, bins.items(), strict=True):
         r = found[key]
-        means, counts = binned(r.value, r.rows, bins_of(prepared))
         length = max(1, round(settings.piece_time / (bins_of(prepared) * prepared.dt)))
         own = noise_level[key].binned ** 2
         for first in range(0, means.size, length):

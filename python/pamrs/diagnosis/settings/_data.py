@@ -612,6 +612,23 @@ class NoiseSettings(SettingsGroup):
         "scatters as that of as many",
         origin="judgement: bumps of a force curve or of an encoder over a stroke",
     )
+    curve_waves: int = setting(
+        16,
+        unit="count",
+        least=1,
+        reason="waves of the same variance of which the error that a rig file states consists: a "
+        "shift, and half a period to fifteen over what was visited",
+        origin="docs/decisions/0095",
+    )
+    curve_rest: float = setting(
+        0.02,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the variance of that error which no such curve tells: a real error is "
+        "not exactly a curve over one measured value",
+        origin="docs/decisions/0095",
+    )
     most_log_limit: float = setting(
         1.0,
         unit="1",

@@ -1,0 +1,229 @@
+"""The error that a rig file says its model has, as curves: what each can do to a block's output."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of
+from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
+from pamrs.errors import SimulationError
+
+__all__ = ["Stated", "curves", "visited", "whitening"]
+
+Array = NDArray[np.float64]
+Stated = Mapping[str, Mapping[str, float]]
+Ranges = Mapping[str, tuple[float, float]]
+"""Least value and width of what was visited, by channel [SI]."""
+
+_FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber")}
+"""Blocks of a rig file whose share of error is one of the flow into a block, beside the valve."""
+_FACTORS = ("muscle", "transmission", "joint")
+"""Blocks whose share of error multiplies the muscles' pull."""
+_SUMMANDS = ("arm", "link", "load")
+"""Blocks whose share of error stands beside the muscles' pull."""
+_MOTION = ("joint_angle", "length")
+_COMMANDS = ("valve_command", "supply_command")
+
+
+def visited(block: Block, recordings: list[Prepared]) -> Ranges:
+    """What all recordings visit of each signal at a block."""
+    found = {}
+    for name in (block.channel, *block.drives):
+        there = [v for p in recordings if (v := _signal(p, name)) is not None]
+        if there:
+            low = min(float(v.min()) for v in there)
+            found[name] = low, max(max(float(v.max()) for v in there) - low, 1e-12)
+    return found
+
+
+def curves(
+    block: Block,
+    core: _core.Rig,
+    base: Residual,
+    prepared: Prepared,
+    ranges: Ranges,
+    stated: Stated,
+    width: int,
+) -> Array | None:
+    """The stated error of a model as a Gaussian process (Kennedy & O'Hagan 2001) of a few curves,
+    carried through the model.
+
+    What a rig file states is the standard deviation of a smooth curve: over a reading that of its
+    gauge, over the motion that of a force, over the command that of a valve, over the pressure that
+    of a flow. It is a sum of waves, each of them a column.
+
+    Parameters
+    ----------
+    block : Block
+        Which block.
+    core : _core.Rig
+        A model close to the data.
+    base : Residual
+        Its residual over the recording.
+    prepared : Prepared
+        The recording.
+    ranges : dict
+        As of `visited`: over these a curve runs, so that column k is one and the same curve in
+        every recording.
+    stated : dict
+        The model's error as the rig file states it (:attr:`pamrs.Rig.model_error`).
+    width : int
+        Samples in a bin.
+
+    Returns
+    -------
+    (m, k) array or None
+        What each wave, one standard deviation high, does to the bin means, in the channel's unit;
+        None where no error acts here.
+    """
+    waves = _waves(prepared.settings.noise.curve_waves)
+
+    def over(name: str) -> list[Array]:
+        low, wide = ranges[name]
+        place = _signal(prepared, name)
+        assert place is not None
+        at = np.clip((place - low) / wide, 0.0, 1.0)
+        return [size * np.cos(number * at) for number, size in waves]
+
+    def means(values: Array) -> Array:
+        return binned(values, base.rows, width)[0]
+
+    columns: list[Array] = []
+    own = _size(stated, block.channel, ranges)
+    if own > 0.0:
+        columns += [means(_freed(own * curve, base)) for curve in over(block.channel)]
+    for place, share in _flow_errors(block, ranges, stated):
+        moved = _flowing(share * np.column_stack(over(place)), base)
+        columns += [means(_freed(column, base)) for column in moved.T]
+    for name, place, much in _drive_errors(block, prepared, ranges, stated):
+        columns += [
+            means(_carried(name, much * curve, block, core, prepared, base))
+            for curve in over(place)
+        ]
+    return np.column_stack(columns) if columns else None
+
+
+def _waves(count: int) -> list[tuple[float, float]]:
+    """Wave number [rad per range] and standard deviation of each wave of a curve of the size 1."""
+    # the mean square of a wave is half of its height's, that of a shift is all of it
+    return [(math.pi * k, math.sqrt((2.0 if k else 1.0) / count)) for k in range(count)]
+
+
+def _signal(prepared: Prepared, name: str) -> Array | None:
+    """A smoothed channel or a command; None where it is neither."""
+    if name in prepared.signals:
+        return prepared.signals[name][0]
+    return prepared.commands.get(name)
+
+
+def _size(stated: Stated, name: str, ranges: Ranges) -> float:
+    """Stated error of a reading [SI]; a share is one of what was visited."""
+    if name not in ranges:
+        return 0.0
+    error = stated.get(name, stated.get(channel_of(name), {}))
+    return math.hypot(error.get("size", 0.0), error.get("share", 0.0) * ranges[name][1])
+
+
+def _shares(stated: Stated, kinds: tuple[str, ...], own: str | None = None) -> float:
+    """The shares of some kinds of block together; of those with a name those called `own` alone."""
+    there = [n for n in stated if channel_of(n) in kinds]
+    if own is not None:
+        there = [n for n in there if n.partition(".")[2] in ("", own)]
+    return math.hypot(*(stated[n].get("share", 0.0) for n in there))
+
+
+def _flow_errors(block: Block, ranges: Ranges, stated: Stated) -> list[tuple[str, float]]:
+    """Over what an error of the flow into a block is a curve, and its share."""
+    if block.kind not in _FLOWS or block.channel not in ranges:
+        return []
+    own = block.channel.partition(".")[2]
+    command = next((n for n in block.drives if channel_of(n) in _COMMANDS and n in ranges), None)
+    found = [
+        (block.channel, _shares(stated, _FLOWS[block.kind], own)),
+        (command or block.channel, _shares(stated, ("valve",), own)),
+    ]
+    return [(place, share) for place, share in found if share > 0.0]
+
+
+def _drive_errors(
+    block: Block, prepared: Prepared, ranges: Ranges, stated: Stated
+) -> list[tuple[str, str, Array]]:
+    """Which drive is off, over what its error is a curve, and how much [SI]: the reading itself,
+    and the force that a pressure stands for.
+    """
+    around = (block.channel, *block.drives)
+    motion = next((n for n in around if channel_of(n) in _MOTION and n in ranges), None)
+    found = []
+    for name in block.drives:
+        if name not in prepared.signals:
+            continue
+        value, (low, wide) = prepared.signals[name][0], ranges[name]
+        errors = [(name, _size(stated, name, ranges), np.ones_like(value))]
+        if block.mechanical and channel_of(name) == "muscle_pressure":
+            most = np.full_like(value, max(abs(low), abs(low + wide)))
+            errors.append((motion or name, _shares(stated, _FACTORS), value))
+            errors.append((motion or name, _shares(stated, _SUMMANDS), most))
+        found += [(name, place, size * much) for place, size, much in errors if size > 0.0]
+    return found
+
+
+def _flowing(shares: Array, base: Residual) -> Array:
+    """What shares of all that changes an output do to it (a column each); how fast they fade is
+    told by what a window's start does.
+    """
+    steps = np.append(np.diff(base.prediction), 0.0)[:, None] * shares
+    moved = np.zeros_like(shares)
+    for a, b, q in base.starts:
+        first = q[:, 0]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            kept = np.clip(np.nan_to_num(first[1:] / first[:-1], nan=1.0, posinf=1.0), 0.0, 1.0)
+        for i in range(a, b - 1):
+            moved[i + 1] = kept[i - a] * moved[i] + steps[i]
+    return moved
+
+
+def _freed(values: Array, base: Residual) -> Array:
+    """Values without what the starts of windows can do, zero in unusable rows."""
+    out = np.where(base.rows, values, 0.0)
+    for a, b, q in base.starts:
+        out[a:b] -= q @ (q.T @ out[a:b])
+    return np.where(base.rows, out, 0.0)
+
+
+def _carried(
+    name: str, more: Array, block: Block, core: _core.Rig, prepared: Prepared, base: Residual
+) -> Array:
+    """What an error of a drive does to a block's output; nothing where the model cannot follow."""
+    value, slope = prepared.signals[name]
+    shaken = prepared.shaken({name: (value + more, slope + np.gradient(more, prepared.dt))})
+    with contextlib.suppress(SimulationError):
+        return change(block, core, shaken, base) - base.value
+    return np.zeros_like(value)
+
+
+def whitening(curves: Array) -> Callable[[Array], Array]:
+    """How rows with unit noise beside an error that consists of curves get unit covariance:
+    multiplied by ``(1 + curves curves^T)^(-1/2)`` (Woodbury).
+
+    Parameters
+    ----------
+    curves : (n, m) array
+        One standard deviation of each curve, in units of the rows' noise.
+
+    Returns
+    -------
+    callable
+        Takes residuals (n,) or sensitivities (n, k).
+    """
+    power, turn = np.linalg.eigh(curves.T @ curves)
+    kept = power > max(float(power.max(initial=0.0)), 1.0) * power.size * np.finfo(float).eps
+    power, turn = power[kept], turn[:, kept]
+    axes = curves @ (turn / np.sqrt(power))
+    damped = axes * (1.0 - 1.0 / np.sqrt(1.0 + power))
+    return lambda rows: np.asarray(rows - damped @ (axes.T @ rows), dtype=np.float64)

@@ -1,0 +1,118 @@
+"""The error that a rig file says its model has: smooth curves over what is measured, carried
+through the model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pamrs
+from pamrs.diagnosis.evidence import significant
+from pamrs.diagnosis.fit import Problem, residuals
+from pamrs.diagnosis.noise import Excess, excess, noise_levels
+from pamrs.diagnosis.noise._discrepancy import whitening
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.recordings import Recording
+from pamrs.simulation import core_rig
+
+Array = NDArray[np.float64]
+RIG = pamrs.rigs.shoulder()
+SETTINGS = DiagnosisSettings()
+DT, ROWS = 0.005, 4000
+NOISE = {
+    "supply_pressure": 300.0,
+    "muscle_pressure": 300.0,
+    "joint_angle": 2e-4,
+    "valve_command": 1e-3,
+}
+HALF = float(np.radians(0.5))
+
+
+def recorded(seed: int) -> tuple[Recording, Array]:
+    """A slow motion to and fro, without the error of the encoder, and the true angle [rad]."""
+    time = DT * np.arange(ROWS)
+    volts = 5.0 + 0.3 * np.sin(2.0 * time + seed) ** 2
+    run = pamrs.simulate(RIG, volts, sample_time=DT)
+    rng = np.random.default_rng(seed)
+    channels = {n: run[n] + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
+    mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
+    units = dict.fromkeys(channels, "SI")
+    return Recording(f"r{seed}", "fit", time, DT, channels, mask, [], units), run["joint_angle"]
+
+
+def judged(off: list[Array], stated: dict[str, dict[str, float]]) -> Excess:
+    """What the arm keeps where the encoder reads so much too much [rad], a recording each."""
+    recordings = []
+    for seed, more in enumerate(off):
+        found, _ = recorded(seed)
+        channels = found.channels | {"joint_angle": found.channels["joint_angle"] + more}
+        recordings.append(prepare(replace(found, channels=channels), RIG, SETTINGS))
+    blocks = [
+        b
+        for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
+        if b.channel == "joint_angle"
+    ]
+    core = core_rig(RIG)
+    problem = Problem(blocks, recordings, core, SETTINGS)
+    level = noise_levels(problem, core, stated)
+    return excess(blocks[0], recordings, residuals(problem, RIG), level, SETTINGS.noise)
+
+
+def smooth(seed: int) -> Array:
+    """Half a degree (rms) as a curve over the angle, the same in every recording."""
+    angle = recorded(seed)[1]
+    return HALF * np.sqrt(2.0) * np.sin(9.0 * angle + 1.0)
+
+
+def lagging(seed: int) -> Array:
+    """Half a degree that changes its sign with the direction, as play in the encoder does."""
+    rate = np.gradient(recorded(seed)[1])
+    return HALF * np.sign(rate)
+
+
+SIZE = {"joint_angle": {"size": HALF}}
+
+
+def test_a_smooth_curve_inside_the_stated_error_is_none() -> None:
+    """An encoder that is off by a curve of half a degree is a mismatch, unless the rig says so."""
+    off = [smooth(0), smooth(1)]
+    strict = judged(off, {})
+    assert significant(strict)
+    for stated in (SIZE, {"muscle": {"share": 0.03}}):
+        lenient = judged(off, stated)
+        assert not significant(lenient)
+        assert lenient.noise == strict.noise  # that of the sensor stays what it is
+    # an error ten times smaller than the mismatch hides nothing
+    assert significant(judged(off, {"joint_angle": {"size": 0.1 * HALF}}))
+
+
+def test_what_is_no_curve_over_the_reading_is_not_hidden_by_the_stated_error() -> None:
+    play = judged([lagging(0), lagging(1)], SIZE)
+    curve = judged([smooth(0), smooth(1)], SIZE)
+    assert significant(play)
+    assert play.ratio > 3.0 * curve.ratio
+
+
+def test_one_curve_acts_in_all_recordings() -> None:
+    """A curve that turns over from one recording to the next is no error of an encoder."""
+    same, turned = (judged([smooth(0), sign * smooth(1)], SIZE) for sign in (1.0, -1.0))
+    assert not significant(same)
+    assert significant(turned)
+
+
+@pytest.mark.parametrize("columns", [0, 1, 7])
+def test_whitening_agrees_with_the_dense_covariance(columns: int) -> None:
+    rng = np.random.default_rng(3)
+    curves = 30.0 * rng.normal(size=(40, columns))
+    if columns > 1:
+        curves[:, 1] = 2.0 * curves[:, 0]  # curves that are the same are no harm
+    rows = rng.normal(size=(40, 2))
+    dense = rows.T @ np.linalg.solve(np.eye(40) + curves @ curves.T, rows)
+    white = whitening(curves)(rows)
+    assert white.T @ white == pytest.approx(dense, rel=1e-6)
+    assert whitening(curves)(rows[:, 0]) == pytest.approx(white[:, 0])
