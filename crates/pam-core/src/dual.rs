@@ -122,6 +122,7 @@ impl<const N: usize> Div for Dual<N> {
     type Output = Self;
 
     #[inline(always)]
+    #[allow(clippy::suspicious_arithmetic_impl)] // one inverse for all derivatives
     fn div(self, other: Self) -> Self {
         let ratio = self.re / other.re;
         let inverse = other.re.recip();
@@ -160,6 +161,7 @@ impl<const N: usize> Div<f64> for Dual<N> {
     type Output = Self;
 
     #[inline(always)]
+    #[allow(clippy::suspicious_arithmetic_impl)] // one inverse for all derivatives
     fn div(self, other: f64) -> Self {
         let inverse = other.recip();
         Self { re: self.re / other, eps: self.eps.map(|e| e * inverse) }
