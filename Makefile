@@ -92,7 +92,9 @@ test:  ## everything that CI checks: the long trials are left to test-all
 	@$(MAKE) --jobs=2 --output-sync=target checks
 	@$(MAKE) test-python
 
-test-all:  ## the same with the long trials
+test-all: export CARGO_PROFILE_TEST_DEBUG_ASSERTIONS = true
+test-all: export CARGO_PROFILE_TEST_OVERFLOW_CHECKS = true
+test-all:  ## the same with the long trials, the core's tests with checks of overflow
 	@$(MAKE) --jobs=2 --output-sync=target checks
 	@$(MAKE) test-python-all
 
