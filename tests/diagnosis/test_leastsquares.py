@@ -118,3 +118,22 @@ def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
     theirs = lsq_linear(10.0 * root, 10.0 * root @ aim, (low, high))
     assert 0.5 * float(rows @ rows) <= theirs.cost * (1.0 + 2e-3)
     assert np.allclose(x, theirs.x, atol=1e-2)
+
+
+def test_a_fit_ends_where_steps_do_not_keep_their_promise() -> None:
+    """Next to a kink the rows rise on both sides, whatever the sensitivities say."""
+    spent: list[float] = []
+
+    def evaluate(x: Array) -> tuple[Array, Array, None]:
+        spent.append(float(x[0]))
+        return 10.0 + 5.0 * np.abs(x), np.array([[5.0]]), None
+
+    x, best, count = levenberg_marquardt(
+        evaluate, np.array([3.0]), (np.array([-9.0]), np.array([9.0])), 40, SETTINGS.fit
+    )
+    assert count == len(spent) < 12
+    assert (
+        float(best[0][0])
+        == 10.0 + 5.0 * abs(float(x[0]))
+        < min(10.0 + 5.0 * abs(a) for a in spent) + 1e-9
+    )

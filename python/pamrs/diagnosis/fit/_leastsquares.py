@@ -92,12 +92,12 @@ def levenberg_marquardt(
             break
         tried = np.clip(x + step, low, high)
         spent += 1
-        reached.append(reached[-1])
         try:
             found = evaluate(tried)
         except SimulationError:
             damping = max(10.0 * hard, 1e-2)
             continue
+        reached.append(reached[-1])
         gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
             x, best, reached[-1] = tried, found, reached[-1] - gained

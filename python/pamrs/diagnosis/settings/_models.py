@@ -93,10 +93,11 @@ class FitSettings(SettingsGroup):
         origin="docs/decisions/0022: a fit that stopped early looked like missing physics",
     )
     stall_evaluations: int = setting(
-        4,
+        5,
         unit="count",
         least=1,
-        reason="evaluations that together gain less than one step must, and the fit ends",
+        reason="evaluations that together gain less than one step must, and the fit ends: as many "
+        "as it takes from the first damping to steps of a tenth",
         origin="docs/decisions/0097",
     )
     evaluations: int = setting(
