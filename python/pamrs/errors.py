@@ -62,11 +62,12 @@ def missing_package(error: ImportError, extra: str) -> MissingPackageError:
     -------
     MissingPackageError
     """
+    name = error.name or "a package"
     if isinstance(error, ModuleNotFoundError):
         why = f"which is not installed: pip install pamrs[{extra}]"
     else:
         why = f"which cannot be loaded ({error}); to install it anew: pip install pamrs[{extra}]"
-    return MissingPackageError(f"this needs {error.name}, {why}", name=error.name)
+    return MissingPackageError(f"this needs {name}, {why}", name=error.name)
 
 
 def joined(head: str, problems: Iterable[str]) -> str:

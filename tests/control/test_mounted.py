@@ -2,6 +2,7 @@
 the line of the link.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -131,3 +132,18 @@ def test_impossible_numbers_of_a_model_are_refused(change):
         ArmModel.from_rig(PLAIN).replace(**change)
     with pytest.raises(ParameterError, match="tilt = inf rad"):
         ArmModel.from_rig(PLAIN).replace(tilt=math.inf)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"tilt": math.nan}, "tilt"),
+        ({"spring": (np.array([-5.0, 1.0]), np.zeros(2))}, "spring"),
+        ({"spring": (np.array([5.0]), np.zeros(2))}, "spring"),
+        ({"spring": (np.ones(2), np.array([0.0, math.inf]))}, "spring"),
+    ],
+)
+def test_a_mounting_of_several_joints_that_cannot_be_is_refused(wrong, named):
+    model = PlanarArmModel.from_rig(pamrs.rigs.named("two_joint_arm"))
+    with pytest.raises(ParameterError, match=named):
+        dataclasses.replace(model, **wrong)

@@ -14,8 +14,8 @@ import pamrs
 from pamrs.diagnosis.evidence import significant
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
-from pamrs.diagnosis.noise._discrepancy import whitening
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.noise._discrepancy import _flowing, whitening
+from pamrs.diagnosis.prepare import Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
@@ -116,3 +116,29 @@ def test_whitening_agrees_with_the_dense_covariance(columns: int) -> None:
     white = whitening(curves)(rows)
     assert white.T @ white == pytest.approx(dense, rel=1e-6)
     assert whitening(curves)(rows[:, 0]) == pytest.approx(white[:, 0])
+
+
+def test_an_error_of_a_flow_outlasts_a_hole_in_the_log() -> None:
+    """What a hole hides of an output fades on as it does beside it."""
+    rows, prediction = np.ones(200, dtype=bool), np.linspace(0.0, 100.0, 200)
+
+    def moved(used: NDArray[np.bool_]) -> Array:
+        fading = np.where(used, np.exp(-0.01 * np.arange(200)), 0.0)[:, None]
+        base = Residual(prediction, None, prediction, used, 1.0, [(0, 200, fading)])
+        return _flowing(np.full((200, 1), 0.01), base)[:, 0]
+
+    holed = rows.copy()
+    holed[[0, *range(100, 110), 199]] = False
+    assert np.allclose(moved(holed)[1:199], moved(rows)[1:199], rtol=2e-2)
+    assert np.all(moved(~rows) == 0.0)
+
+
+def test_bins_of_a_recording_that_is_shorter_than_one_are_none() -> None:
+    few = np.ones(4, dtype=bool)
+    for values in (np.ones(4), np.ones((4, 3)), np.ones((4, 0))):
+        means, counts = binned(values, few, 5)
+        assert means.shape == (0, *values.shape[1:])
+        assert counts.shape == (0,)
+    means, counts = binned(np.ones((10, 0)), np.ones(10, dtype=bool), 5)
+    assert means.shape == (2, 0)
+    assert counts.tolist() == [5.0, 5.0]

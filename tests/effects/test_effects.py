@@ -303,3 +303,11 @@ def test_a_linear_model_refuses_a_dead_time_of_the_valve() -> None:
     rig = pamrs.rigs.shoulder().with_effect("input_path_lag", {"delay": 0.03}, form="dead_time")
     with pytest.raises(ParameterError, match=r"delay = 0\.03 is not allowed"):
         linearise(rig, 0.7)
+
+
+def test_a_step_that_leaves_the_range_behind_a_hose_is_an_error_and_no_panic():
+    """Within one step a pressure can be no number; flows in series must not stop at that."""
+    rig = pamrs.rigs.shoulder().with_effect("tube_flow_restriction", {"conductance": 1e-8})
+    start = {"joint_rate": 3e3, "muscle_pressure": 3e5}
+    with pytest.raises(pamrs.SimulationError):
+        pamrs.simulate(rig, np.full(20, 8.0), sample_time=0.005, initial=start)

@@ -257,7 +257,7 @@ def _picture() -> Callable[..., bytes]:
     try:
         from pamrs.design.figures import summary_png
     except ImportError as error:
-        raise missing_package(error, "plot") from None
+        raise missing_package(error, "plot") from error
     return summary_png
 
 

@@ -139,7 +139,7 @@ class ClosedLoop:
         except ImportError as error:
             from pamrs.errors import missing_package
 
-            raise missing_package(error, "io") from None
+            raise missing_package(error, "io") from error
         commands = self.command if isinstance(self.command, Mapping) else {"command": self.command}
         columns = {**self._wanted(), **commands, **self.channels}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))

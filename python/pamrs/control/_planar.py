@@ -15,6 +15,7 @@ Li, Applied Nonlinear Control, 1991, 9.1).
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -123,6 +124,19 @@ class PlanarArmModel(JointModel):
                 )
             value.flags.writeable = False
             object.__setattr__(self, name, value)
+        if not math.isfinite(self.tilt):
+            raise ParameterError(f"tilt = {self.tilt} rad is not allowed: a finite angle")
+        if self.spring is not None:
+            stiffness, rest = (np.array(part, dtype=np.float64) for part in self.spring)
+            both = np.concatenate([stiffness.ravel(), rest.ravel()])
+            right = stiffness.shape == rest.shape == (n,) and bool(np.all(np.isfinite(both)))
+            if not (right and np.all(stiffness >= 0.0)):
+                raise ParameterError(
+                    f"spring = {self.spring} is not allowed: finite stiffnesses of zero or more "
+                    f"and finite angles are needed for the joints {', '.join(self.names)}"
+                )
+            stiffness.flags.writeable = rest.flags.writeable = False
+            object.__setattr__(self, "spring", (stiffness, rest))
         object.__setattr__(
             self, "pressure_limit", float(positive_gain("pressure_limit", self.pressure_limit))
         )

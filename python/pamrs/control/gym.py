@@ -41,7 +41,7 @@ try:
     from gymnasium.vector import AutoresetMode
     from gymnasium.vector.utils import batch_space
 except ImportError as error:
-    raise missing_package(error, "control") from None
+    raise missing_package(error, "control") from error
 
 __all__ = ["ID", "ShoulderEnv", "ShoulderVectorEnv"]
 

@@ -310,7 +310,7 @@ def python_control() -> Any:
     except ImportError as error:
         from pamrs.errors import missing_package
 
-        raise missing_package(error, "control") from None
+        raise missing_package(error, "control") from error
     return library
 
 

@@ -519,7 +519,7 @@ def _cma(
     try:
         import cma  # type: ignore[import-untyped]
     except ImportError as error:
-        raise missing_package(error, "search") from None
+        raise missing_package(error, "search") from error
     if size == 1:
         raise ParameterError(
             "bounds has one gain; CMA-ES needs two at least: take optuna, or a gain_map"
@@ -557,7 +557,7 @@ def _optuna(
     try:
         import optuna
     except ImportError as error:
-        raise missing_package(error, "search") from None
+        raise missing_package(error, "search") from error
     before = optuna.logging.get_verbosity()
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:

@@ -218,7 +218,7 @@ class Lift:
         except ImportError as error:
             from pamrs.errors import missing_package
 
-            raise missing_package(error, "plot") from None
+            raise missing_package(error, "plot") from error
         return write_atomically(path, lift_png(self))
 
 

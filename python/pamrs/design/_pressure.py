@@ -341,7 +341,7 @@ def pareto_front(
     try:
         from pamrs.design._genetic import evolve_two
     except ImportError as error:
-        raise missing_package(error, "search") from None
+        raise missing_package(error, "search") from error
     span = problem.upper - problem.lower
 
     def objectives(unit: Array) -> Array:

@@ -84,7 +84,7 @@ def search(
         try:
             from pamrs.design._genetic import evolve
         except ImportError as error:
-            raise missing_package(error, "search") from None
+            raise missing_package(error, "search") from error
         with seeded(seed):
             evolve(evaluator, settings)
     elif method == "de":
@@ -138,7 +138,7 @@ def _cma(evaluator: Evaluator, seed: int) -> None:
     try:
         import cma  # type: ignore[import-untyped]
     except ImportError as error:
-        raise missing_package(error, "search") from None
+        raise missing_package(error, "search") from error
     rng = np.random.default_rng(seed)
     size = evaluator.lower.size
     population = 4 + int(3 * np.log(size))

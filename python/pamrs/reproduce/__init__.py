@@ -94,7 +94,7 @@ def section(
         except ImportError as error:
             from pamrs.errors import missing_package
 
-            raise missing_package(error, "plot") from None
+            raise missing_package(error, "plot") from error
     chapter = importlib.import_module(f"pamrs.reproduce.{_CHAPTERS[name]}")
     rows = chapter.facts(search=search, progress=progress)
     if pictures and progress is not None:

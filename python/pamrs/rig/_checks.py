@@ -53,9 +53,11 @@ def muscle_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
     problems += _map_problems(f"{label}.map", muscle) if "map_force" in muscle else []
     warmer = muscle.get("temperature", 0.0) - muscle.get("reference_temperature", 0.0)
     if muscle.get("softening", 0.0) * warmer > 1.0:
+        side = "above" if warmer > 0.0 else "below"
         problems.append(
             f"{label}.softening = {muscle['softening']:g} 1/K is not allowed: a size of at most "
-            f"{1.0 / abs(warmer):g} 1/K is needed, {warmer:g} K above {label}.reference_temperature"
+            f"{1.0 / abs(warmer):.4g} 1/K is needed, {abs(warmer):.4g} K {side} "
+            f"{label}.reference_temperature"
         )
     thickness, diameter = muscle["wall_thickness"], muscle["rest_diameter"]
     if not thickness < diameter / 2:

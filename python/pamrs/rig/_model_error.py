@@ -1,9 +1,9 @@
 """How well a user knows the model: ``[model_error]`` of a rig file.
 
 An entry is named after a kind of block (``muscle = "1 %"``, a share of what the block does to its
-output) or after a measured channel (``joint_angle = "0.1 deg"``, a size, or a share of its own
-changes). It is one standard deviation of an error that stays alike for a while, as that of a force
-curve or of an encoder does.
+output) or after a measured channel (``joint_angle = "0.1 deg"``, a size, or a share of the range
+that it visits). It is one standard deviation of a smooth curve that stays what it is, as the error
+of a force over the stroke or of an encoder over the angle does (docs/decisions/0095).
 """
 
 from __future__ import annotations

@@ -145,7 +145,7 @@ def _salib(module: str) -> Any:
             warnings.simplefilter("ignore")
             return importlib.import_module(f"SALib.{module}")
     except ImportError as error:
-        raise missing_package(error, "sensitivity") from None
+        raise missing_package(error, "sensitivity") from error
 
 
 def _design(method: str, dimensions: int, n: int, seed: int) -> _Design:

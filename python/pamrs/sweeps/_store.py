@@ -271,7 +271,7 @@ def open_sweep(store: str | os.PathLike[str]) -> xr.Dataset:
     try:
         import xarray as xr
     except ImportError as error:
-        raise missing_package(error, "sweep") from None
+        raise missing_package(error, "sweep") from error
     path = Path(store)
     _stored(path)
     entries, _ = read_journal(path / _FOLDER / _JOURNAL)
@@ -304,7 +304,7 @@ def _zarr() -> Any:
     try:
         import zarr
     except ImportError as error:
-        raise missing_package(error, "sweep") from None
+        raise missing_package(error, "sweep") from error
     return zarr
 
 

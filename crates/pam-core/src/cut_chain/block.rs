@@ -62,7 +62,7 @@ impl Block {
     /// Longest stable step [s] while its neighbours are driven.
     ///
     /// # Errors
-    /// [`Error::Parameter`] for links that cannot be.
+    /// [`Error::Parameter`] for an arm whose links are not possible.
     pub fn longest_step(self, rig: &Rig, measured: &Measured<'_>) -> Result<f64> {
         if self.mechanical() {
             return Ok(rig.body_step());

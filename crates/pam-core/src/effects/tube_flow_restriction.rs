@@ -4,11 +4,12 @@
 //! Valve and tube in series without volume between them: the pressure at the node is that at which
 //! both pass the same mass, `m_v(p_1, p_n) = m_t(p_n, p_2)`. `iso_6358`: the tube has a sonic
 //! conductance and a critical ratio of 0.3. `pipe`: isothermal flow through a long pipe, laminar at
-//! small flows and turbulent at large ones ([`crate::blocks::pipe`]; Shapiro 1953). The node is found by Newton steps inside a bracket, for the difference of the flows or of their
-//! squares; one more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
-//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014);
-//! Eckersten, "Simplified flow calculations for pneumatic components", 1975. A conductance of
-//! [`NONE`] or more restricts nothing.
+//! small flows and turbulent at large ones ([`crate::blocks::pipe`]; Shapiro 1953). The node is
+//! found by Newton steps inside a bracket, for the difference of the flows or of their squares; one
+//! more step in the scalar's own arithmetic gives it its exact derivatives. Not stiff: nothing is
+//! stored at the node (a volume there is a `[line]`'s inlet volume). ISO 6358-3 (2014); Eckersten,
+//! "Simplified flow calculations for pneumatic components", 1975. A conductance of [`NONE`] or more
+//! restricts nothing.
 //!
 //! With a `tap` of [`AT_VALVE`] or more the transducer of what the valve feeds sits at the valve's
 //! end of the tube and reads the node, which leads the muscle's pressure while air flows. Where
@@ -223,7 +224,8 @@ impl Series<'_, f64> {
         }
         let square =
             (first * upstream * upstream + last * downstream * downstream) / (first + last);
-        square.sqrt().clamp(downstream, upstream)
+        // not `clamp`, which panics at a bound that is not a number
+        square.sqrt().max(downstream).min(upstream)
     }
 
     /// Pressure at the node [Pa] and slope of what it gains there [kg/(s Pa)].
@@ -370,6 +372,13 @@ mod tests {
         assert_eq!(flow(8e-6, 1.2e-8, [5e5, 5e5], false), 0.0);
         assert!(flow(0.0, 1.2e-8, [8e5, 2e5], false).abs() < 1e-18);
         assert!(flow(0.0, 1.2e-8, [8e5, 2e5], true).abs() < 1e-18);
+    }
+
+    #[test]
+    fn a_pressure_that_is_no_number_gives_a_flow_that_is_none() {
+        for p in [[f64::NAN, 2e5], [8e5, f64::NAN], [f64::NAN; 2]] {
+            assert!(flow(8e-6, 1.2e-8, p, false).is_nan() && flow(8e-6, 1.2e-8, p, true).is_nan());
+        }
     }
 
     #[test]

@@ -40,9 +40,11 @@ pub(crate) fn check_softened(
         return Ok(());
     }
     let warmer = temperature - reference;
-    let most = 1.0 / warmer.abs();
+    let (most, apart) =
+        ((1e6 / warmer.abs()).floor() / 1e6, (warmer.abs() * 100.0).round() / 100.0);
+    let side = if warmer > 0.0 { "above" } else { "below" };
     let allowed =
-        format!("a size of at most {most} 1/K, {warmer} K above {muscle}.reference_temperature");
+        format!("a size of at most {most} 1/K, {apart} K {side} {muscle}.reference_temperature");
     Err(Error::parameter(format!("{muscle}.softening"), softening, allowed))
 }
 

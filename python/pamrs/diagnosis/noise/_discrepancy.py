@@ -180,9 +180,12 @@ def _flowing(shares: Array, base: Residual) -> Array:
     steps = np.append(np.diff(base.prediction), 0.0)[:, None] * shares
     moved = np.zeros_like(shares)
     for a, b, q in base.starts:
-        first = q[:, 0]
-        with np.errstate(divide="ignore", invalid="ignore"):
-            kept = np.clip(np.nan_to_num(first[1:] / first[:-1], nan=1.0, posinf=1.0), 0.0, 1.0)
+        used = np.flatnonzero(q[:, 0])
+        if used.size == 0:
+            continue
+        # over rows that are not used it fades as beside them
+        level = np.interp(np.arange(b - a), used, np.log(np.abs(q[used, 0])))
+        kept = np.minimum(np.exp(np.diff(level)), 1.0)
         for i in range(a, b - 1):
             moved[i + 1] = kept[i - a] * moved[i] + steps[i]
     return moved

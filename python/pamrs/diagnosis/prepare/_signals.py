@@ -451,6 +451,6 @@ def binned(values: Array, rows: Mask, width: int) -> tuple[Array, Array]:
     n = rows.size // width * width
     weights = rows[:n].reshape(-1, width).astype(np.float64)
     counts = weights.sum(axis=1)
-    data = values[:n].reshape(*weights.shape, -1)
+    data = values[:n].reshape(*weights.shape, math.prod(values.shape[1:]))
     means = (weights[:, None, :] @ data)[:, 0] / np.maximum(counts, 1.0)[:, None]
     return means.reshape(counts.size, *values.shape[1:]), counts

@@ -617,7 +617,7 @@ class NoiseSettings(SettingsGroup):
         unit="count",
         least=1,
         reason="waves of the same variance of which the error that a rig file states consists: a "
-        "shift, and half a period to fifteen over what was visited",
+        "shift, and one to fifteen half periods over what was visited",
         origin="docs/decisions/0095",
     )
     curve_rest: float = setting(

@@ -1,10 +1,10 @@
 //! Planar arm of `N` links in series, with payloads, friction and elastic stops.
 //!
-//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop - k (q - q_k)` (Spong, Hutchinson &
-//! Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity vector (of
-//! a tilted base from an angle to it), as in the one-link arm, `q_k` from the link before; positive torque raises `q`. In the links'
-//! directions `phi_i = q_1 + ... + q_i`, with `mu_i` all mass carried at the end of link `i` (its
-//! payload and every link beyond),
+//! `H(q) q'' + C(q, q') q' + G(q) = tau - c q' - f tanh(q'/w) + tau_stop - k (q - q_k)` (Spong,
+//! Hutchinson & Vidyasagar, *Robot Modeling and Control*, ch. 7). `q_1` is measured from the gravity
+//! vector (of a tilted base from an angle to it), as in the one-link arm, `q_k` from the link
+//! before; positive torque raises `q`. In the links' directions `phi_i = q_1 + ... + q_i`, with
+//! `mu_i` all mass carried at the end of link `i` (its payload and every link beyond),
 //!
 //! - `A_ii = I_i + m_i c_i^2 + mu_i l_i^2`, `B_i = m_i c_i + mu_i l_i`, `A_ij = l_i B_j` for
 //!   `i < j`;
