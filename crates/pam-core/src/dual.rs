@@ -4,6 +4,9 @@
 //! compiler puts them into vectors (`docs/decisions/0097`). The price: what is divided by zero, or
 //! multiplied with what is infinite, has no derivative any more, varying or not.
 
+// derivatives of products and quotients are sums
+#![allow(clippy::suspicious_arithmetic_impl)]
+
 use num_traits::{One, Zero};
 use std::cmp::Ordering;
 use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssign};
@@ -123,7 +126,6 @@ impl<const N: usize> Div for Dual<N> {
     type Output = Self;
 
     #[inline(always)]
-    #[allow(clippy::suspicious_arithmetic_impl)] // one inverse for all derivatives
     fn div(self, other: Self) -> Self {
         let ratio = self.re / other.re;
         let inverse = other.re.recip();
@@ -162,7 +164,6 @@ impl<const N: usize> Div<f64> for Dual<N> {
     type Output = Self;
 
     #[inline(always)]
-    #[allow(clippy::suspicious_arithmetic_impl)] // one inverse for all derivatives
     fn div(self, other: f64) -> Self {
         let inverse = other.recip();
         Self { re: self.re / other, eps: self.eps.map(|e| e * inverse) }
