@@ -224,7 +224,9 @@ impl Series<'_, f64> {
         }
         let square =
             (first * upstream * upstream + last * downstream * downstream) / (first + last);
-        // not `clamp`, which panics at a bound that is not a number
+        if square.is_nan() {
+            return square; // within a step a pressure may be no number, which ends the run behind it
+        }
         square.sqrt().max(downstream).min(upstream)
     }
 
