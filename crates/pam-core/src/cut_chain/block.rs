@@ -67,11 +67,8 @@ impl Block {
         if self.mechanical() {
             return Ok(rig.body_step());
         }
-        let layout = rig.layout();
-        let mut moving = hidden(layout, measured);
-        moving.extend(unread(rig, self, measured).into_iter().map(|k| layout.supply(k)));
-        moving.extend(self.output(layout));
-        rig.air_step(|node| node.place(layout).is_some_and(|place| moving.contains(&place)))
+        let simulated = self.simulated(rig, measured);
+        rig.air_step(|node| node.place(rig.layout()).is_some_and(|place| simulated.moves(place)))
     }
 
     /// Whether muscles and what they move make its output, and not air alone.

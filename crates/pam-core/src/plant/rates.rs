@@ -87,7 +87,7 @@ impl Simulated {
     }
 
     /// Whether the state at a place is integrated.
-    pub(super) fn moves(&self, place: usize) -> bool {
+    pub(crate) fn moves(&self, place: usize) -> bool {
         !self.driven[place]
     }
 }

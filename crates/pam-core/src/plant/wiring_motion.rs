@@ -10,7 +10,7 @@ use crate::muscle::spec::{MODULUS_SCALE, SOFTENING, TEMPERATURE};
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
 
-/// Bounds of an angle that an arm is mounted at.
+/// Bounds of an angle that an arm is mounted at, or that a spring is at rest at.
 const TURNED: (f64, f64, &str) = (-7.0, 7.0, "rad");
 
 pub(super) fn coordinates(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<Coordinate>> {
@@ -83,7 +83,7 @@ fn coordinate(joint: &JointSpec, table: &mut Parameters) -> Result<Coordinate> {
         }),
         spring: Some([
             add("stiffness", joint.stiffness, (0.0, 1e9, "N m/rad"))?,
-            add("spring_angle", joint.spring_angle, (-7.0, 7.0, "rad"))?,
+            add("spring_angle", joint.spring_angle, TURNED)?,
         ]),
         zero: None,
     })

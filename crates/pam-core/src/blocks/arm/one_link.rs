@@ -41,6 +41,8 @@ pub struct Mounting<S> {
     /// The same of the payload.
     payload: [S; 2],
     base_angle: S,
+    /// Both are straight down, and stay so whatever varies.
+    plumb: bool,
 }
 
 impl<S: Scalar> Mounting<S> {
@@ -48,7 +50,9 @@ impl<S: Scalar> Mounting<S> {
     /// `centre_angle` off the line to the payload [rad].
     pub fn new(base_angle: S, centre_angle: S) -> Self {
         let at = |angle: S| [angle.cos(), angle.sin()];
-        Self { own: at(base_angle + centre_angle), payload: at(base_angle), base_angle }
+        let (own, payload) = (at(base_angle + centre_angle), at(base_angle));
+        let plumb = [own, payload].iter().all(|at| at[1].same(&constant(0.0)));
+        Self { own, payload, base_angle, plumb }
     }
 
     /// Angle of the line to the payload from the gravity vector, where the joint's is zero [rad].
@@ -138,8 +142,11 @@ impl<S: Scalar> OneLink<S> {
     /// Largest torque of its weight by the sine and by the cosine of the joint's angle [N m].
     #[inline]
     pub fn weights(&self) -> [S; 2] {
-        let Mounting { own, payload, .. } = self.mounting;
+        let Mounting { own, payload, plumb, .. } = self.mounting;
         let hanging = self.payload * self.length;
+        if plumb {
+            return [(self.first_moment + hanging) * self.gravity, constant(0.0)];
+        }
         [0, 1].map(|k| (self.first_moment * own[k] + hanging * payload[k]) * self.gravity)
     }
 
@@ -147,11 +154,10 @@ impl<S: Scalar> OneLink<S> {
     #[inline]
     pub fn weight(&self, angle: S) -> S {
         let [level, side] = self.weights();
-        let plumb = level * angle.sin();
-        if side.same(&constant(0.0)) {
-            return plumb; // as most are, and a cosine is dear
+        if self.mounting.plumb {
+            return level * angle.sin(); // as most are, and a cosine is dear
         }
-        plumb + side * angle.cos()
+        level * angle.sin() + side * angle.cos()
     }
 
     /// Angular acceleration [rad/s2] under a joint torque and a stop torque [N m].
