@@ -29,7 +29,6 @@ __all__ = [
     "GEOMETRY",
     "QUANTITY",
     "as_given",
-    "check_packages",
     "check_writable",
     "exact",
     "named_muscle",
@@ -138,33 +137,6 @@ def usable_samples(
         name: (recording.time[rows], recording.channels[name][rows])
         for name, rows in recording.mask.items()
     }
-
-
-def check_packages(extra: str, *packages: str) -> None:
-    """Refuse, before any long work starts, what needs a package that is not installed.
-
-    Parameters
-    ----------
-    extra : str
-        The extra of pamrs that installs them.
-    *packages : str
-        What is imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If one is missing; names it and the extra.
-    """
-    import importlib
-
-    from pamrs.errors import missing_package
-
-    for package in packages:
-        try:
-            importlib.import_module(package)
-        except ImportError as error:
-            error.name = error.name or package
-            raise missing_package(error, extra) from error
 
 
 def tell(text: str) -> list[str]:

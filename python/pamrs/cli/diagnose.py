@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs.cli._shared import (
-    check_packages,
     check_writable,
     exact,
     progress,
@@ -17,6 +16,7 @@ from pamrs.cli._shared import (
     tell,
     write,
 )
+from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis

@@ -14,13 +14,13 @@ import typer
 
 from pamrs.cli._shared import (
     GEOMETRY,
-    check_packages,
     check_writable,
     named_muscle,
     progress,
     quantity,
     write,
 )
+from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.fit import ForceMap, FrictionFit, MapFit, ModelComparison, MuscleFit

@@ -8,7 +8,8 @@ from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import as_given, check_packages, check_writable, exact, rig_named, write
+from pamrs.cli._shared import as_given, check_writable, exact, rig_named, write
+from pamrs.errors import check_packages
 
 __all__ = ["lift_command"]
 

@@ -9,13 +9,13 @@ import typer
 
 from pamrs.channels import unit_of
 from pamrs.cli._shared import (
-    check_packages,
     check_writable,
     progress,
     rig_named,
     usable_samples,
     write,
 )
+from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.recordings import Case, Recording

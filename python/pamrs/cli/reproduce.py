@@ -10,7 +10,8 @@ from typing import Annotated
 
 import typer
 
-from pamrs.cli._shared import check_packages, check_writable, progress, write
+from pamrs.cli._shared import check_writable, progress, write
+from pamrs.errors import check_packages
 
 __all__ = ["reproduce_command"]
 

@@ -12,7 +12,6 @@ import typer
 
 from pamrs.channels import UNITS, channel_of, unit_of
 from pamrs.cli._shared import (
-    check_packages,
     check_writable,
     exact,
     progress,
@@ -20,6 +19,7 @@ from pamrs.cli._shared import (
     usable_samples,
     write,
 )
+from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     import numpy as np

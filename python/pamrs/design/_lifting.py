@@ -345,10 +345,8 @@ class _Balance:
 
     def __init__(self, rig: Rig, pressure: float) -> None:
         self.arm = rig.tables("arm")[""]
-        self.joint, transmissions = (
-            next(iter(rig.tables("joint").values())),
-            rig.tables("transmission"),
-        )
+        self.joint = next(iter(rig.tables("joint").values()))
+        transmissions = rig.tables("transmission")
         self.groups = [
             (rig.muscle_of(name), Joint.from_model(transmissions.get(name, self.joint)))
             for name in rig.tables("muscle")

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import importlib
 import os
 from pathlib import Path
 
-from pamrs.errors import missing_package
+from pamrs.errors import check_packages
 from pamrs.findings import Findings
 
 __all__ = ["render_html", "write_figure", "write_report"]
@@ -25,12 +24,7 @@ def require(*packages: str) -> None:
     ImportError
         If one is missing; names it and the extra to install.
     """
-    for package in packages:
-        try:
-            importlib.import_module(package)
-        except ImportError as error:
-            error.name = error.name or package
-            raise missing_package(error, "report") from error
+    check_packages("report", *packages)
 
 
 def render_html(diagnosis: Findings) -> str:

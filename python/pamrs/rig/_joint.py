@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig._muscle import Muscle
+from pamrs.rig.schema import SPRING, STOPS
 
 __all__ = ["Joint"]
 
@@ -101,7 +102,7 @@ class Joint:
         -------
         Joint
         """
-        return cls(**{key: value for key, value in model.items() if key not in _NOT_ITS_OWN})
+        return cls(**{key: value for key, value in model.items() if key not in (*STOPS, *SPRING)})
 
     @property
     def parameters(self) -> dict[str, Any]:
@@ -217,13 +218,3 @@ class Joint:
             f"Joint({self._spec['kind']}, rest_angle={math.degrees(self._spec['rest_angle']):.4g} "
             "deg)"
         )
-
-
-_NOT_ITS_OWN = (
-    "min_angle",
-    "max_angle",
-    "stop_stiffness",
-    "stop_damping",
-    "stiffness",
-    "spring_angle",
-)

@@ -17,6 +17,8 @@ from pamrs.rig.schema import (
     LIMITS,
     PORTS,
     SCHEMA,
+    SPRING,
+    STOPS,
     Key,
     keys_of,
     kind_of,
@@ -33,8 +35,6 @@ __all__ = [
     "toml_text",
 ]
 
-_STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
-_SPRING: Final = ("stiffness", "spring_angle")
 _MOUNTING: Final = ("base_angle", "centre_angle")
 
 # ---------------------------------------------------------------------------------- TOML
@@ -241,8 +241,8 @@ def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
         "name": name,
         "transmission": own,
         "rest_angle": table["rest_angle"],
-        **{key: table[key] for key in _STOPS},
-        **_told(table, _SPRING),
+        **{key: table[key] for key in STOPS},
+        **_told(table, SPRING),
     }
 
 
@@ -256,7 +256,7 @@ def _transmission(table: Mapping[str, Any] | None) -> dict[str, Any] | None:
     return (
         None
         if table is None
-        else {key: value for key, value in table.items() if key not in (*_STOPS, *_SPRING)}
+        else {key: value for key, value in table.items() if key not in (*STOPS, *SPRING)}
     )
 
 

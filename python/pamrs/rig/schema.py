@@ -19,6 +19,8 @@ __all__ = [
     "REQUIRED_BLOCKS",
     "SCHEMA",
     "SINGLE_BLOCKS",
+    "SPRING",
+    "STOPS",
     "Key",
     "Port",
     "keys_of",
@@ -111,6 +113,10 @@ _ISO = ("iso_6358",)
 _MAP = ("map",)
 _ELASTIC = tuple(model for model in ALL_MODELS if model != "map")
 _COEFFICIENTS = ("coefficients",)
+
+#: Keys of [joint] that are no part of its transmission.
+STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
+SPRING: Final = ("stiffness", "spring_angle")
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
 _KINDS: Final = {

@@ -97,10 +97,10 @@ def curves(
     columns: list[Array] = []
     own = _size(stated, block.channel, ranges)
     if own > 0.0:
-        columns += [means(_freed(own * curve, base)) for curve in over(block.channel)]
+        columns += [means(base.freed(own * curve)) for curve in over(block.channel)]
     for place, share in _flow_errors(block, ranges, stated):
         moved = _flowing(share * np.column_stack(over(place)), base)
-        columns += [means(_freed(column, base)) for column in moved.T]
+        columns += [means(base.freed(column)) for column in moved.T]
     for name, place, much in _drive_errors(block, prepared, ranges, stated):
         columns += [
             means(_carried(name, much * curve, block, core, prepared, base))
@@ -189,14 +189,6 @@ def _flowing(shares: Array, base: Residual) -> Array:
         for i in range(a, b - 1):
             moved[i + 1] = kept[i - a] * moved[i] + steps[i]
     return moved
-
-
-def _freed(values: Array, base: Residual) -> Array:
-    """Values without what the starts of windows can do, zero in unusable rows."""
-    out = np.where(base.rows, values, 0.0)
-    for a, b, q in base.starts:
-        out[a:b] -= q @ (q.T @ out[a:b])
-    return np.where(base.rows, out, 0.0)
 
 
 def _carried(

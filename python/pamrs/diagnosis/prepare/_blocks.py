@@ -485,6 +485,13 @@ class Residual:
     noise: float
     starts: list[tuple[int, int, Array]] = field(default_factory=list)
 
+    def freed(self, values: Array) -> Array:
+        """Values (n,) without what the starts of windows can do, 0 in unusable rows."""
+        out = np.where(self.rows, values, 0.0)
+        for a, b, q in self.starts:
+            out[a:b] -= q @ (q.T @ out[a:b])
+        return np.where(self.rows, out, 0.0)
+
 
 def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) -> Array:
     """Residual under another model, freed of the same starts as one that was computed with its
@@ -510,10 +517,7 @@ def change(block: Block, core: _core.Rig, prepared: Prepared, base: Residual) ->
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
     )
-    value = np.where(base.rows, measured - prediction, 0.0)
-    for a, b, q in base.starts:
-        value[a:b] -= q @ (q.T @ value[a:b])
-    return np.where(base.rows, value, 0.0)
+    return base.freed(measured - prediction)
 
 
 def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tuple[Array, Array]]:
