@@ -24,7 +24,7 @@ class Ratio:
 
 
 def race(
-    works: Mapping[str, Callable[[], object]], repeats: int = 15, least: float = 0.02
+    works: Mapping[str, Callable[[], object]], repeats: int = 15, least: float = 0.25
 ) -> Times:
     """Time every work once in each repetition, in another order each time.
 
@@ -35,7 +35,8 @@ def race(
     repeats : int
         Number of repetitions.
     least : float
-        A repetition calls a work as often as it takes to fill this time [s].
+        A repetition calls a work as often as it takes to fill this time [s]: what runs for a
+        shorter one than its peers is timed while the processor is still on its way to its speed.
 
     Returns
     -------

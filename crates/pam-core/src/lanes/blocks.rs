@@ -1,7 +1,7 @@
 //! The blocks of several plants side by side: the equations of [`crate::blocks`] without branches.
 //! A test holds each rig's rates against those of [`crate::plant`].
 
-use super::num::{Mask, Num};
+use super::num::{Mask, Num, Registers};
 use crate::blocks::arm::one_link::Stops;
 use crate::blocks::gas::{Gas, LAMINAR_RATIO};
 use crate::chebyshev::{interpolate, lobatto};
@@ -49,13 +49,13 @@ impl Orifice {
 
     /// What [`Self::mass_flow`] takes in the place of a discharge area [m2].
     #[inline(always)]
-    pub fn conductance<S: Simd, const R: usize>(&self, area: Num<S, R>) -> Num<S, R> {
+    pub fn conductance<S: Simd, R: Registers>(&self, area: Num<S, R>) -> Num<S, R> {
         area * self.factor
     }
 
     /// Mass flow [kg/s] from `upstream` to `downstream`, as [`Gas::mass_flow`].
     #[inline(always)]
-    pub fn mass_flow<S: Simd, const R: usize>(
+    pub fn mass_flow<S: Simd, R: Registers>(
         &self,
         conductance: Num<S, R>,
         upstream: Num<S, R>,
@@ -68,7 +68,7 @@ impl Orifice {
     }
 
     #[inline(always)]
-    fn psi<S: Simd, const R: usize>(&self, ratio: Num<S, R>) -> Num<S, R> {
+    fn psi<S: Simd, R: Registers>(&self, ratio: Num<S, R>) -> Num<S, R> {
         let choked = ratio.constant(self.choked);
         if ratio.constant(self.critical_ratio).less(ratio).nowhere() {
             return choked;
@@ -84,12 +84,12 @@ impl Orifice {
 
 /// A tube, as [`crate::blocks::tube::Tube`].
 #[derive(Clone, Copy)]
-pub(super) struct Tube<S: Simd, const R: usize> {
+pub(super) struct Tube<S: Simd, R: Registers> {
     pub flow_factor: Num<S, R>,
     pub critical_ratio: Num<S, R>,
 }
 
-impl<S: Simd, const R: usize> Tube<S, R> {
+impl<S: Simd, R: Registers> Tube<S, R> {
     #[inline(always)]
     pub fn mass_flow(&self, upstream: Num<S, R>, downstream: Num<S, R>) -> Num<S, R> {
         let high = upstream.or_above(downstream);
@@ -112,7 +112,7 @@ impl<S: Simd, const R: usize> Tube<S, R> {
 
 /// Where the air comes from, as [`crate::blocks::supply::Supply`].
 #[derive(Clone, Copy)]
-pub(super) enum Supply<S: Simd, const R: usize> {
+pub(super) enum Supply<S: Simd, R: Registers> {
     /// Fall of the pressure per mass that leaves [Pa/kg].
     Tank(Num<S, R>),
     Constant,
@@ -122,7 +122,7 @@ pub(super) enum Supply<S: Simd, const R: usize> {
     },
 }
 
-impl<S: Simd, const R: usize> Supply<S, R> {
+impl<S: Simd, R: Registers> Supply<S, R> {
     #[inline(always)]
     pub fn pressure_rate(
         &self,
@@ -154,7 +154,7 @@ pub(super) enum Turns {
 /// What moves: an arm of one link, or a mass that hangs from the muscle (without inertia of its
 /// own, and always pulled straight down).
 #[derive(Clone, Copy)]
-pub(super) struct Body<S: Simd, const R: usize> {
+pub(super) struct Body<S: Simd, R: Registers> {
     /// One over the inertia [1/(kg m2)], or over the mass [1/kg].
     pub mobility: Num<S, R>,
     /// Torque of the weight where it pulls across [N m], or the weight itself [N].
@@ -178,7 +178,7 @@ pub(super) struct Body<S: Simd, const R: usize> {
     pub springs: bool,
 }
 
-impl<S: Simd, const R: usize> Body<S, R> {
+impl<S: Simd, R: Registers> Body<S, R> {
     #[inline(always)]
     pub fn acceleration(&self, angle: Num<S, R>, rate: Num<S, R>, torque: Num<S, R>) -> Num<S, R> {
         // What resists is known before the torque is.
@@ -210,7 +210,7 @@ impl<S: Simd, const R: usize> Body<S, R> {
 
 /// Torque of the stops [N m], which never pull.
 #[inline(always)]
-fn stop_torque<S: Simd, const R: usize>(
+fn stop_torque<S: Simd, R: Registers>(
     stops: &Stops,
     angle: Num<S, R>,
     rate: Num<S, R>,

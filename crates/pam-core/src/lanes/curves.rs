@@ -5,7 +5,7 @@
 //! cells, refined until they agree with [`crate::blocks::joint::Joint::eval`] and
 //! [`crate::muscle::Table::eval`] at points off the nodes. No cell crosses a kink of the muscle.
 
-use super::num::{side_by_side, Num, MOST_LANES, PAIR, WHOLE};
+use super::num::{side_by_side, Num, Registers, MOST_LANES, PAIR, WHOLE};
 use crate::chebyshev::{interpolate, lobatto};
 use crate::plant::Group;
 use pulp::Simd;
@@ -19,8 +19,15 @@ const NODES: usize = DEGREE + 1;
 const VOLUME: usize = 3;
 const SLOPE: usize = 4;
 /// A cell: its powers, of the distance from its middle in its width, one after the other, all
-/// columns of each.
-type Cell = [f64; NODES * COLUMNS];
+/// columns of each, which are one line of the cache.
+#[derive(Debug, Clone)]
+#[repr(align(64))]
+struct Cell([f64; NODES * COLUMNS]);
+
+/// Columns of some lanes, each a line of the cache.
+#[repr(align(64))]
+struct Rows<const N: usize>([f64; N]);
+
 /// Largest error, relative to the largest magnitude of each column.
 pub(super) const TOLERANCE: f64 = 1e-9;
 /// Cells are halved until the error is below this.
@@ -46,7 +53,7 @@ struct Piece {
 impl Piece {
     /// What its cells are found by: cells per unit, offset, the first and the last one.
     #[inline(always)]
-    fn numbers<S: Simd, const R: usize>(&self, of: Num<S, R>) -> [Num<S, R>; 4] {
+    fn numbers<S: Simd, R: Registers>(&self, of: Num<S, R>) -> [Num<S, R>; 4] {
         let Self { cells_per_unit, offset, first, last, .. } = *self;
         [of.constant(cells_per_unit), of.constant(offset), of.constant(first), of.constant(last)]
     }
@@ -84,13 +91,13 @@ impl Curves {
         }
         let mut pieces = pieces.into_iter();
         let (first, others) = (pieces.next()?, pieces.collect());
-        Some(Self { low, high, first, others, cells, none: [0.0; NODES * COLUMNS] })
+        Some(Self { low, high, first, others, cells, none: Cell([0.0; NODES * COLUMNS]) })
     }
 
     /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
     /// its end.
     #[inline(always)]
-    pub fn eval<W: Simd, S: Simd, const R: usize>(
+    pub fn eval<W: Simd, S: Simd, R: Registers>(
         &self,
         wide: W,
         simd: S,
@@ -100,22 +107,22 @@ impl Curves {
         let square = x * x;
         let mut columns = [at; COLUMNS];
         if side_by_side::<S, R>() == 1 {
-            let mut row = [0.0; COLUMNS];
+            let mut row = Rows([0.0; COLUMNS]);
             let place = [x.numbers()[0], square.numbers()[0]];
-            self.row(wide, cell.numbers()[0], place, &mut row);
-            for (column, value) in columns.iter_mut().zip(row) {
+            self.row(wide, cell.numbers()[0], place, &mut row.0);
+            for (column, value) in columns.iter_mut().zip(row.0) {
                 *column = at.constant(value);
             }
             return columns;
         }
-        for register in 0..R {
-            let mut rows = [0.0; COLUMNS * MOST_LANES / PAIR];
-            let lanes = rows.chunks_exact_mut(COLUMNS).take(S::F64_LANES);
+        for register in 0..R::COUNT {
+            let mut rows = Rows([0.0; COLUMNS * MOST_LANES / PAIR]);
+            let lanes = rows.0.chunks_exact_mut(COLUMNS).take(S::F64_LANES);
             for (row, lane) in lanes.zip(register * S::F64_LANES..) {
                 let place = [x.numbers()[lane], square.numbers()[lane]];
                 self.row(wide, cell.numbers()[lane], place, row);
             }
-            Num::turn(simd, &rows, &mut columns, register);
+            Num::turn(simd, &rows.0, &mut columns, register);
         }
         columns
     }
@@ -125,7 +132,7 @@ impl Curves {
     fn row<W: Simd>(&self, wide: W, cell: f64, [x, square]: [f64; 2], row: &mut [f64]) {
         let per_row = COLUMNS / W::F64_LANES;
         let cell = self.cells.get(cell.to_bits() as u32 as usize).unwrap_or(&self.none);
-        let powers = W::as_simd_f64s(cell).0;
+        let powers = W::as_simd_f64s(&cell.0).0;
         let (x, square) = (wide.splat_f64s(x), wide.splat_f64s(square));
         for (k, out) in W::as_mut_simd_f64s(row).0.iter_mut().enumerate() {
             let power = |power: usize| powers[power * per_row + k];
@@ -139,7 +146,7 @@ impl Curves {
 
     /// Cell of each lane, in the last digits of a number, and the place in it from -1/2 to 1/2.
     #[inline(always)]
-    fn place<S: Simd, const R: usize>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
+    fn place<S: Simd, R: Registers>(&self, at: Num<S, R>) -> (Num<S, R>, Num<S, R>) {
         let [scale, offset, first, last] = if side_by_side::<S, R>() == 1 {
             // a plant alone goes where it is
             let mut own = &self.first;
@@ -169,10 +176,10 @@ impl Curves {
 
 /// A cell as it is stored, of one in powers of half its width.
 fn stored(powers: &[[f64; COLUMNS]; NODES]) -> Cell {
-    std::array::from_fn(|k| {
+    Cell(std::array::from_fn(|k| {
         let (power, column) = (k / COLUMNS, k % COLUMNS);
         powers[power][column] * f64::from(1 << power)
-    })
+    }))
 }
 
 /// The columns at an angle, the slope (zero here) left to the volume's polynomial.

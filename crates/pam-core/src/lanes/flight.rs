@@ -3,7 +3,7 @@
 //! depends on its own state and commands only.
 
 use super::group::{Group, Rigs, Row, Runs, Spent};
-use super::num::{in_fours, side_by_side, Num, MOST_LANES, PAIR};
+use super::num::{in_fours, side_by_side, Num, Pair, Registers, Single, MOST_LANES, PAIR};
 use super::rates::{Lanes, Shape};
 use super::reads::Reads;
 use super::rk4::Rk4;
@@ -14,6 +14,7 @@ use crate::simulate::drive::Drive;
 use crate::simulate::{Failure, Progress, Timing, Trajectory};
 use crate::Result;
 use pulp::{Arch, Scalar, Simd, WithSimd};
+use std::marker::PhantomData;
 
 /// Rows for which registers of four are enough.
 const FEW: usize = 4 * PAIR;
@@ -30,25 +31,28 @@ pub(super) fn flights<'a>(
 ) -> Result<Vec<Box<dyn Group + 'a>>> {
     // A few rows have no use for wide registers.
     match rows.len() {
-        1 => Fill::<1> { plan, rows, rigs, wanted }.with_simd(Scalar),
-        ..=FEW => in_fours(Fill::<PAIR> { plan, rows, rigs, wanted }),
-        _ => Arch::new().dispatch(Fill::<PAIR> { plan, rows, rigs, wanted }),
+        1 => Fill { plan, rows, rigs, wanted, registers: PhantomData::<Single> }.with_simd(Scalar),
+        ..=FEW => in_fours(Fill { plan, rows, rigs, wanted, registers: PhantomData::<Pair> }),
+        _ => {
+            Arch::new().dispatch(Fill { plan, rows, rigs, wanted, registers: PhantomData::<Pair> })
+        }
     }
 }
 
-struct Fill<'a, 'f, const R: usize> {
+struct Fill<'a, 'f, R: Registers> {
     plan: &'a Plan,
     rows: Vec<Row>,
     rigs: &'f dyn Rigs<'a>,
     wanted: &'f [usize],
+    registers: PhantomData<R>,
 }
 
-impl<'a, const R: usize> WithSimd for Fill<'a, '_, R> {
+impl<'a, R: Registers> WithSimd for Fill<'a, '_, R> {
     type Output = Result<Vec<Box<dyn Group + 'a>>>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Self { plan, rows, rigs, wanted } = self;
+        let Self { plan, rows, rigs, wanted, .. } = self;
         let (mut flights, mut rows): (Vec<Box<dyn Group + 'a>>, _) =
             (Vec::new(), rows.into_iter().peekable());
         while rows.peek().is_some() {
@@ -60,7 +64,7 @@ impl<'a, const R: usize> WithSimd for Fill<'a, '_, R> {
 }
 
 /// Rows side by side, one at least, at most one for each lane.
-struct Flight<'a, S: Simd, const R: usize> {
+struct Flight<'a, S: Simd, R: Registers> {
     simd: S,
     plan: &'a Plan,
     timing: Timing,
@@ -85,7 +89,7 @@ struct Flight<'a, S: Simd, const R: usize> {
     spent: Spent,
 }
 
-impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
+impl<'a, S: Simd, R: Registers> Flight<'a, S, R> {
     #[inline(always)]
     fn new(
         simd: S,
@@ -315,7 +319,7 @@ impl<'a, S: Simd, const R: usize> Flight<'a, S, R> {
     }
 }
 
-impl<S: Simd, const R: usize> Group for Flight<'_, S, R> {
+impl<S: Simd, R: Registers> Group for Flight<'_, S, R> {
     fn rows(&self) -> &[Row] {
         &self.rows
     }
@@ -378,13 +382,13 @@ pub(super) fn opening(plant: &Plant<'_, f64>, valve: usize, spool: f64) -> f64 {
 }
 
 /// A call that is compiled for the registers of the flight.
-struct Advance<'f, 'a, 'd, S: Simd, const R: usize> {
+struct Advance<'f, 'a, 'd, S: Simd, R: Registers> {
     flight: &'f mut Flight<'a, S, R>,
     samples: usize,
     drive: &'f Drive<'d>,
 }
 
-impl<S: Simd, const R: usize> WithSimd for Advance<'_, '_, '_, S, R> {
+impl<S: Simd, R: Registers> WithSimd for Advance<'_, '_, '_, S, R> {
     type Output = ();
 
     #[inline(always)]

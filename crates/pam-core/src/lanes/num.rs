@@ -29,51 +29,110 @@ pub(super) fn in_fours<W: WithSimd>(work: W) -> W::Output {
     pulp::Arch::new().dispatch(work)
 }
 
-/// How many plants there are side by side.
-#[inline(always)]
-pub(super) const fn side_by_side<S: Simd, const R: usize>() -> usize {
-    S::F64_LANES * R
+/// The registers that hold a number: how many they are, and how they stand in memory.
+pub(super) trait Registers: Copy + 'static {
+    /// How many they are.
+    const COUNT: usize;
+    /// One thing for each of them.
+    type Each<T: Copy + Send + Sync + 'static>: Copy + Send + Sync + AsRef<[T]> + AsMut<[T]>;
+
+    /// The same thing for each.
+    fn each<T: Copy + Send + Sync + 'static>(value: T) -> Self::Each<T>;
 }
 
-/// One number of each lane, in `R` registers.
+/// The register of a plant alone.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Num<S: Simd, const R: usize> {
+pub(super) struct Single;
+
+impl Registers for Single {
+    const COUNT: usize = 1;
+    type Each<T: Copy + Send + Sync + 'static> = [T; 1];
+
+    #[inline(always)]
+    fn each<T: Copy + Send + Sync + 'static>(value: T) -> [T; 1] {
+        [value]
+    }
+}
+
+/// The registers of plants side by side. Each begins a line of the cache: one that lies across two
+/// takes twice as long to read and to write.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair;
+
+/// Two things where a line of the cache begins.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(super) struct Aligned<T>([T; PAIR]);
+
+impl<T> AsRef<[T]> for Aligned<T> {
+    #[inline(always)]
+    fn as_ref(&self) -> &[T] {
+        &self.0
+    }
+}
+
+impl<T> AsMut<[T]> for Aligned<T> {
+    #[inline(always)]
+    fn as_mut(&mut self) -> &mut [T] {
+        &mut self.0
+    }
+}
+
+impl Registers for Pair {
+    const COUNT: usize = PAIR;
+    type Each<T: Copy + Send + Sync + 'static> = Aligned<T>;
+
+    #[inline(always)]
+    fn each<T: Copy + Send + Sync + 'static>(value: T) -> Aligned<T> {
+        Aligned([value; PAIR])
+    }
+}
+
+/// How many plants there are side by side.
+#[inline(always)]
+pub(super) const fn side_by_side<S: Simd, R: Registers>() -> usize {
+    S::F64_LANES * R::COUNT
+}
+
+/// One number of each lane.
+#[derive(Clone, Copy)]
+pub(super) struct Num<S: Simd, R: Registers> {
     simd: S,
-    lanes: [S::f64s; R],
+    lanes: R::Each<S::f64s>,
 }
 
 /// Yes or no for each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Mask<S: Simd, const R: usize> {
+pub(super) struct Mask<S: Simd, R: Registers> {
     simd: S,
-    lanes: [S::m64s; R],
+    lanes: R::Each<S::m64s>,
 }
 
 /// What a number is multiplied by, or what is added to it: a number of each lane, or one of all.
-pub(super) trait Operand<S: Simd, const R: usize> {
+pub(super) trait Operand<S: Simd, R: Registers> {
     /// As a number of each lane.
     fn in_lanes(self, simd: S) -> Num<S, R>;
 }
 
-impl<S: Simd, const R: usize> Operand<S, R> for Num<S, R> {
+impl<S: Simd, R: Registers> Operand<S, R> for Num<S, R> {
     #[inline(always)]
     fn in_lanes(self, _: S) -> Self {
         self
     }
 }
 
-impl<S: Simd, const R: usize> Operand<S, R> for f64 {
+impl<S: Simd, R: Registers> Operand<S, R> for f64 {
     #[inline(always)]
     fn in_lanes(self, simd: S) -> Num<S, R> {
         Num::splat(simd, self)
     }
 }
 
-impl<S: Simd, const R: usize> Num<S, R> {
+impl<S: Simd, R: Registers> Num<S, R> {
     /// The same number in each lane.
     #[inline(always)]
     pub fn splat(simd: S, value: f64) -> Self {
-        Self { simd, lanes: [simd.splat_f64s(value); R] }
+        Self { simd, lanes: R::each(simd.splat_f64s(value)) }
     }
 
     /// A number for each lane; as many as there are lanes.
@@ -87,13 +146,13 @@ impl<S: Simd, const R: usize> Num<S, R> {
     /// The numbers, one for each lane.
     #[inline(always)]
     pub fn numbers(&self) -> &[f64] {
-        bytemuck::cast_slice(&self.lanes)
+        bytemuck::cast_slice(self.lanes.as_ref())
     }
 
     /// The same, to be written.
     #[inline(always)]
     pub fn numbers_mut(&mut self) -> &mut [f64] {
-        bytemuck::cast_slice_mut(&mut self.lanes)
+        bytemuck::cast_slice_mut(self.lanes.as_mut())
     }
 
     /// Eight numbers of each lane of one register, which stand lane by lane, put where they belong.
@@ -111,7 +170,7 @@ impl<S: Simd, const R: usize> Num<S, R> {
                     let [z, w] = simd.deinterleave_shfl_f64s([last[k], last[k + 1]]);
                     let found = simd.deinterleave_shfl_f64s([x, y, z, w]);
                     for (place, lanes) in [k, k + 1, k + 4, k + 5].into_iter().zip(found) {
-                        columns[place].lanes[register] = lanes;
+                        columns[place].lanes.as_mut()[register] = lanes;
                     }
                 }
             }
@@ -119,7 +178,7 @@ impl<S: Simd, const R: usize> Num<S, R> {
                 let low = simd.deinterleave_shfl_f64s([*a, *c, *e, *g]);
                 let high = simd.deinterleave_shfl_f64s([*b, *d, *f, *h]);
                 for (column, lanes) in columns.iter_mut().zip(low.into_iter().chain(high)) {
-                    column.lanes[register] = lanes;
+                    column.lanes.as_mut()[register] = lanes;
                 }
             }
             _ => {
@@ -141,27 +200,31 @@ impl<S: Simd, const R: usize> Num<S, R> {
 
     #[inline(always)]
     fn map(mut self, of: impl Fn(S, S::f64s) -> S::f64s) -> Self {
-        for k in 0..R {
-            self.lanes[k] = of(self.simd, self.lanes[k]);
+        let Self { simd, lanes } = &mut self;
+        for own in lanes.as_mut() {
+            *own = of(*simd, *own);
         }
         self
     }
 
     #[inline(always)]
     fn with(mut self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::f64s) -> Self {
-        for k in 0..R {
-            self.lanes[k] = of(self.simd, self.lanes[k], other.lanes[k]);
+        let Self { simd, lanes } = &mut self;
+        for (own, other) in lanes.as_mut().iter_mut().zip(other.lanes.as_ref()) {
+            *own = of(*simd, *own, *other);
         }
         self
     }
 
     #[inline(always)]
     fn compare(self, other: Self, of: impl Fn(S, S::f64s, S::f64s) -> S::m64s) -> Mask<S, R> {
-        let mut lanes = [of(self.simd, self.lanes[0], other.lanes[0]); R];
-        for (k, mask) in lanes.iter_mut().enumerate().skip(1) {
-            *mask = of(self.simd, self.lanes[k], other.lanes[k]);
+        let Self { simd, lanes: own } = self;
+        let (own, other) = (own.as_ref(), other.lanes.as_ref());
+        let mut lanes = R::each(of(simd, own[0], other[0]));
+        for (k, mask) in lanes.as_mut().iter_mut().enumerate().skip(1) {
+            *mask = of(simd, own[k], other[k]);
         }
-        Mask { simd: self.simd, lanes }
+        Mask { simd, lanes }
     }
 
     /// One number where this one is between two others, another where it is not, or no number.
@@ -223,8 +286,10 @@ impl<S: Simd, const R: usize> Num<S, R> {
         of: impl Fn(S, S::f64s, S::f64s, S::f64s) -> S::f64s,
     ) -> Self {
         let (by, plus) = (by.in_lanes(self.simd), plus.in_lanes(self.simd));
-        for k in 0..R {
-            self.lanes[k] = of(self.simd, self.lanes[k], by.lanes[k], plus.lanes[k]);
+        let Self { simd, lanes } = &mut self;
+        let (by, plus) = (by.lanes.as_ref(), plus.lanes.as_ref());
+        for (k, own) in lanes.as_mut().iter_mut().enumerate() {
+            *own = of(*simd, *own, by[k], plus[k]);
         }
         self
     }
@@ -400,19 +465,20 @@ const EXPONENTIAL: [f64; 11] = {
     terms
 };
 
-impl<S: Simd, const R: usize> Mask<S, R> {
+impl<S: Simd, R: Registers> Mask<S, R> {
     /// Whether it holds in no lane.
     #[inline(always)]
     pub fn nowhere(self) -> bool {
-        self.lanes.iter().all(|lanes| self.simd.first_true_m64s(*lanes) == S::F64_LANES)
+        self.lanes.as_ref().iter().all(|lanes| self.simd.first_true_m64s(*lanes) == S::F64_LANES)
     }
 
     /// One number where it holds, another where it does not.
     #[inline(always)]
     pub fn select(self, yes: Num<S, R>, no: Num<S, R>) -> Num<S, R> {
         let mut chosen = no;
-        for k in 0..R {
-            chosen.lanes[k] = self.simd.select_f64s(self.lanes[k], yes.lanes[k], no.lanes[k]);
+        let (holds, yes) = (self.lanes.as_ref(), yes.lanes.as_ref());
+        for (k, own) in chosen.lanes.as_mut().iter_mut().enumerate() {
+            *own = self.simd.select_f64s(holds[k], yes[k], *own);
         }
         chosen
     }
@@ -420,7 +486,7 @@ impl<S: Simd, const R: usize> Mask<S, R> {
 
 macro_rules! operator {
     ($trait:ident, $name:ident, $lanes:ident) => {
-        impl<S: Simd, const R: usize> $trait for Num<S, R> {
+        impl<S: Simd, R: Registers> $trait for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -429,7 +495,7 @@ macro_rules! operator {
             }
         }
 
-        impl<S: Simd, const R: usize> $trait<f64> for Num<S, R> {
+        impl<S: Simd, R: Registers> $trait<f64> for Num<S, R> {
             type Output = Self;
 
             #[inline(always)]
@@ -445,7 +511,7 @@ operator!(Sub, sub, sub_f64s);
 operator!(Mul, mul, mul_f64s);
 operator!(Div, div, div_f64s);
 
-impl<S: Simd, const R: usize> Neg for Num<S, R> {
+impl<S: Simd, R: Registers> Neg for Num<S, R> {
     type Output = Self;
 
     #[inline(always)]
@@ -454,7 +520,7 @@ impl<S: Simd, const R: usize> Neg for Num<S, R> {
     }
 }
 
-impl<S: Simd, const R: usize> AddAssign for Num<S, R> {
+impl<S: Simd, R: Registers> AddAssign for Num<S, R> {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
@@ -477,18 +543,18 @@ mod tests {
             let [mut sine, mut tangent, mut logarithm, mut near] = [0.0_f64; 4];
             for k in -4000..=4000 {
                 let x = f64::from(k) * 0.0025 + 1e-5;
-                let number = Num::<S, PAIR>::splat(simd, x);
+                let number = Num::<S, Pair>::splat(simd, x);
                 sine = sine.max((number.sin().numbers()[0] - x.sin()).abs());
-                let steep = Num::<S, PAIR>::splat(simd, 3.0 * x);
+                let steep = Num::<S, Pair>::splat(simd, 3.0 * x);
                 tangent = tangent.max((steep.tanh().numbers()[0] - (3.0 * x).tanh()).abs());
                 // From 5e-5 to 2e4, as a pressure over that of the room.
                 let ratio = x.exp();
-                let error = Num::<S, PAIR>::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
+                let error = Num::<S, Pair>::splat(simd, ratio).ln().numbers()[0] - ratio.ln();
                 logarithm = logarithm.max(error.abs() / ratio.ln().abs().max(1.0));
                 // Of a number far from another one, and of one beside it.
                 for other in [2.5 * ratio, ratio * (1.0 + 1e-4 * x)] {
-                    let [here, log] = [ratio, ratio.ln()].map(|n| Num::<S, PAIR>::splat(simd, n));
-                    let found = Num::<S, PAIR>::splat(simd, other).ln_near(here, log, 1.0);
+                    let [here, log] = [ratio, ratio.ln()].map(|n| Num::<S, Pair>::splat(simd, n));
+                    let found = Num::<S, Pair>::splat(simd, other).ln_near(here, log, 1.0);
                     let error = found.numbers()[0] - other.ln();
                     near = near.max(error.abs() / other.ln().abs().max(1.0));
                 }

@@ -2,7 +2,7 @@
 //! without effects.
 
 use super::blocks::{Body, Supply, Tube, Turns};
-use super::num::{side_by_side, Mask, Num, MOST_LANES};
+use super::num::{side_by_side, Mask, Num, Registers, MOST_LANES};
 use super::rk4::Slopes;
 use super::Plan;
 use crate::blocks::arm::one_link::Spring;
@@ -11,7 +11,7 @@ use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE};
 use pulp::Simd;
 
 #[derive(Clone, Copy)]
-struct Valve<S: Simd, const R: usize> {
+struct Valve<S: Simd, R: Registers> {
     from: Node,
     to: usize,
     /// Of the opening that is open, see [`super::blocks::Orifice::conductance`].
@@ -24,7 +24,7 @@ struct Valve<S: Simd, const R: usize> {
     some_vent: bool,
 }
 
-enum Passage<S: Simd, const R: usize> {
+enum Passage<S: Simd, R: Registers> {
     Orifice(Num<S, R>),
     Tube(Tube<S, R>),
 }
@@ -113,7 +113,7 @@ impl Shape {
 }
 
 /// Values of the parameters of each lane.
-struct Plants<'a, S: Simd, const R: usize> {
+struct Plants<'a, S: Simd, R: Registers> {
     simd: S,
     rig: &'a Rig,
     plan: &'a Plan,
@@ -144,7 +144,7 @@ struct Room<T> {
 }
 
 /// Plants side by side and room for their equations.
-pub(super) struct Lanes<'a, S: Simd, const R: usize> {
+pub(super) struct Lanes<'a, S: Simd, R: Registers> {
     pub shape: Shape,
     plants: Plants<'a, S, R>,
     room: Room<Vec<Num<S, R>>>,
@@ -152,7 +152,7 @@ pub(super) struct Lanes<'a, S: Simd, const R: usize> {
     logs: Vec<[Num<S, R>; 2]>,
 }
 
-impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
+impl<'a, S: Simd, R: Registers> Lanes<'a, S, R> {
     /// One lane for each plant of a rig that the plan is for, one at least; the lanes that are left
     /// over are as the last of them.
     pub fn new(simd: S, plan: &'a Plan, plants: &[&Plant<'a, f64>], sums: bool) -> Self {
@@ -278,9 +278,9 @@ impl<'a, S: Simd, const R: usize> Lanes<'a, S, R> {
     }
 }
 
-type Here<'r, S, const R: usize> = Room<&'r mut [Num<S, R>]>;
+type Here<'r, S, R> = Room<&'r mut [Num<S, R>]>;
 
-impl<S: Simd, const R: usize> Plants<'_, S, R> {
+impl<S: Simd, R: Registers> Plants<'_, S, R> {
     #[inline(always)]
     fn pressure_at(&self, shape: Shape, node: Node, state: &[Num<S, R>]) -> Num<S, R> {
         match node {
@@ -474,7 +474,7 @@ impl<S: Simd, const R: usize> Plants<'_, S, R> {
     }
 }
 
-impl<S: Simd, const R: usize> Here<'_, S, R> {
+impl<S: Simd, R: Registers> Here<'_, S, R> {
     /// A mass flow along the arrow; what goes against it goes out of its end.
     #[inline(always)]
     fn pass(
@@ -511,9 +511,9 @@ impl<S: Simd, const R: usize> Here<'_, S, R> {
     }
 }
 
-type Each<'e, 'a, S, const R: usize> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S, R>;
+type Each<'e, 'a, S, R> = &'e dyn Fn(&dyn Fn(&Plant<'a, f64>) -> f64) -> Num<S, R>;
 
-fn supply<'a, S: Simd, const R: usize>(
+fn supply<'a, S: Simd, R: Registers>(
     k: usize,
     first: &Plant<'a, f64>,
     each: Each<'_, 'a, S, R>,
@@ -540,7 +540,7 @@ fn supply<'a, S: Simd, const R: usize>(
     }
 }
 
-fn passage<'a, S: Simd, const R: usize>(
+fn passage<'a, S: Simd, R: Registers>(
     k: usize,
     plan: &Plan,
     first: &Plant<'a, f64>,
@@ -566,7 +566,7 @@ fn passage<'a, S: Simd, const R: usize>(
 }
 
 /// One coordinate. A plan is for no other bodies: in their place stands what is no number.
-fn body<'a, S: Simd, const R: usize>(
+fn body<'a, S: Simd, R: Registers>(
     plan: &Plan,
     first: &Plant<'a, f64>,
     each: Each<'_, 'a, S, R>,

@@ -1,7 +1,7 @@
 //! Channels of plants side by side: most are states, the others are what each plant observes.
 
 use super::group::Runs;
-use super::num::Num;
+use super::num::{Num, Registers};
 use crate::plant::{Channel, Memory, Plant, Rig};
 use pulp::Simd;
 
@@ -34,7 +34,7 @@ impl Reads {
 
     /// Write down every wanted channel of all plants, then the next channel.
     #[inline(always)]
-    pub fn write<S: Simd, const R: usize>(
+    pub fn write<S: Simd, R: Registers>(
         &mut self,
         state: &[Num<S, R>],
         runs: &mut Runs<'_>,

@@ -1,11 +1,11 @@
 //! Fixed-step integration of several plants side by side, as [`crate::simulate::integrate`].
 
-use super::num::Num;
+use super::num::{Num, Registers};
 use super::rates::{Lanes, Shape, SMALL};
 use pulp::Simd;
 
 /// The classical Runge-Kutta method over lanes.
-pub(super) struct Rk4<S: Simd, const R: usize> {
+pub(super) struct Rk4<S: Simd, R: Registers> {
     before: Vec<Num<S, R>>,
     stage: Vec<Num<S, R>>,
     next: Vec<Num<S, R>>,
@@ -14,7 +14,7 @@ pub(super) struct Rk4<S: Simd, const R: usize> {
     pub evaluations: u64,
 }
 
-impl<S: Simd, const R: usize> Rk4<S, R> {
+impl<S: Simd, R: Registers> Rk4<S, R> {
     pub fn new(state: &[Num<S, R>]) -> Self {
         let zeros = || state.iter().map(|value| value.constant(0.0)).collect::<Vec<_>>();
         Self { before: zeros(), stage: zeros(), next: zeros(), sum: zeros(), evaluations: 0 }
@@ -63,14 +63,14 @@ impl<S: Simd, const R: usize> Rk4<S, R> {
 const STAGES: [(f64, f64); 4] = [(1.0, 0.5), (2.0, 0.5), (2.0, 1.0), (1.0, 0.0)];
 
 /// A step on its way, place by place of the state.
-struct Stages<'s, S: Simd, const R: usize> {
+struct Stages<'s, S: Simd, R: Registers> {
     start: &'s [Num<S, R>],
     stage: &'s mut [Num<S, R>],
     next: &'s mut [Num<S, R>],
     sum: &'s mut [Num<S, R>],
 }
 
-impl<S: Simd, const R: usize> Stages<'_, S, R> {
+impl<S: Simd, R: Registers> Stages<'_, S, R> {
     #[inline(always)]
     fn step<W: Simd>(
         self,
@@ -100,7 +100,7 @@ impl<S: Simd, const R: usize> Stages<'_, S, R> {
 
 /// Where the slopes of a stage go. Each is used as it comes: a plant alone would wait for it to be
 /// written and read.
-pub(super) struct Slopes<'s, S: Simd, const R: usize> {
+pub(super) struct Slopes<'s, S: Simd, R: Registers> {
     start: &'s [Num<S, R>],
     sum: &'s mut [Num<S, R>],
     next: &'s mut [Num<S, R>],
@@ -111,7 +111,7 @@ pub(super) struct Slopes<'s, S: Simd, const R: usize> {
     pub first: bool,
 }
 
-impl<S: Simd, const R: usize> Slopes<'_, S, R> {
+impl<S: Simd, R: Registers> Slopes<'_, S, R> {
     /// The slope of the state at a place.
     #[inline(always)]
     pub fn set(&mut self, place: usize, slope: Num<S, R>) {

@@ -2,14 +2,14 @@
 //! bits are those of the same plant in a flight.
 
 use super::flight::opening;
-use super::num::{in_fours, Num};
+use super::num::{in_fours, Num, Single};
 use super::rates::{Lanes, Shape};
 use super::rk4::Rk4;
 use super::Plan;
 use crate::plant::{Controls, Plant};
 use pulp::{Scalar, Simd, WithSimd};
 
-type One = Num<Scalar, 1>;
+type One = Num<Scalar, Single>;
 
 /// The state of a plant after a step.
 #[derive(Clone, Copy)]
@@ -26,8 +26,8 @@ impl Seen<'_> {
 /// A plant in a lane of its own.
 pub(crate) struct Solo<'a> {
     plan: &'a Plan,
-    lanes: Lanes<'a, Scalar, 1>,
-    method: Rk4<Scalar, 1>,
+    lanes: Lanes<'a, Scalar, Single>,
+    method: Rk4<Scalar, Single>,
     state: Vec<One>,
 }
 
