@@ -97,16 +97,27 @@ def test_noise_level_is_recovered(level: float) -> None:
     rng = np.random.default_rng(0)
     slow = 500.0 * np.sin(np.arange(4000) * 0.01)
     estimate = noise_level(
-        slow + rng.normal(0.0, level, 4000), np.ones(4000, dtype=bool), seed=SETTINGS.seed
+        slow + rng.normal(0.0, level, 4000),
+        np.ones(4000, dtype=bool),
+        SETTINGS.prepare,
+        seed=SETTINGS.seed,
     )
     assert estimate == pytest.approx(level, rel=0.08)
 
 
 def test_quantised_rest_has_the_noise_of_its_lattice() -> None:
     values = np.where(np.arange(400) % 50 == 0, 42.0, 0.0)
-    assert noise_level(values, np.ones(400, dtype=bool), seed=SETTINGS.seed) == pytest.approx(
-        42.0 / np.sqrt(12.0)
-    )
+    found = noise_level(values, np.ones(400, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    assert found == pytest.approx(42.0 / np.sqrt(12.0))
+
+
+def test_a_channel_that_chatters_has_the_noise_of_its_gauge() -> None:
+    """A valve that opens and shuts from sample to sample is no noise."""
+    rng = np.random.default_rng(3)
+    chatter = np.where(np.arange(4000) % 2, 2e5, 0.0) * (1.0 + 0.02 * np.sin(np.arange(4000) / 90))
+    values = 3e5 + chatter + rng.normal(0.0, 400.0, 4000)
+    found = noise_level(values, np.ones(4000, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    assert found == pytest.approx(400.0, rel=0.2)
 
 
 def test_too_few_samples_are_refused_in_words() -> None:

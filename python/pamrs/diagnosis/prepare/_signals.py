@@ -160,9 +160,13 @@ class Prepared:
         return rows & self.recording.mask[output]
 
 
-def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
+def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: int) -> float:
     """Standard deviation of white sample noise, from third differences, robust; at least that of
     quantisation.
+
+    White noise is as loud in one band of frequencies as in another. Where a band is far quieter
+    than the third differences say, these are of what the channel really did (a valve that chatters
+    from sample to sample), and the noise is that of the quietest band.
 
     Parameters
     ----------
@@ -170,6 +174,8 @@ def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
         Samples on a uniform grid.
     mask : (n,) bool array
         Which may be used.
+    settings : PrepareSettings
+        Samples of a spectrum, and how quiet a band has to be.
     seed : int
         Of the dither on a quantised channel.
 
@@ -181,14 +187,35 @@ def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
     ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
     if ok.sum() < 8:
         return 0.0
-    steps = np.abs(np.diff(values[mask]))
+    # between the numbers that occur: one that jumps from sample to sample has no small step in time
+    steps = np.diff(np.unique(values[mask]))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
     lattice = float(steps.min()) if steps.size else 0.0
     # the median of differences of whole steps moves by whole steps: as much noise as the lattice
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
-    sigma = 1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok]))) / np.sqrt(20.0)
-    return float(np.sqrt(max(sigma**2 - lattice**2 / 12.0, lattice**2 / 12.0)))
+    variance = (1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok])))) ** 2 / 20.0
+    quiet = _quietest_band(dithered, mask, settings)
+    if quiet < settings.quiet_share * variance:
+        variance = quiet
+    return float(np.sqrt(max(variance - lattice**2 / 12.0, lattice**2 / 12.0)))
+
+
+def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> float:
+    """Variance of white noise that would be as loud everywhere as the quietest band of a signal is;
+    infinite where too few samples stand side by side.
+    """
+    length = settings.spectrum_samples
+    pieces = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
+    usable = np.lib.stride_tricks.sliding_window_view(mask, length)[:: length // 2].all(axis=1)
+    if usable.sum() < settings.least_spectra:
+        return math.inf
+    window = np.hanning(length)
+    pieces = pieces[usable] - pieces[usable].mean(axis=1, keepdims=True)
+    power = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2 / float(window @ window)
+    # the lowest eighth is motion, the last line has half as many numbers
+    bands = power[:, length // 16 : length // 2].reshape(len(pieces), -1, length // 16).mean(axis=2)
+    return float(np.median(bands, axis=0).min())
 
 
 def filter_length(dt: float, settings: PrepareSettings) -> int:
@@ -357,7 +384,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
                 f"{name} are usable"
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
-        noise[name] = noise_level(recording.channels[name], mask, seed=settings.seed)
+        noise[name] = noise_level(recording.channels[name], mask, own, seed=settings.seed)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
         lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)

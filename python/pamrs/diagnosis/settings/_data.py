@@ -30,6 +30,31 @@ class PrepareSettings(SettingsGroup):
         "miss more than that to be a corner",
         origin="docs/decisions/0056",
     )
+    spectrum_samples: int = setting(
+        64,
+        unit="count",
+        least=32,
+        reason="samples of each spectrum in which a band that is quieter than the noise is looked "
+        "for; a multiple of 16",
+        origin="docs/decisions/0099",
+    )
+    least_spectra: int = setting(
+        16,
+        unit="count",
+        least=1,
+        reason="spectra without a sample that was left out, from which bands are compared",
+        origin="docs/decisions/0099",
+    )
+    quiet_share: float = setting(
+        0.25,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the variance of third differences below which the quietest band is the "
+        "noise",
+        origin="half the level; the quietest of seven bands of 600 samples of white noise had 0.38 "
+        "of its variance or more in a thousand draws (docs/decisions/0099)",
+    )
     start_reaches: tuple[float, ...] = setting(
         (0.04, 0.08, 0.16),
         unit="s",
