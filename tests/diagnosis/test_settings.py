@@ -172,7 +172,7 @@ def test_settings_go_through_json() -> None:
         ),
         (
             {"verdict.quiet_likely": 0.5},
-            r"quiet_likely \+ quiet_other \+ quiet_unlisted = 0.54 is not allowed",
+            r"quiet_likely \+ quiet_other \+ quiet_unlisted = 0.67 is not allowed",
         ),
         ({"evidence.x": 1.0}, r"settings has no 'evidence.x': one of log_odds_explained"),
         ({"softness": 1.0}, r"settings has no 'softness': one of prepare"),

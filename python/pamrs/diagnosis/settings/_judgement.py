@@ -306,13 +306,13 @@ class VerdictSettings(SettingsGroup):
         8, unit="count", least=1, reason="sets that a case lists", origin="judgement"
     )
     quiet_likely: float = setting(
-        0.96,
+        0.83,
         unit="1",
         least=0.0,
         most=1.0,
         reason="probability of parameters in a group that keeps only noise after its parameters "
         "moved, of none where they did not have to",
-        origin="judgement; docs/decisions/0004",
+        origin="the rest; docs/decisions/0004, 0100",
     )
     quiet_other: float = setting(
         0.03,
@@ -320,15 +320,15 @@ class VerdictSettings(SettingsGroup):
         least=0.0,
         most=1.0,
         reason="probability of the other one of the two",
-        origin="judgement; docs/decisions/0004",
+        origin="the rest; docs/decisions/0004, 0100",
     )
     quiet_unlisted: float = setting(
-        0.01,
+        0.14,
         unit="1",
         least=0.0,
         most=1.0,
-        reason="probability of unlisted in such a group",
-        origin="judgement; docs/decisions/0004",
+        reason="probability of unlisted in such a group: of what is there and too small to be seen",
+        origin="docs/decisions/0100: 24 of 171 such groups of six seeds that were read",
     )
     strained_parameters: float = setting(
         0.75,
