@@ -46,6 +46,7 @@ def describe() -> dict[str, str]:
         "caches of a core": ", ".join(caches) or "not known",
         "memory": f"{memory:.0f} GiB",
         "system": f"{platform.system()} {platform.release()}",
+        "RUSTFLAGS": os.environ.get("RUSTFLAGS") or "none",
         "load before the run": " ".join(f"{load:.2f}" for load in os.getloadavg()),
     }
 

@@ -200,8 +200,9 @@ def limit_part(limit: Limit) -> str:
             "(`benchmarks/counting.py`), the mean over the run above. Sine, hyperbolic tangent "
             "and power are weighted with about the length of their polynomials.",
             table(("operation", "in one step", "counted as"), counts),
-            f"That is {work.flops:.0f} flop. The table is read for {work.table_bytes:.0f} B a step "
-            "out of the nearest cache; a run that keeps four states streams "
+            f"That is {work.flops:.0f} flop, and {work.table_bytes:.0f} B of the muscle's table "
+            "out of the nearest cache, by the plain equations: lanes have curves of the angle in "
+            "the place of tendon and table, and do fewer; a run that keeps four states streams "
             f"{work.stream_bytes:.3g} B a step, one that is reduced none. A core does "
             f"{limit.peak_flops / 1e9:.3g} Gflop/s in a matrix product and moves "
             f"{limit.peak_bytes / 1e9:.3g} GB/s in a triad, both measured in this run. So "

@@ -31,12 +31,12 @@ def race(
     Parameters
     ----------
     works : mapping of str to callable
-        Each is called once beforehand, outside the clock.
+        Each is called twice beforehand.
     repeats : int
         Number of repetitions.
     least : float
-        A repetition calls a work as often as it takes to fill this time [s]: what runs for a
-        shorter one than its peers is timed while the processor is still on its way to its speed.
+        A repetition calls a work as often as it takes to fill this time [s], and once at least, so
+        that short and long works are timed at the same clock of the processor.
 
     Returns
     -------

@@ -35,7 +35,7 @@ def measure(command: str, repeats: int, sizes: list[int], reference: list[str]) 
     def say(part: str) -> None:
         print(f"benchmarks: {part}", file=sys.stderr, flush=True)
 
-    # before anything runs: the load is that of others
+    # before the peers run: the load is that of others, and of what `make bench` ran before
     known, versions = machine.describe(), machine.versions()
     say("peers")
     beside = goals(repeats)

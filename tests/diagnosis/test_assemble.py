@@ -16,6 +16,7 @@ from pamrs.diagnosis.explain._assemble import _merged, _settled
 from pamrs.diagnosis.fit import Problem, fit, residuals
 from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.screen import stand_of
 from pamrs.errors import DiagnosisError
 from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
@@ -178,3 +179,17 @@ def test_a_channel_that_a_new_model_spoils_is_told() -> None:
     (told,) = words.worse({**channels, "muscle_pressure": spoiled}, SETTINGS.warnings)
     assert "muscle pressure by 9.10 kPa, the nominal one by 7.50 kPa" in told
     assert words.worse({"joint_angle": channels["joint_angle"]}, SETTINGS.warnings) == []
+
+
+def test_parameters_that_are_all_at_their_walls_explain_nothing() -> None:
+    rig = pamrs.rigs.shoulder()
+    prepared = prepare(recorded(rig, "all", "fit"), rig, SETTINGS)
+    blocks = {b.name: b for b in available_blocks(rig, NAMES, SETTINGS.prepare)}
+    arm = Problem([blocks["arm"]], [prepared], core_rig(rig), SETTINGS)
+    found = fit(arm, rig, (), {}, {"arm": 1.0})
+    walls = SETTINGS.fit.most_tolerances
+    stuck = replace(found, moved=dict.fromkeys(found.moved, walls))
+    free, held = (stand_of(one, arm, {"arm": 1.0}) for one in (found, stuck))
+    assert free.basis.shape[1] > 0
+    assert held.basis.shape == (held.rows.size, 0)
+    np.testing.assert_array_equal(held.left, held.rows)

@@ -189,9 +189,32 @@ def test_the_noise_of_a_quantised_channel_is_that_of_noise_and_lattice(steps: fl
     for seed in range(4):
         rng = np.random.default_rng(seed)
         values = np.round(rng.normal(0.0, steps, 20000) + 30.0 * np.sin(np.arange(20000) / 900.0))
-        assert noise_level(values, np.ones(20000, dtype=bool), seed=SETTINGS.seed) == pytest.approx(
-            np.hypot(steps, 12.0**-0.5), rel=0.1
+        found = noise_level(
+            values, np.ones(20000, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed
         )
+        assert found == pytest.approx(np.hypot(steps, 12.0**-0.5), rel=0.1)
+
+
+def test_a_sound_gauge_has_the_noise_of_its_third_differences() -> None:
+    """The quietest band of few samples is quieter than the others, and far from telling."""
+    always = replace(SETTINGS.prepare, quiet_share=1.0)
+    never = replace(SETTINGS.prepare, quiet_share=0.0)
+    for seed in range(40):
+        values = np.random.default_rng(seed).normal(0.0, 1.0, 600)
+        usable = np.ones(600, dtype=bool)
+        found, high, low = (
+            noise_level(values, usable, s, seed=SETTINGS.seed)
+            for s in (SETTINGS.prepare, never, always)
+        )
+        assert found == high
+        assert low < high
+
+
+@pytest.mark.parametrize("samples", [12, 40, 63, 64])
+def test_few_samples_have_a_noise_too(samples: int) -> None:
+    values = np.random.default_rng(1).normal(0.0, 1.0, samples)
+    found = noise_level(values, np.ones(samples, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    assert 0.3 < found < 3.0
 
 
 def test_a_value_that_nobody_has_published_costs_odds() -> None:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+import textwrap
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -243,3 +248,31 @@ def test_what_is_wrong_is_said(arguments, words):
     given = {"valve_command": np.full(ROWS, 6.0), "sample_time": SAMPLE} | arguments
     with pytest.raises(pamrs.PamrsError, match=words):
         pamrs.simulate_batch(pamrs.rigs.shoulder(), **given)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
+def test_ctrl_c_ends_a_batch_while_other_threads_go_on() -> None:
+    code = """
+        import os, signal, threading, time, numpy as np, pamrs
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        counted = 0
+        def count():
+            global counted
+            end = time.monotonic() + 0.3
+            while time.monotonic() < end:
+                counted += 1
+            os.kill(os.getpid(), signal.SIGINT)
+        thread = threading.Thread(target=count)
+        thread.start()
+        try:
+            pamrs.simulate_batch(pamrs.rigs.shoulder(), np.full(4000, 5.5), sample_time=1.0,
+                parameters={"arm.payload": np.linspace(0.0, 20.0, 4000)}, record=["joint_angle"],
+                every=3999)
+        except KeyboardInterrupt:
+            print("ended", counted > 1000)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split() == ["ended", "True"]

@@ -88,7 +88,8 @@ def simulate_batch(
         Numbers of the whole run by a name of yours: ``("final", "joint_angle")``; reductions are
         ``final``, ``min``, ``max``, ``peak`` (largest magnitude), ``mean`` and ``squared_error``
         (time integral of the squared difference from ``reference``, a number or an array of shape
-        (rows,), in the channel's unit). No trajectory is kept for them.
+        (rows,), in the channel's unit). Energies are final values of the balance:
+        ``("final", "energy_supplied")``. No trajectory is kept for them.
     threads : int, optional
         Most threads that work; by default one for each processor that this process may use.
 

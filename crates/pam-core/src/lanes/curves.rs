@@ -24,6 +24,8 @@ const SLOPE: usize = 4;
 #[repr(align(64))]
 struct Cell([f64; NODES * COLUMNS]);
 
+const _: () = assert!(COLUMNS * size_of::<f64>() == align_of::<Cell>());
+
 /// Columns of some lanes, each a line of the cache.
 #[repr(align(64))]
 struct Rows<const N: usize>([f64; N]);

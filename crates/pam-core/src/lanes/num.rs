@@ -54,8 +54,8 @@ impl Registers for Single {
     }
 }
 
-/// The registers of plants side by side. Each begins a line of the cache: one that lies across two
-/// takes twice as long to read and to write.
+/// The registers of plants side by side, which begin a line of the cache: one that lies across two
+/// lines takes twice as long to read and to write.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair;
 

@@ -21,7 +21,7 @@ from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residual
 from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.errors import DiagnosisError, ParameterError
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -288,8 +288,11 @@ def _left(
             scales.append(scale)
             keys.append(key)
     stacked, jacobian = np.concatenate(rows), np.concatenate(slopes)
-    moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
-    left = stacked - jacobian @ moved
+    with np.errstate(over="ignore", invalid="ignore"):
+        moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
+        left = stacked - jacobian @ moved
+    if not np.isfinite(left).all():
+        raise SimulationError("a model of the recordings leaves the range of its numbers")
     rms, kept = {}, {}
     start = 0
     for key, part, scale in zip(keys, rows, scales, strict=True):

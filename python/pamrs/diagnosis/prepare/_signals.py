@@ -205,7 +205,9 @@ def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> floa
     """Variance of white noise that would be as loud everywhere as the quietest band of a signal is;
     infinite where too few samples stand side by side.
     """
-    length = settings.spectrum_samples
+    length, lines = settings.spectrum_samples, settings.spectrum_samples // 16
+    if values.size < length:
+        return math.inf
     pieces = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
     usable = np.lib.stride_tricks.sliding_window_view(mask, length)[:: length // 2].all(axis=1)
     if usable.sum() < settings.least_spectra:
@@ -214,7 +216,7 @@ def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> floa
     pieces = pieces[usable] - pieces[usable].mean(axis=1, keepdims=True)
     power = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2 / float(window @ window)
     # the lowest eighth is motion, the last line has half as many numbers
-    bands = power[:, length // 16 : length // 2].reshape(len(pieces), -1, length // 16).mean(axis=2)
+    bands = power[:, lines : 8 * lines].reshape(len(pieces), 7, lines).mean(axis=2)
     return float(np.median(bands, axis=0).min())
 
 

@@ -172,12 +172,12 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     explain anything away.
     """
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
-    if jacobian is None or jacobian.shape[1] == 0:
-        none = np.zeros((rows.size, 0))
-        return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
     walls = problem.settings.fit.most_tolerances
     names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
+    if jacobian is None or not names:
+        none = np.zeros((rows.size, 0))
+        return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
     free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)

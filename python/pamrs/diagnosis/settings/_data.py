@@ -35,7 +35,7 @@ class PrepareSettings(SettingsGroup):
         unit="count",
         least=32,
         reason="samples of each spectrum in which a band that is quieter than the noise is looked "
-        "for; a multiple of 16",
+        "for",
         origin="docs/decisions/0099",
     )
     least_spectra: int = setting(
