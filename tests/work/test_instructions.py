@@ -1,7 +1,8 @@
 """Instructions of the core's hot paths, counted by valgrind: unlike times they repeat.
 
 Counted is a run of Python with so many calls more, less the same without them, so that starting up
-does not count; threads of NumPy that wait would. Valgrind knows no registers of 512 bits: lanes are four wide here.
+does not count; threads of NumPy that wait would. Valgrind knows no registers of 512 bits: lanes are
+four wide here.
 """
 
 from __future__ import annotations
