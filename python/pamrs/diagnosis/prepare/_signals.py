@@ -187,18 +187,24 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
     ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
     if ok.sum() < 8:
         return 0.0
-    # between the numbers that occur: one that jumps from sample to sample has no small step in time
-    steps = np.diff(np.unique(values[mask]))
-    steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values[mask]).max()))]
-    lattice = float(steps.min()) if steps.size else 0.0
+    lattice = _lattice(values[mask])
     # the median of differences of whole steps moves by whole steps: as much noise as the lattice
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     variance = (1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok])))) ** 2 / 20.0
-    quiet = _quietest_band(dithered, mask, settings)
+    # what jumps from sample to sample shows no small step in time, and a finer lattice
+    finer = _lattice(np.unique(values[mask]))
+    quiet = _quietest_band(values, mask, settings)
     if quiet < settings.quiet_share * variance:
-        variance = quiet
+        return float(np.sqrt(max(quiet, finer**2 / 12.0)))
     return float(np.sqrt(max(variance - lattice**2 / 12.0, lattice**2 / 12.0)))
+
+
+def _lattice(values: Array) -> float:
+    """Smallest step from one number to the next, but for rounding."""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values).max()))]
+    return float(steps.min()) if steps.size else 0.0
 
 
 def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> float:
