@@ -274,3 +274,15 @@ def test_a_chamber_has_no_motion(tmp_path):
         pamrs.ParameterError, match="'sealed_chamber' has no arm and no load to draw"
     ):
         still.animate(tmp_path / "x.gif")
+
+
+def test_an_interrupt_is_said_and_has_its_own_code(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def pressed(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("pamrs.rig.load_rig", pressed)
+    monkeypatch.setattr("pamrs.load_rig", pressed, raising=False)
+    assert cli.main(["rig", "check", "any.toml"]) == 1
+    assert "pamrs: interrupted" in capsys.readouterr().err

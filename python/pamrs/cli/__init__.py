@@ -93,6 +93,10 @@ def _one_line(error: BaseException) -> str:
     return "; ".join(parts) or type(error).__name__
 
 
+_TYPER_INTERRUPTED = 130
+"""What typer makes of an interrupt, in its newer versions."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -116,6 +120,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
     try:
         code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
+        if code == _TYPER_INTERRUPTED:
+            raise KeyboardInterrupt
     except (KeyboardInterrupt, EOFError, typer.Abort):
         typer.echo("pamrs: interrupted", err=True)
         return 1

@@ -99,7 +99,8 @@ def channels_png(
                         time,
                         factor * value,
                         color=COLOURS["measured"],
-                        lw=0.9,
+                        lw=2.6,  # seen beside a thin line that follows it
+                        alpha=0.6,
                         label=f"{label} recorded".strip(),
                     )
                 time, value = decimate(result.time, factor * result[name])

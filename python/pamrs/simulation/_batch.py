@@ -79,8 +79,9 @@ class BatchRun(Mapping[str, Array]):
         try:
             return self.channels[channel]
         except KeyError:
+            there = f"there are: {', '.join(self.channels)}" if self.channels else "nothing was"
             raise KeyError(
-                f"{channel!r} was not recorded; there are: {', '.join(self.channels)}"
+                f"{channel!r} was not recorded ({there}); record=[{channel!r}] keeps it"
             ) from None
 
     def __iter__(self) -> Any:
