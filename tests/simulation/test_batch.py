@@ -6,9 +6,6 @@ from __future__ import annotations
 import copy
 import os
 import pickle
-import subprocess
-import sys
-import textwrap
 from typing import Any
 
 import numpy as np
@@ -18,6 +15,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.simulation import core_rig
+from tests.scripts import script
 
 DT = 0.002
 
@@ -463,14 +461,6 @@ def test_only_rigs_make_a_batch() -> None:
     for wrong, message in (([], "empty"), ("shoulder", "rig is a str"), (5, "rig is a int")):
         with pytest.raises(pamrs.ParameterError, match=message):
             pamrs.Batch(wrong, n=1, sample_time=DT)  # type: ignore[arg-type]
-
-
-def script(code: str) -> list[str]:
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 0, done.stderr
-    return done.stdout.split()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
-import textwrap
 
 import numpy as np
 import pytest
@@ -14,6 +11,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.simulation import core_rig
+from tests.scripts import script
 
 SAMPLE = 0.005
 ROWS = 101
@@ -252,7 +250,7 @@ def test_what_is_wrong_is_said(arguments, words):
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
 def test_ctrl_c_ends_a_batch_while_other_threads_go_on() -> None:
-    code = """
+    said = script("""
         import os, signal, threading, time, numpy as np, pamrs
         signal.signal(signal.SIGINT, signal.default_int_handler)
         counted = 0
@@ -270,9 +268,5 @@ def test_ctrl_c_ends_a_batch_while_other_threads_go_on() -> None:
                 every=3999)
         except KeyboardInterrupt:
             print("ended", counted > 1000)
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=120
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["ended", "True"]
+    """)
+    assert said == ["ended", "True"]

@@ -7,15 +7,13 @@ from __future__ import annotations
 import copy
 import os
 import pickle
-import subprocess
-import sys
-import textwrap
 import threading
 
 import numpy as np
 import pytest
 
 import pamrs
+from tests.scripts import script
 
 COMMAND = 5.0 + 1.2 * np.sin(np.arange(300) * 0.05)
 
@@ -94,7 +92,7 @@ def test_bad_input_is_named_and_leaves_the_state_alone() -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals as on POSIX")
 def test_ctrl_c_ends_a_long_run() -> None:
-    code = """
+    said = script("""
         import os, signal, threading, time, numpy as np, pamrs
         signal.signal(signal.SIGINT, signal.default_int_handler)  # a job in the background begins \
 with it ignored
@@ -109,12 +107,8 @@ with it ignored
             pamrs.simulate(rig, np.full(4_000_000, 5.0), sample_time=0.005)
         except KeyboardInterrupt:
             print(time.perf_counter())
-    """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, timeout=60
-    )
-    assert done.returncode == 0, done.stderr
-    pressed, ended = (float(line) for line in done.stdout.split())
+    """)
+    pressed, ended = (float(line) for line in said)
     assert ended > pressed
 
 

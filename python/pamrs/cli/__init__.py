@@ -36,6 +36,8 @@ __all__ = ["NOT_WRITTEN", "app", "main"]
 
 NOT_WRITTEN: Final = 4
 """Exit code when the work was done, but a file of its result could not be written."""
+_TYPER_INTERRUPTED: Final = 130
+"""What typer makes of an interrupt, in its newer versions."""
 
 app = typer.Typer(
     name="pamrs",
@@ -91,10 +93,6 @@ def _one_line(error: BaseException) -> str:
     if len(parts) > 1:
         parts = [f"{parts[0].rstrip(':')}: {parts[1]}", *parts[2:]]
     return "; ".join(parts) or type(error).__name__
-
-
-_TYPER_INTERRUPTED = 130
-"""What typer makes of an interrupt, in its newer versions."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

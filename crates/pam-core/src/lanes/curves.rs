@@ -5,7 +5,7 @@
 //! cells, refined until they agree with [`crate::blocks::joint::Joint::eval`] and
 //! [`crate::muscle::Table::eval`] at points off the nodes. No cell crosses a kink of the muscle.
 
-use super::num::{side_by_side, Num, Registers, MOST_LANES, PAIR, WHOLE};
+use super::num::{side_by_side, Aligned, Num, Registers, MOST_LANES, PAIR, WHOLE};
 use crate::chebyshev::{interpolate, lobatto};
 use crate::plant::Group;
 use pulp::Simd;
@@ -20,15 +20,9 @@ const VOLUME: usize = 3;
 const SLOPE: usize = 4;
 /// A cell: its powers, of the distance from its middle in its width, one after the other, all
 /// columns of each, which are one line of the cache.
-#[derive(Debug, Clone)]
-#[repr(align(64))]
-struct Cell([f64; NODES * COLUMNS]);
+type Cell = Aligned<[f64; NODES * COLUMNS]>;
 
 const _: () = assert!(COLUMNS * size_of::<f64>() == align_of::<Cell>());
-
-/// Columns of some lanes, each a line of the cache.
-#[repr(align(64))]
-struct Rows<const N: usize>([f64; N]);
 
 /// Largest error, relative to the largest magnitude of each column.
 pub(super) const TOLERANCE: f64 = 1e-9;
@@ -93,7 +87,7 @@ impl Curves {
         }
         let mut pieces = pieces.into_iter();
         let (first, others) = (pieces.next()?, pieces.collect());
-        Some(Self { low, high, first, others, cells, none: Cell([0.0; NODES * COLUMNS]) })
+        Some(Self { low, high, first, others, cells, none: Aligned([0.0; NODES * COLUMNS]) })
     }
 
     /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
@@ -109,7 +103,7 @@ impl Curves {
         let square = x * x;
         let mut columns = [at; COLUMNS];
         if side_by_side::<S, R>() == 1 {
-            let mut row = Rows([0.0; COLUMNS]);
+            let mut row = Aligned([0.0; COLUMNS]);
             let place = [x.numbers()[0], square.numbers()[0]];
             self.row(wide, cell.numbers()[0], place, &mut row.0);
             for (column, value) in columns.iter_mut().zip(row.0) {
@@ -118,7 +112,7 @@ impl Curves {
             return columns;
         }
         for register in 0..R::COUNT {
-            let mut rows = Rows([0.0; COLUMNS * MOST_LANES / PAIR]);
+            let mut rows = Aligned([0.0; COLUMNS * MOST_LANES / PAIR]);
             let lanes = rows.0.chunks_exact_mut(COLUMNS).take(S::F64_LANES);
             for (row, lane) in lanes.zip(register * S::F64_LANES..) {
                 let place = [x.numbers()[lane], square.numbers()[lane]];
@@ -178,7 +172,7 @@ impl Curves {
 
 /// A cell as it is stored, of one in powers of half its width.
 fn stored(powers: &[[f64; COLUMNS]; NODES]) -> Cell {
-    Cell(std::array::from_fn(|k| {
+    Aligned(std::array::from_fn(|k| {
         let (power, column) = (k / COLUMNS, k % COLUMNS);
         powers[power][column] * f64::from(1 << power)
     }))

@@ -59,19 +59,19 @@ impl Registers for Single {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair;
 
-/// Two things where a line of the cache begins.
+/// What begins a line of the cache.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(super) struct Aligned<T>([T; PAIR]);
+pub(super) struct Aligned<T>(pub T);
 
-impl<T> AsRef<[T]> for Aligned<T> {
+impl<T, const N: usize> AsRef<[T]> for Aligned<[T; N]> {
     #[inline(always)]
     fn as_ref(&self) -> &[T] {
         &self.0
     }
 }
 
-impl<T> AsMut<[T]> for Aligned<T> {
+impl<T, const N: usize> AsMut<[T]> for Aligned<[T; N]> {
     #[inline(always)]
     fn as_mut(&mut self) -> &mut [T] {
         &mut self.0
@@ -80,10 +80,10 @@ impl<T> AsMut<[T]> for Aligned<T> {
 
 impl Registers for Pair {
     const COUNT: usize = PAIR;
-    type Each<T: Copy + Send + Sync + 'static> = Aligned<T>;
+    type Each<T: Copy + Send + Sync + 'static> = Aligned<[T; PAIR]>;
 
     #[inline(always)]
-    fn each<T: Copy + Send + Sync + 'static>(value: T) -> Aligned<T> {
+    fn each<T: Copy + Send + Sync + 'static>(value: T) -> Aligned<[T; PAIR]> {
         Aligned([value; PAIR])
     }
 }

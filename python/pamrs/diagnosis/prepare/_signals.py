@@ -192,10 +192,10 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     variance = (1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok])))) ** 2 / 20.0
-    # what jumps from sample to sample shows no small step in time, and a finer lattice
-    finer = _lattice(np.unique(values[mask]))
     quiet = _quietest_band(values, mask, settings)
     if quiet < settings.quiet_share * variance:
+        # what jumps from sample to sample shows no small step in time, and a finer lattice
+        finer = _lattice(np.unique(values[mask]))
         return float(np.sqrt(max(quiet, finer**2 / 12.0)))
     return float(np.sqrt(max(variance - lattice**2 / 12.0, lattice**2 / 12.0)))
 
@@ -214,15 +214,18 @@ def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> floa
     length, lines = settings.spectrum_samples, settings.spectrum_samples // 16
     if values.size < length:
         return math.inf
-    pieces = np.lib.stride_tricks.sliding_window_view(values, length)[:: length // 2]
-    usable = np.lib.stride_tricks.sliding_window_view(mask, length)[:: length // 2].all(axis=1)
-    if usable.sum() < settings.least_spectra:
+    every, usable = (
+        np.lib.stride_tricks.sliding_window_view(part, length)[:: length // 2]
+        for part in (values, mask)
+    )
+    pieces = every[usable.all(axis=1)]
+    if len(pieces) < settings.least_spectra:
         return math.inf
     window = np.hanning(length)
-    pieces = pieces[usable] - pieces[usable].mean(axis=1, keepdims=True)
+    pieces = pieces - pieces.mean(axis=1, keepdims=True)
     power = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2 / float(window @ window)
     # the lowest eighth is motion, the last line has half as many numbers
-    bands = power[:, lines : 8 * lines].reshape(len(pieces), 7, lines).mean(axis=2)
+    bands = power[:, lines : 8 * lines].reshape(len(pieces), -1, lines).mean(axis=2)
     return float(np.median(bands, axis=0).min())
 
 
