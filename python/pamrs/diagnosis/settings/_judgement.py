@@ -320,7 +320,7 @@ class VerdictSettings(SettingsGroup):
         least=0.0,
         most=1.0,
         reason="probability of the other one of the two",
-        origin="the rest; docs/decisions/0004, 0100",
+        origin="judgement; docs/decisions/0004",
     )
     quiet_unlisted: float = setting(
         0.14,
