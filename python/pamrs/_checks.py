@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs.errors import ParameterError
+from pamrs.units import with_unit
 
 __all__ = ["checked_number", "checked_table", "positive"]
 
@@ -69,7 +70,7 @@ def checked_number(
     ParameterError
         With name, value and what is allowed.
     """
-    last = f" {unit}" if unit else ""
+    last = with_unit("", unit)
     allowed = f"from {lower:g} to {upper:g}{last}"
     if math.isinf(upper):
         allowed = f"a finite number of {lower:g}{last} or more"

@@ -67,6 +67,8 @@ def test_rig_check_lists_parameters(capsys):
     assert code == 0
     assert err == ""
     assert "valve.discharge_area_max" in out
+    alpha = next(line for line in out.splitlines() if line.startswith("chamber.alpha_in "))
+    assert "1" not in alpha.split()[-1:]  # a plain number has no unit behind it
     assert "is valid" in out.splitlines()[-1]
 
 

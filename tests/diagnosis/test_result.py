@@ -121,6 +121,14 @@ def test_summary_names_the_effect() -> None:
     assert summary.isascii()
 
 
+def test_a_plain_number_stands_without_its_unit() -> None:
+    found = synthetic.diagnosis()
+    share = EffectParameterFound(0.00514, 0.00039, "1", interval=(0.0044, 0.0059))
+    effect = dataclasses.replace(found.effects[0], parameters={"share": share})
+    lines = dataclasses.replace(found, effects=[effect]).summary().splitlines()
+    assert "  share = 0.00514 +- 0.00039" in lines
+
+
 def test_summary_says_how_the_whole_rig_runs_and_what_is_only_closest() -> None:
     errors = {"joint_angle": FreeRunError("rad", 0.1, 0.01, None, None)}
     run = FreeRun("random", "held_out", 30.0, errors)

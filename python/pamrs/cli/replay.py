@@ -16,6 +16,7 @@ from pamrs.cli._shared import (
     write,
 )
 from pamrs.errors import check_packages
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.recordings import Case, Recording
@@ -117,5 +118,5 @@ def _lines(nominal: Simulation | None, own: Simulation | None, recording: Record
     found = []
     for name in before | after:
         told = [f"{errors[name]:.4g}" for errors in (before, after) if name in errors]
-        found.append(f"  {name}: rms difference {' -> '.join(told)} {unit_of(name)}")
+        found.append(with_unit(f"  {name}: rms difference {' -> '.join(told)}", unit_of(name)))
     return found

@@ -20,6 +20,7 @@ from pamrs.cli._shared import (
     write,
 )
 from pamrs.errors import check_packages
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -110,7 +111,8 @@ def simulate_command(
         from pamrs.simulation import differences
 
         for name, rms in differences(result, recording).items():
-            typer.echo(f"{name}: rms difference from the recording {rms:.4g} {unit_of(name)}")
+            told = f"{name}: rms difference from the recording {rms:.4g}"
+            typer.echo(with_unit(told, unit_of(name)))
     files: dict[Path | None, Callable[[Path], object]] = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: result.plot(path, recorded=recorded),

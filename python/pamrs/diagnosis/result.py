@@ -29,6 +29,7 @@ from pamrs.findings import (
     told,
 )
 from pamrs.report import text as words
+from pamrs.units import with_unit
 
 __all__ = ["READABLE", "SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
 
@@ -204,7 +205,7 @@ class Diagnosis(Findings):
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)
-                    lines.append(f"  {name} = {value} {own.unit}".rstrip())
+                    lines.append(with_unit(f"  {name} = {value}", own.unit))
                 else:
                     lines.append(f"  {name}: these recordings do not determine it")
         for wrong in self.wrong_parameters:

@@ -17,6 +17,7 @@ from pamrs.findings import (
     Unexplained,
     WrongParameter,
 )
+from pamrs.units import with_unit
 
 __all__ = [
     "blocks_label",
@@ -240,8 +241,8 @@ def sentence_of(wrong: WrongParameter) -> str:
     values = {key: float(v) * factor if is_number(v := wrong[key]) else math.nan for key in keys}
     found = format_uncertain(values["value"], values["std"], unicode=False)
     stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
-    shown = "" if unit in ("", "1") else f" {unit}".replace("°", "deg")
-    return f"{_spoken(wrong.name)} is {found}{shown}, not {stated}"
+    shown = with_unit(found, unit.replace("°", "deg"))
+    return f"{_spoken(wrong.name)} is {shown}, not {stated}"
 
 
 def kept_sentence(kept: Unexplained) -> str:

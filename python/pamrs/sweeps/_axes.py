@@ -18,6 +18,7 @@ from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
+from pamrs.units import with_unit
 
 __all__ = ["INITIAL", "Axes", "Blocks", "Grid", "Quantity", "Samples", "quantity"]
 
@@ -220,8 +221,9 @@ def _check_column(known: Quantity, values: Array) -> None:
     bad = np.flatnonzero(~(np.isfinite(values) & (values >= known.lower) & (values <= known.upper)))
     if bad.size:
         raise ParameterError(
-            f"{known.name}[{bad[0]}] = {values[bad[0]]:g} {known.unit} is not allowed: from "
-            f"{known.lower:g} to {known.upper:g} {known.unit}"
+            with_unit(f"{known.name}[{bad[0]}] = {values[bad[0]]:g}", known.unit)
+            + " is not allowed: from "
+            + with_unit(f"{known.lower:g} to {known.upper:g}", known.unit)
         )
 
 
