@@ -14,11 +14,11 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import check_column
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.units import with_unit
 
 __all__ = ["INITIAL", "Axes", "Blocks", "Grid", "Quantity", "Samples", "quantity"]
 
@@ -218,13 +218,7 @@ def _columns(given: Any, what: str) -> dict[str, Array]:
 
 
 def _check_column(known: Quantity, values: Array) -> None:
-    bad = np.flatnonzero(~(np.isfinite(values) & (values >= known.lower) & (values <= known.upper)))
-    if bad.size:
-        raise ParameterError(
-            with_unit(f"{known.name}[{bad[0]}] = {values[bad[0]]:g}", known.unit)
-            + " is not allowed: from "
-            + with_unit(f"{known.lower:g} to {known.upper:g}", known.unit)
-        )
+    check_column(known.name, values, known.lower, known.upper, known.unit)
 
 
 def _digest(values: Array) -> str:
