@@ -122,10 +122,25 @@ def named_muscle(
 def rig_named(file: Path) -> Rig:
     """A rig file, or a rig of the package by its name."""
     from pamrs import rigs
+    from pamrs.errors import RigError, meant
     from pamrs.rig import load_rig
 
-    return (
-        rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
+    name = str(file)
+    if not file.exists() and name in rigs.names():
+        return rigs.named(name)
+    try:
+        return load_rig(file)
+    except RigError:
+        if file.exists():
+            raise
+    if file.suffix or len(file.parts) > 1:
+        others = [path.name for path in file.parent.glob("*.toml")]
+        hint = meant(file.name, [*others, *rigs.names()])
+        raise RigError(
+            f"{file}: cannot be read (no such file{f'; {hint}' if 'mean' in hint else ''})"
+        )
+    raise RigError(
+        f"{name!r} is neither a file nor a rig of the package; {meant(name, rigs.names())}"
     )
 
 
