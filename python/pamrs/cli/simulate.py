@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pamrs.channels import channel_of, dotted, unit_of
+from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
     check_writable,
     exact,
@@ -111,8 +111,9 @@ def simulate_command(
         from pamrs.simulation import differences
 
         for name, rms in differences(result, recording).items():
-            told = f"{name}: rms difference from the recording {rms:.4g}"
-            typer.echo(with_unit(told, unit_of(name)))
+            unit, factor = laboratory_unit(name)
+            told = f"{name}: rms difference from the recording {factor * rms:.4g}"
+            typer.echo(with_unit(told, unit))
     files: dict[Path | None, Callable[[Path], object]] = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: result.plot(path, recorded=recorded),

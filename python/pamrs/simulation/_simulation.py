@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
@@ -327,11 +327,8 @@ class Simulation(Mapping[str, Array]):
         """
         self._check_whole("summary()")
         said = [f"{self.rig.name}: {self.time[-1]:g} s, {self.time.size} rows"]
-        for channel, unit, factor in (
-            ("muscle_pressure", "bar", 1e-5),
-            ("joint_angle", "deg", 180.0 / math.pi),
-            ("length", "mm", 1e3),
-        ):
+        for channel in ("muscle_pressure", "joint_angle", "length"):
+            unit, factor = laboratory_unit(channel)
             for block, values in self.under(channel).items():
                 low, high, last = (
                     factor * float(v) for v in (values.min(), values.max(), values[-1])
@@ -391,6 +388,7 @@ class Simulation(Mapping[str, Array]):
         path: str | os.PathLike[str],
         *,
         recorded: Mapping[str, tuple[Array, Array]] | None = None,
+        nominal: Simulation | None = None,
     ) -> Path:
         """Write a picture of the channels over time, a PNG.
 
@@ -400,6 +398,9 @@ class Simulation(Mapping[str, Array]):
             The file.
         recorded : mapping of str to (time, value), optional
             Recorded channels to draw beside them [s, SI].
+        nominal : Simulation, optional
+            The same run of another rig to draw beside it: that of the rig file, where this one is
+            of a diagnosed model.
 
         Returns
         -------
@@ -413,7 +414,7 @@ class Simulation(Mapping[str, Array]):
         """
         from pamrs._writing import write_atomically
 
-        return write_atomically(path, _motion().channels_png(self, recorded))
+        return write_atomically(path, _motion().channels_png(self, recorded, nominal))
 
     def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
         """Write the arm as it moves, an animated GIF.
