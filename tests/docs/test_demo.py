@@ -33,8 +33,8 @@ def found(*names: str, chance: float = 0.9, sets: tuple[list[str], ...] = ()) ->
         (found("heat_transfer"), "The first answer is NOT the truth this time."),
         (
             found(sets=(["unlisted"], ["leak_muscle"])),
-            "The first answer is NOT the truth this time, but the diagnosis leaves it open, and the "
-            "truth is among what stands.",
+            "The first answer is NOT the truth this time, but the diagnosis leaves it open, and "
+            "the truth is among what stands.",
         ),
     ],
 )
