@@ -178,3 +178,8 @@ def test_what_happens_often_is_counted() -> None:
     count = sum(e.kind == "max_stop_reached" for e in result.events)
     assert count > 2
     assert f"and {count - 1} more times" in result.summary()
+
+
+def test_a_command_that_is_one_number_wants_a_duration() -> None:
+    with pytest.raises(pamrs.ParameterError, match="valve_command = 6 is one number: duration"):
+        pamrs.simulate(pamrs.rigs.shoulder(), 6.0, sample_time=0.005)

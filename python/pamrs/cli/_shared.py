@@ -98,14 +98,14 @@ def named_muscle(
 ) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
     from pamrs import library
-    from pamrs.errors import ParameterError
+    from pamrs.errors import ParameterError, meant
     from pamrs.rig import load_rig
 
     if not name.endswith(".toml") and not Path(name).exists():
         if name not in library.names():
             raise ParameterError(
-                f"{option} = {name!r} is neither a file nor in the library: "
-                f"{', '.join(library.names())}"
+                f"{option} = {name!r} is neither a file nor in the library; "
+                f"{meant(name, library.names())}"
             )
         return library.entry(name).muscle, {}, None
     rig = load_rig(name)

@@ -218,8 +218,8 @@ def _held(
         begin = exact("hold", when, "time") if at else last
         if k > 0 and not last < begin <= time[-1]:
             raise ParameterError(
-                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are "
-                "needed"
+                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s "
+                "(--duration) are needed"
             )
         last = begin
         values[time >= begin - 1e-9] = exact("hold", value, dimension)

@@ -375,6 +375,11 @@ def _signal(
         raise ParameterError(f"{name} is not allowed: numbers are needed") from None
     if signal.ndim == 0 and rows is not None:
         signal = np.full(rows, float(signal))
+    if signal.ndim == 0:
+        raise ParameterError(
+            f"{name} = {float(signal):g} is one number: duration is missing, how long it is held "
+            "(or give one value for each row)"
+        )
     if signal.ndim != 1 or signal.size == 0 or (rows is not None and signal.size != rows):
         needed = "(n,) with n >= 1" if rows is None else f"({rows},)"
         raise ParameterError(

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted, laboratory_unit
-from pamrs.errors import PamrsError, ParameterError
+from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
 
@@ -231,7 +231,7 @@ class Simulation(Mapping[str, Array]):
             return self._channels[channel]
         except KeyError:
             raise KeyError(
-                f"no channel {channel!r}; there are: {', '.join(self._channels)}"
+                f"no channel {channel!r}; {meant(str(channel), self._channels)}"
             ) from None
 
     def __iter__(self) -> Iterator[str]:

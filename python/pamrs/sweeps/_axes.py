@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs._checks import check_column
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, meant
 from pamrs.rig import Rig
 
 __all__ = ["INITIAL", "Axes", "Blocks", "Grid", "Quantity", "Samples", "quantity"]
@@ -78,10 +78,9 @@ def quantity(rig: Rig, name: str) -> Quantity:
         return of_effects[name]
     known = rig.parameters
     if name not in known:
-        there = ", ".join([*known, *of_effects])
         raise ParameterError(
             f"{name!r} is no parameter of the rig {rig.name!r}, and no initial value such as "
-            f"'initial.joint_angle'; it has: {there}"
+            f"'initial.joint_angle'; {meant(name, [*known, *of_effects])}"
         )
     found = known[name]
     tol = found.tol if math.isfinite(found.tol) else 0.0
