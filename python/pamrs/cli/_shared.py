@@ -44,6 +44,8 @@ _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 QUANTITY = re.compile(
     rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$"
 )
+#: Units to give as an example, where people seldom write the one of SI.
+_USUAL: Final = {"pressure": "bar", "angle": "deg", "length": "mm"}
 #: Sizes of a muscle that commands take, and their dimension.
 GEOMETRY: Final = {
     "rest_length": "length",
@@ -67,7 +69,7 @@ def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]
     if match is None or match["unit"] is None:
         raise ParameterError(
             f"{as_given(name, text)} is not allowed: a number with a unit like "
-            f"{DIMENSIONS[dimension]!r} is needed"
+            f"{_USUAL.get(dimension, DIMENSIONS[dimension])!r} is needed"
         )
     try:
         value = to_si(float(match["value"]), match["unit"], dimension)
