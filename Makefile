@@ -31,13 +31,18 @@ PAGE ?= $(if $(CASES),$(FOLDER)/proof,docs/proof)
 PROVE_SEED := $(or $(SEED),7)
 PROVE_COMMAND := make prove SEED=$(PROVE_SEED)$(if $(CASES), CASES=$(CASES)) JOBS=$(JOBS) FOLDER=$(FOLDER)
 
+# Errors and warnings of pip are shown; that there is a newer pip, or that root installs into .venv, is none.
+PIP_INSTALL := $(BIN)/python -m pip --disable-pip-version-check install --quiet --root-user-action=ignore
+# maturin calls pip too.
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_ROOT_USER_ACTION := ignore
+
 # The binding crate must see the same interpreter from cargo and from maturin, or it is rebuilt each time.
 export PYO3_PYTHON := $(CURDIR)/$(BIN)/python
 # Sums over eight sensitivities at once take the vectors of processors since 2013 where this one has them; same results bit for bit.
 ifeq ($(shell grep -m 1 '^flags' /proc/cpuinfo 2>/dev/null | tr ' ' '\n' | grep -cxE 'avx2|bmi2|f16c|fma|movbe|abm'),6)
 export RUSTFLAGS ?= -C target-cpu=x86-64-v3
 endif
-export PIP_DISABLE_PIP_VERSION_CHECK := 1
 export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
@@ -49,16 +54,19 @@ help:  ## this list
 
 $(VENV)/.created:
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Python 3.11 or newer is needed; this is " + sys.version.split()[0] + " (choose one: make PYTHON=path/to/python)")'
-	"$(PYTHON)" -m venv $(VENV)
+	@echo "making $(VENV) with $(PYTHON)"
+	@"$(PYTHON)" -m venv $(VENV)
 	@touch $@
 
 $(VENV)/.installed: requirements-dev.lock $(VENV)/.created
-	$(BIN)/python -m pip install --quiet --requirement requirements-dev.lock
+	@echo "installing what requirements-dev.lock pins into $(VENV): some minutes the first time"
+	@$(PIP_INSTALL) --requirement requirements-dev.lock
 	@touch $@
 
 # The peers of the benchmarks are large, and nothing else needs them.
 $(VENV)/.bench: requirements-bench.lock $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --requirement requirements-bench.lock --constraint requirements-dev.lock
+	@echo "installing what requirements-bench.lock pins into $(VENV)"
+	@$(PIP_INSTALL) --requirement requirements-bench.lock --constraint requirements-dev.lock
 	@touch $@
 
 # Other flags are another library.
@@ -66,7 +74,8 @@ $(VENV)/.flags: $(VENV)/.created FORCE
 	@printf '%s\n' '$(RUSTFLAGS)' | cmp -s - $@ || printf '%s\n' '$(RUSTFLAGS)' > $@
 
 $(VENV)/.built: $(VENV)/.installed $(VENV)/.flags pyproject.toml $(RUST_SOURCES)
-	env -u MAKEFLAGS -u MFLAGS PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
+	@echo "compiling the Rust core: some minutes the first time"
+	@env -u MAKEFLAGS -u MFLAGS PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
 	    $(BIN)/maturin develop --release --quiet $(LOCKED)
 	@touch $@
 
@@ -75,7 +84,7 @@ setup: $(VENV)/.installed  ## .venv with the pinned tools
 build: $(VENV)/.built  ## the package, its Rust core compiled, in .venv
 
 demo: build  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
-	$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
+	@$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
 
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
 prove: build  ## blinded trial from cases to docs/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)

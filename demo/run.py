@@ -17,6 +17,13 @@ from pathlib import Path
 from typing import Any
 
 KINDS = ("leak_muscle", "heat_transfer", "muscle_hysteresis")
+#: Answers that are no names of effects.
+WORDS = {
+    "unlisted": "an effect outside the catalogue",
+    "parameters": "parameter values that are off",
+    "none": "nothing missing",
+}
+EVEN = 0.5
 ROOT = Path(__file__).parents[1]
 
 
@@ -29,6 +36,31 @@ def score(key: dict[str, Any], result: dict[str, Any]) -> tuple[str, str, bool]:
     if key["verdict"] == "effects":
         right = right and named == sorted(key["effects"])
     return truth, verdict, right
+
+
+def judgement(key: dict[str, Any], result: dict[str, Any]) -> str:
+    """Whether the verdict is the truth, and whether the diagnosis calls it settled."""
+    right = score(key, result)[2]
+    truth = sorted(key["effects"]) or [key["verdict"]]
+    named = sorted(effect["id"] for effect in result["effects"])
+    answer = named if result["verdict"] == "effects" else [result["verdict"]]
+    sets = [sorted(names) for names in result["ambiguity"]]
+    rivals = [names for names in sets if names != answer]
+    chances = [effect["probability"] for effect in result["effects"] if named == answer]
+    if not right:
+        held = truth in sets
+        return "The first answer is NOT the truth this time" + (
+            ", but the diagnosis leaves it open, and the truth is among what stands."
+            if held
+            else "."
+        )
+    if rivals:
+        others = " and ".join(" + ".join(WORDS.get(name, name) for name in s) for s in rivals)
+        stand = "stands" if len(rivals) == 1 else "stand"
+        return f"The verdict is right, but not settled: {others} also {stand}."
+    if any(chance < EVEN for chance in chances):
+        return f"The verdict is right, but not settled: its probability is {min(chances):.2f}."
+    return "The verdict is right."
 
 
 def main() -> int:
@@ -63,9 +95,11 @@ def main() -> int:
     print(f"   SHA-256 of the key, still shut: {digest}", flush=True)
 
     report, answer, picture = out / "report.html", out / "result.json", out / "diagnosis.png"
+    model = out / "model.toml"
     print("2  The diagnosis, in its own process, sees only the case folder ...\n", flush=True)
     started = time.perf_counter()
     outputs = ["--report", str(report), "--json", str(answer), "--png", str(picture)]
+    outputs += ["--model", str(model)]
     command = [sys.executable, "-m", "pamrs", "diagnose", str(folder), *outputs]
     done = subprocess.run(command, cwd=folder, check=False)
     if done.returncode:
@@ -74,15 +108,15 @@ def main() -> int:
 
     key = json.loads(key_path.read_text(encoding="utf-8"))
     result = json.loads(answer.read_text(encoding="utf-8"))
-    truth, verdict, right = score(key, result)
+    truth, verdict, _ = score(key, result)
     print(
         f"\n3  The key is opened.\n   concealed: {truth}\n"
         f"   verdict:   {verdict}   ({seconds:.0f} s)"
     )
-    print("   The verdict is right." if right else "   The verdict is NOT the truth this time.")
+    print(f"   {judgement(key, result)}")
     again = f"make demo KIND={kind} SEED={seed}"
     print(f"\nThe same case again: {again}\nWritten:")
-    for path in (report, picture, answer, key_path, folder):
+    for path in (report, picture, answer, model, key_path, folder):
         print(f"   {path.relative_to(ROOT) if path.is_relative_to(ROOT) else path}")
     return 0
 

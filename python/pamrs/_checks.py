@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError
+from pamrs.units import with_unit
 
-__all__ = ["checked_number", "checked_table", "positive"]
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+__all__ = ["check_column", "checked_number", "checked_table", "positive"]
 
 
 def positive(name: str, value: float, *, zero: bool = False) -> float:
@@ -69,7 +74,7 @@ def checked_number(
     ParameterError
         With name, value and what is allowed.
     """
-    last = f" {unit}" if unit else ""
+    last = with_unit("", unit)
     allowed = f"from {lower:g} to {upper:g}{last}"
     if math.isinf(upper):
         allowed = f"a finite number of {lower:g}{last} or more"
@@ -86,6 +91,36 @@ def checked_number(
     if whole and not number.is_integer():
         raise ParameterError(f"{name} = {number:g} is not allowed: a whole number is needed")
     return number
+
+
+def check_column(
+    name: str, values: NDArray[np.float64], lower: float, upper: float, unit: str
+) -> None:
+    """Refuse a column of which a number is not finite or outside its bounds.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    values : ndarray
+        The column.
+    lower, upper : float
+        Bounds.
+    unit : str
+        Their unit.
+
+    Raises
+    ------
+    ParameterError
+        With name, row, value and what is allowed.
+    """
+    import numpy as np
+
+    bad = np.flatnonzero(~(np.isfinite(values) & (values >= lower) & (values <= upper)))
+    if bad.size:
+        wrong = with_unit(f"{name}[{bad[0]}] = {values[bad[0]]:g}", unit)
+        allowed = with_unit(f"from {lower:g} to {upper:g}", unit)
+        raise ParameterError(f"{wrong} is not allowed: {allowed}")
 
 
 def checked_table(name: str, values: Any) -> dict[str, Any]:

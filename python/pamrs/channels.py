@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
-__all__ = ["UNITS", "channel_of", "dotted", "unit_of"]
+__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "unit_of"]
 
 #: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
 #: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``.
@@ -53,3 +54,30 @@ def dotted(channel: str, name: str) -> str:
 def unit_of(name: str) -> str:
     """SI unit of a channel, "1" for one that is not known."""
     return UNITS.get(channel_of(name), "1")
+
+
+#: What a laboratory reads its instruments in, for SI units: unit, and factor from SI.
+_LABORATORY: Final = {
+    "Pa": ("bar", 1e-5),
+    "rad": ("deg", 180.0 / math.pi),
+    "rad/s": ("deg/s", 180.0 / math.pi),
+    "m": ("mm", 1e3),
+    "m/s": ("mm/s", 1e3),
+}
+
+
+def laboratory_unit(name: str) -> tuple[str, float]:
+    """The unit that people read a channel in, and the factor from SI.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+
+    Returns
+    -------
+    tuple of (str, float)
+        bar, deg, mm, their rates; SI for all others.
+    """
+    unit = unit_of(name)
+    return _LABORATORY.get(unit, (unit, 1.0))

@@ -94,6 +94,28 @@ def check_packages(extra: str, *packages: str) -> None:
             raise missing_package(error, extra) from error
 
 
+def meant(given: str, allowed: Iterable[str]) -> str:
+    """What an unknown name may have meant, else the names that there are.
+
+    Parameters
+    ----------
+    given : str
+        The name.
+    allowed : iterable of str
+        The known ones.
+
+    Returns
+    -------
+    str
+        ``did you mean 'shoulder'?`` or ``there are: shoulder, elbow``.
+    """
+    import difflib
+
+    names = list(allowed)
+    near = difflib.get_close_matches(given, names, n=1)
+    return f"did you mean {near[0]!r}?" if near else f"there are: {', '.join(names) or 'none'}"
+
+
 def joined(head: str, problems: Iterable[str]) -> str:
     """One message out of a headline and the problems found under it.
 

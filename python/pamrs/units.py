@@ -16,7 +16,16 @@ from typing import Final, NamedTuple
 
 from pamrs.errors import ParameterError
 
-__all__ = ["DIMENSIONS", "Unit", "bar_and_psi", "from_si", "parse_unit", "same_dimension", "to_si"]
+__all__ = [
+    "DIMENSIONS",
+    "Unit",
+    "bar_and_psi",
+    "from_si",
+    "parse_unit",
+    "same_dimension",
+    "to_si",
+    "with_unit",
+]
 
 #: Names of dimensions accepted by :func:`to_si`, with the SI unit of each.
 DIMENSIONS: Final[dict[str, str]] = {
@@ -279,6 +288,28 @@ def from_si(value: float, unit: str, dimension: str, *, difference: bool = False
     """Convert an SI value into ``unit``; the inverse of :func:`to_si`, with the same parameters."""
     parsed = _checked(unit, dimension)
     return (value - (0.0 if difference else parsed.offset)) / parsed.scale
+
+
+def with_unit(number: str, unit: str) -> str:
+    """A number with its unit behind it, as people read it: a plain number stands alone.
+
+    Parameters
+    ----------
+    number : str
+        The number as it is printed.
+    unit : str
+        Its unit; "1", "-" and "" are none.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> with_unit("1.5", "bar"), with_unit("0.005", "1")
+    ('1.5 bar', '0.005')
+    """
+    return number if unit in ("", "1", "-") else f"{number} {unit}"
 
 
 def bar_and_psi(pressure: float) -> str:

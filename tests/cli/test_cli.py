@@ -51,7 +51,7 @@ def test_no_words_print_help(capsys):
         (["digest"], "digest"),
         (["diagnose"], "argument"),
         (["diagnose", "x", "--colour"], "--colour"),
-        (["simulate", "rig.toml"], "--output"),
+        (["simulate", "rig.toml", "--output"], "--output"),
         (["rig"], "command"),
     ],
 )
@@ -67,6 +67,8 @@ def test_rig_check_lists_parameters(capsys):
     assert code == 0
     assert err == ""
     assert "valve.discharge_area_max" in out
+    alpha = next(line for line in out.splitlines() if line.startswith("chamber.alpha_in "))
+    assert "1" not in alpha.split()[-1:]  # a plain number has no unit behind it
     assert "is valid" in out.splitlines()[-1]
 
 
@@ -256,14 +258,43 @@ def test_simulate_draws_channels_and_motion(capsys, tmp_path):
     assert code == 0, err
     assert plot.read_bytes().startswith(b"\x89PNG")
     assert motion.read_bytes().startswith(b"GIF89a")
-    code, _, err = run(capsys, "simulate", "shoulder", "--input", table)
-    assert code == 2
-    assert "nothing would be written" in err
+    code, out, err = run(capsys, "simulate", "shoulder", "--input", table)
+    assert code == 0, err
+    assert "muscle_pressure: rms difference from the recording" in out
     code, _, err = run(
         capsys, "simulate", "shoulder", "--input", table, "--animation", motion, "--speed", "0"
     )
     assert code == 2
     assert "speed = 0.0 is not allowed" in err
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        (["simulate", "sholder"], "'sholder' is neither a file nor a rig of the package; did you"),
+        (["rig", "check", "knee"], "there are: shoulder, antagonistic_joint, bench"),
+        (["diagnose", "--plan", "elbo"], "did you mean 'elbow'?"),
+        (["simulate", "shoulder", "--hold", "valve_comand = 6 V"], "'valve_command'?"),
+        (["simulate", "sealed_chamber", "--hold", "valve_command = 6 V"], "there are: pressure"),
+        (["simulate", "two_joint_arm", "--hold", "valve_command.elbo = 6 V"], "command.elbow'?"),
+        (["simulate", "two_joint_arm", "--hold", "valve_command = 6 V"], "valve_command.elbow, "),
+        (["simulate", "shoulder"], "give --hold 'valve_command = 5 V, 8 V @ 1 s', or --input"),
+        (["simulate", "shoulder", "--initial", "muscle_presure = 2 bar"], "muscle_pressure'?"),
+    ],
+)
+def test_a_name_that_is_almost_right_is_recognised(capsys, words, part):
+    code, out, err = run(capsys, *words)
+    assert code == 2
+    assert out == ""
+    assert_one_clean_line(err, part)
+
+
+def test_simulate_says_that_a_command_is_beyond_the_valve(capsys):
+    code, out, _ = run(
+        capsys, "simulate", "elbow", "--hold", "valve_command = 6 V, 50 V @ 1 s, 5 V @ 2 s"
+    )
+    assert code == 0
+    assert "valve: command clipped to its range of 0 to 10 V from 1 s to 2 s; 50 V was" in out
 
 
 def test_a_chamber_has_no_motion(tmp_path):

@@ -217,7 +217,7 @@ def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
     [
         ([], ["--point"]),
         (["--point", "18"], ["--point = '18' is not allowed", "POSITION:FORCE"]),
-        (["--point", "0:4 kN"], ["--point = '0' is not allowed", "unit like 'm'"]),
+        (["--point", "0:4 kN"], ["--point = '0' is not allowed", "unit like 'mm'"]),
         (["--point", "0 mm:4 bar"], ["--point = '4 bar'", "wrong dimension"]),
         (
             ["--point", "3 mm:4 kN", "--point", "3 %:2 kN"],

@@ -51,12 +51,34 @@ def test_errors_of_the_nominal_rig_stand_beside_those_of_the_model(
     code, out, _ = run(capsys, "replay", case.parent / "model.toml", "--plot", plot)
     assert code == 0
     assert re.findall(r"^(\w+) \(", out, re.MULTILINE) == ["waves", "steps"]
-    errors = re.findall(r"muscle_pressure: rms difference (\S+) -> (\S+) Pa", out)
+    errors = re.findall(r"muscle_pressure: rms difference (\S+) -> (\S+) bar", out)
     assert len(errors) == 2
     for before, after in errors:
-        assert float(before) > 1000.0
-        assert float(after) < 1.0
+        assert float(before) > 0.01
+        assert float(after) < 1e-5
     assert plot.read_bytes().startswith(b"\x89PNG")
+    assert re.search(r"joint_angle: rms difference \S+ -> \S+ deg$", out, re.MULTILINE)
+
+
+def test_the_picture_has_recorded_rig_file_and_model_in_units_of_the_laboratory(
+    case: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    figure = pytest.importorskip("matplotlib.figure").Figure
+    drawn = []
+    save = figure.savefig
+    monkeypatch.setattr(
+        figure, "savefig", lambda self, *a, **k: (drawn.append(self), save(self, *a, **k))
+    )
+    assert (
+        cli.main(["replay", str(case.parent / "model.toml"), "--plot", str(tmp_path / "a.png")])
+        == 0
+    )
+    panels = {axes.get_title("left"): axes for axes in drawn[0].axes}
+    assert [axes.get_ylabel() for axes in panels.values()] == ["V", "bar", "deg", "N m", "N"]
+    labels = [line.get_label() for line in panels["joint angle"].lines]
+    assert labels == ["recorded", "rig file", "model"]
+    pressures = [text.get_text() for text in panels["pressure, gauge"].get_legend().get_texts()]
+    assert pressures == ["recorded", "rig file", "supply model", "muscle model"]
 
 
 def test_one_recording_with_the_rig_of_the_case(

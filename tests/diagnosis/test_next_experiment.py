@@ -265,7 +265,7 @@ def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
     assert all(pair.text for pair in asked.pairs)
     first = next(p for p in asked.pairs if "unlisted" in p.between)
     assert "has to predict" in first.text
-    assert ("Measure chamber.dead_volume" in first.text) is wrong
+    assert ("Measure the chamber dead volume" in first.text) is wrong
     if not wrong:
         assert first.noises is not None
         assert first.noises > 1.0
@@ -307,5 +307,5 @@ def test_a_pair_that_nothing_simulates_is_told_in_words() -> None:
     told = _pair(asked, *sets, [])
     assert told.between == ["muscle_creep", "muscle_hysteresis"]
     assert "nested loops" in told.text
-    assert "arm.elbow" in told.text
+    assert "arm of elbow" in told.text
     assert (told.experiment, told.noises) == ("", None)

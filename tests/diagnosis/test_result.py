@@ -19,6 +19,8 @@ from pamrs.findings import (
     EffectParameterFound,
     FreeRun,
     FreeRunError,
+    NextExperiment,
+    PairExperiment,
     Where,
 )
 from pamrs.report import render_html
@@ -119,6 +121,43 @@ def test_summary_names_the_effect() -> None:
     assert 12 <= len(summary.splitlines()) <= 32
     assert max(map(len, summary.splitlines())) <= 100
     assert summary.isascii()
+
+
+def test_a_plain_number_stands_without_its_unit() -> None:
+    found = synthetic.diagnosis()
+    share = EffectParameterFound(0.00514, 0.00039, "1", interval=(0.0044, 0.0059))
+    effect = dataclasses.replace(found.effects[0], parameters={"share": share})
+    lines = dataclasses.replace(found, effects=[effect]).summary().splitlines()
+    assert "  share = 0.00514 +- 0.00039" in lines
+
+
+def test_an_instruction_that_pairs_share_is_given_once() -> None:
+    what = "For the chamber of flexor: step the pressure by two sizes and watch for 4 s"
+    own = NextExperiment(
+        f"{what}; what fades is heat.",
+        pairs=[
+            PairExperiment(["unlisted", "leak_muscle"], f"{what}. A model with a leak says it."),
+            PairExperiment(
+                ["unlisted", "sensors.flexor.pressure_zero"], "Measure it by itself with a gauge."
+            ),
+        ],
+    )
+    found = dataclasses.replace(synthetic.diagnosis(), next_experiment=own)
+    summary = " ".join(found.summary().split())
+    assert summary.count("watch for 4 s") == 1
+    assert "unlisted effect or muscle leak? The same experiment. A model with a leak" in summary
+    assert "or wrong pressure zero of flexor? Measure it by itself" in summary
+    html = render_html(found)
+    assert html.count("watch for 4 s") == 1
+
+
+def test_errors_of_a_block_with_a_name_have_their_unit() -> None:
+    found = synthetic.diagnosis()
+    errors = dataclasses.replace(
+        found.fit, held_out={"joint_angle.elbow": found.fit.held_out["joint_angle"]}
+    )
+    lines = dataclasses.replace(found, fit=errors).summary().splitlines()
+    assert any(line.startswith("joint_angle.elbow [deg]") for line in lines)
 
 
 def test_summary_says_how_the_whole_rig_runs_and_what_is_only_closest() -> None:

@@ -14,11 +14,11 @@ ROOT = Path(__file__).parents[2]
 #: Those in one line do not know each other.
 LAYERS = (
     ("errors",),
+    ("units",),
     (
         "channels",
         "comparison",
         "findings",
-        "units",
         "_checks",
         "_files",
         "_stretches",

@@ -161,3 +161,10 @@ def test_chambers_load(path: Path) -> None:
 
 def test_there_are_seven_chambers() -> None:
     assert len(list(CHAMBERS.glob("*/case.toml"))) == 7
+
+
+def test_the_folder_above_a_case_says_where_the_case_is(tmp_path):
+    (tmp_path / "cases" / "one").mkdir(parents=True)
+    (tmp_path / "cases" / "one" / "case.toml").write_text("", encoding="utf-8")
+    with pytest.raises(pamrs.CaseError, match=r"no case.toml; did you mean '.*one'\?"):
+        pamrs.load_case(tmp_path)

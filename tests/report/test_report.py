@@ -64,6 +64,14 @@ def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(
     assert words in replace(synthetic.diagnosis(), verdict=verdict, ambiguity=ambiguity).headline
 
 
+def test_the_headline_names_what_the_model_holds_already() -> None:
+    term = BudgetTerm("chamber", "held", "leak_muscle", "", 0.9, [0.8, 1.0], None, 1.0, 300.0, "Pa")
+    found = replace(synthetic.nothing(), budget=[term])
+    assert found.headline.startswith(
+        "Nothing is missing beside the muscle leak that the model holds: the model explains"
+    )
+
+
 def test_ids_are_unique_and_resolve(page: str) -> None:
     ids = re.findall(r'\bid="([^"]+)"', page)
     assert len(ids) == len(set(ids))

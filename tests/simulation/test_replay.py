@@ -120,16 +120,17 @@ def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
     [
         (
             ["--hold", "valve_command = 6 V"],
-            "the rig has no valve of that name; it has: elbow, wrist",
+            "no signal 'valve_command'; there are: valve_command.elbow, valve_command.wrist",
         ),
         (
             ["--hold", "valve_command.elbow = 6 bar", "--hold", "valve_command.wrist = 5 V"],
             "--hold",
         ),
-        (["--hold", "torque = 6 V"], "a signal like"),
+        (["--hold", "torque = 6 V"], "takes no signal 'torque'; there are"),
+        (["--hold", "valve_command"], "a signal like"),
         (["--hold", "valve_command.elbow = 6 V, 7 V"], "needs its time"),
-        (["--hold", "valve_command.elbow = 6 V"], "valve_command.wrist is missing"),
-        (["--initial", "colour = 6 V"], "a state like"),
+        (["--hold", "valve_command.elbow = 6 V"], "missing for valve_command.wrist"),
+        (["--initial", "colour = 6 V"], "no state 'colour'"),
         (["--duration", "-1 s"], "--duration"),
     ],
 )

@@ -223,7 +223,9 @@ def test_squared_error_takes_a_reference():
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"parameters": {"arm.payload": [1.0, -2.0]}}, r"row 1.*arm\.payload.*-2"),
+        ({"parameters": {"arm.payload": [1.0, -2.0]}}, r"arm\.payload\[1\] = -2 kg"),
+        # the bound of the rig file and of a sweep
+        ({"parameters": {"arm.payload": [2e5, 9.0]}}, r"payload\[0\] = 200000 kg .* 100000 kg"),
         ({"parameters": {"arm.payload": [1.0, np.nan]}}, r"arm\.payload\[1\] = nan"),
         ({"parameters": {"arm.weight": [1.0, 2.0]}}, r"arm\.weight.*arm\.payload"),
         ({"parameters": {"arm.payload": [1.0, 2.0]}, "n": 3}, "arm.payload is for 2.*n for 3"),

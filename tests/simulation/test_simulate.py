@@ -154,3 +154,32 @@ def test_impossible_parameter_is_refused_by_name(name: str, value: float) -> Non
 def test_rig_with_a_valve_needs_a_command() -> None:
     with pytest.raises(ValueError, match="valve_command"):
         pamrs.simulate(pamrs.rigs.shoulder(), duration=0.1, sample_time=0.01, step=1e-3)
+
+
+def test_a_command_beyond_its_valve_is_an_event_and_is_said() -> None:
+    command = np.full(31, 6.0)
+    command[5:10], command[20:] = 50.0, -3.0
+    result = run(command)
+    told = [(round(e.time, 6), e.kind) for e in result.events if e.kind.startswith("command")]
+    assert told == [
+        (0.025, "command_clipped"),
+        (0.05, "command_in_range"),
+        (0.1, "command_clipped"),
+    ]
+    line = "valve: command clipped to its range of 0 to 10 V from 0.025 s to 0.05 s and once more; "
+    assert line + "50 V was asked for" in result.summary().splitlines()
+    assert [e.time for e in result.events] == sorted(e.time for e in result.events)
+    # a recorded command scatters about the end of the range
+    assert "clipped" not in run(np.full(31, 10.02)).summary()
+
+
+def test_what_happens_often_is_counted() -> None:
+    result = run(np.full(601, 10.0))
+    count = sum(e.kind == "max_stop_reached" for e in result.events)
+    assert count > 2
+    assert f"and {count - 1} more times" in result.summary()
+
+
+def test_a_command_that_is_one_number_wants_a_duration() -> None:
+    with pytest.raises(pamrs.ParameterError, match="valve_command = 6 is one number: duration"):
+        pamrs.simulate(pamrs.rigs.shoulder(), 6.0, sample_time=0.005)

@@ -17,6 +17,8 @@ import pamrs
 from pamrs.sweeps._axes import Blocks
 from tests.sweeps.helpers import COMMAND, DT, GRID, METRICS, same, small
 
+LEAKING = pamrs.rigs.shoulder().with_effect("leak_muscle", {"conductance": 5e-11})
+
 
 def one_run(payload: float, angle: float, volume: float) -> pamrs.Simulation:
     rig = pamrs.rigs.shoulder().with_parameters(
@@ -265,24 +267,26 @@ def test_bad_input_is_named_and_leaves_no_store(tmp_path, changes, message):
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"over": {**GRID, "arm.payload": [2.0, 5.0, 9.5]}}, "values of arm.payload: 3, "),
-        ({"over": dict(reversed(GRID.items()))}, "order of the axes"),
-        ({"rig": pamrs.rigs.shoulder().with_parameters({"arm.length": 0.8})}, "rig: "),
+        ({"over": {**GRID, "arm.payload": [2.0, 5.0, 9.5]}}, "over['arm.payload']: other numbers"),
+        ({"over": dict(reversed(GRID.items()))}, "over (order of the axes): "),
+        ({"rig": pamrs.rigs.shoulder().with_parameters({"arm.length": 0.8})}, "0.8 m now"),
+        ({"rig": LEAKING}, "rig: other effects"),
         (
             {"metrics": {**METRICS, "new": ("final", "joint_rate")}},
-            "metric new is not in the store",
+            "metrics['new'] is not in the store",
         ),
-        ({"metrics": {"end": METRICS["end"]}}, "metric ise is in the store only"),
+        ({"metrics": {"end": METRICS["end"]}}, "metrics['ise'] is in the store only"),
         ({"metrics": {**METRICS, "ise": ("squared_error", "joint_angle", 0.9)}}, "0.9] now"),
-        ({"valve_command": COMMAND + 1e-9}, "valve_command: "),
+        ({"valve_command": COMMAND + 1e-9}, "valve_command: other numbers"),
         ({"step": 1e-3}, "step: None in the store, 0.001 now"),
-        ({"initial": {"joint_rate": 0.1}}, "initial joint_rate is not in the store"),
-        ({"chunk": 2}, r"runs of a chunk: (1, 2, 2) in the store"),
+        ({"initial": {"joint_rate": 0.1}}, "initial['joint_rate'] is not in the store"),
+        ({"chunk": 2}, r"chunk: (1, 2, 2) in the store"),
     ],
 )
 def test_the_store_of_another_sweep_is_refused(tmp_path, changes, message, store):
-    with pytest.raises(pamrs.ParameterError, match=re.escape(message)):
+    with pytest.raises(pamrs.ParameterError, match=re.escape(message)) as told:
         small(store, **changes)
+    assert not re.search(r"\b[0-9a-f]{8,}\b", str(told.value))  # words, no digests
 
 
 @pytest.fixture(scope="module")

@@ -44,6 +44,8 @@ _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 QUANTITY = re.compile(
     rf"^\s*(?P<value>{_NUMBER})\s*(?:(?:\+-|±)\s*(?P<tol>{_NUMBER})\s*)?(?P<unit>\S.*?)?\s*$"
 )
+#: Units to give as an example, where people seldom write the one of SI.
+_USUAL: Final = {"pressure": "bar", "angle": "deg", "length": "mm"}
 #: Sizes of a muscle that commands take, and their dimension.
 GEOMETRY: Final = {
     "rest_length": "length",
@@ -67,7 +69,7 @@ def quantity(name: str, text: str, dimension: str) -> tuple[float, float | None]
     if match is None or match["unit"] is None:
         raise ParameterError(
             f"{as_given(name, text)} is not allowed: a number with a unit like "
-            f"{DIMENSIONS[dimension]!r} is needed"
+            f"{_USUAL.get(dimension, DIMENSIONS[dimension])!r} is needed"
         )
     try:
         value = to_si(float(match["value"]), match["unit"], dimension)
@@ -98,14 +100,14 @@ def named_muscle(
 ) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The muscle of a rig file, or of the library, what is known of its geometry, and the rig."""
     from pamrs import library
-    from pamrs.errors import ParameterError
+    from pamrs.errors import ParameterError, meant
     from pamrs.rig import load_rig
 
     if not name.endswith(".toml") and not Path(name).exists():
         if name not in library.names():
             raise ParameterError(
-                f"{option} = {name!r} is neither a file nor in the library: "
-                f"{', '.join(library.names())}"
+                f"{option} = {name!r} is neither a file nor in the library; "
+                f"{meant(name, library.names())}"
             )
         return library.entry(name).muscle, {}, None
     rig = load_rig(name)
@@ -122,10 +124,25 @@ def named_muscle(
 def rig_named(file: Path) -> Rig:
     """A rig file, or a rig of the package by its name."""
     from pamrs import rigs
+    from pamrs.errors import RigError, meant
     from pamrs.rig import load_rig
 
-    return (
-        rigs.named(str(file)) if not file.exists() and str(file) in rigs.names() else load_rig(file)
+    name = str(file)
+    if not file.exists() and name in rigs.names():
+        return rigs.named(name)
+    try:
+        return load_rig(file)
+    except RigError:
+        if file.exists():
+            raise
+    if file.suffix or len(file.parts) > 1:
+        others = [path.name for path in file.parent.glob("*.toml")]
+        hint = meant(file.name, [*others, *rigs.names()])
+        raise RigError(
+            f"{file}: cannot be read (no such file{f'; {hint}' if 'mean' in hint else ''})"
+        )
+    raise RigError(
+        f"{name!r} is neither a file nor a rig of the package; {meant(name, rigs.names())}"
     )
 
 

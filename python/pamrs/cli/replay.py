@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pamrs.channels import unit_of
+from pamrs.channels import laboratory_unit
 from pamrs.cli._shared import (
     check_writable,
     progress,
@@ -16,6 +16,7 @@ from pamrs.cli._shared import (
     write,
 )
 from pamrs.errors import check_packages
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.recordings import Case, Recording
@@ -59,6 +60,7 @@ def replay_command(
     chosen = _chosen(found, recording)
     shown = next((r for r in chosen if r.role == "held_out"), chosen[0])
     drawn: Simulation | None = None
+    beside: Simulation | None = None
     for one in chosen:
         typer.echo(f"{one.name} ({one.role.replace('_', ' ')}, {one.duration:.4g} s)")
         with progress(f"simulating {one.name}"):
@@ -67,9 +69,10 @@ def replay_command(
             typer.echo(line)
         if one is shown:
             drawn = own or nominal
+            beside = None if own is None else nominal
     if plot is not None and drawn is not None:
-        result = drawn
-        write({plot: lambda path: result.plot(path, recorded=usable_samples(shown))})
+        result, recorded = drawn, usable_samples(shown)
+        write({plot: lambda path: result.plot(path, recorded=recorded, nominal=beside)})
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
@@ -116,6 +119,7 @@ def _lines(nominal: Simulation | None, own: Simulation | None, recording: Record
     after = {} if own is None else differences(own, recording)
     found = []
     for name in before | after:
-        told = [f"{errors[name]:.4g}" for errors in (before, after) if name in errors]
-        found.append(f"  {name}: rms difference {' -> '.join(told)} {unit_of(name)}")
+        unit, factor = laboratory_unit(name)
+        told = [f"{factor * errors[name]:.4g}" for errors in (before, after) if name in errors]
+        found.append(with_unit(f"  {name}: rms difference {' -> '.join(told)}", unit))
     return found

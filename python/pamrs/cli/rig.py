@@ -9,6 +9,7 @@ import typer
 
 from pamrs import rigs
 from pamrs.cli._shared import rig_named
+from pamrs.units import with_unit
 
 __all__ = ["rig_app"]
 
@@ -34,7 +35,7 @@ def _rig_check(
     for name, parameter in rig.parameters.items():
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
-        typer.echo(f"{name:<{width}}  {known}{spread} {parameter.unit}")
+        typer.echo(with_unit(f"{name:<{width}}  {known}{spread}", parameter.unit))
     typer.echo(
         f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} "
         "effects"

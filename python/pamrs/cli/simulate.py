@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pamrs.channels import UNITS, channel_of, unit_of
+from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
     check_writable,
     exact,
@@ -20,6 +20,7 @@ from pamrs.cli._shared import (
     write,
 )
 from pamrs.errors import check_packages
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     import numpy as np
@@ -37,6 +38,8 @@ _DIMENSIONS = {
     "pressure": "pressure",
     "length": "length",
 }
+#: Signals that a rig cannot do without, each with an example.
+_NEEDED = {"valve_command": "5 V, 8 V @ 1 s", "length": "300 mm"}
 _INITIAL = {"Pa": "pressure", "rad": "angle", "rad/s": "angular speed", "m": "length", "m/s": "m/s"}
 
 
@@ -79,8 +82,6 @@ def simulate_command(
     """Drive a rig with a recording's inputs, or with steps, and write what its channels would
     be.
     """
-    if output is None and plot is None and animation is None:
-        raise typer.BadParameter("nothing would be written: give --output, --plot or --animation")
     if input is not None and (hold or initial):
         raise typer.BadParameter("--hold and --initial do not go with --input, which says both")
     check_writable(output, plot, animation)
@@ -110,7 +111,9 @@ def simulate_command(
         from pamrs.simulation import differences
 
         for name, rms in differences(result, recording).items():
-            typer.echo(f"{name}: rms difference from the recording {rms:.4g} {unit_of(name)}")
+            unit, factor = laboratory_unit(name)
+            told = f"{name}: rms difference from the recording {factor * rms:.4g}"
+            typer.echo(with_unit(told, unit))
     files: dict[Path | None, Callable[[Path], object]] = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: result.plot(path, recorded=recorded),
@@ -144,7 +147,7 @@ def _steps(
     import numpy as np
 
     from pamrs.errors import ParameterError
-    from pamrs.simulation import simulate
+    from pamrs.simulation import initial_names, input_names, simulate
 
     if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
         given = f"--duration = {duration:g} s with --sample-time = {sample_time:g} s"
@@ -152,9 +155,10 @@ def _steps(
             f"{given} is not allowed: two times > 0 s are needed that give from 2 to 1e8 rows"
         )
     time = np.asarray(np.arange(round(duration / sample_time) + 1) * sample_time, dtype=np.float64)
+    known = input_names(rig)
     drive: dict[str, Any] = {}
     for text in hold:
-        name, values = _held(text, time)
+        name, values = _held(text, time, known)
         head, _, block = name.partition(".")
         if (head == "length" and "length" in drive) or block in drive.get(head, {}):
             raise ParameterError(f"--hold = {text!r} is not allowed: {name} is given twice")
@@ -162,28 +166,47 @@ def _steps(
             drive["length"] = values
         else:
             drive.setdefault(head, {})[block] = values
-    start = dict(_began(text) for text in initial)
+    held = {dotted(head, b) for head, own in drive.items() if head != "length" for b in own}
+    start = dict(_began(text, initial_names(rig)) for text in initial)
+    for name in known:
+        example = _NEEDED.get(channel_of(name))
+        if example is not None and name not in held | set(drive):
+            raise ParameterError(
+                f"--hold is missing for {name}: give --hold '{name} = {example}', or --input with "
+                "a recording"
+            )
     if not drive:
         drive["duration"] = duration
     with progress(f"simulating {rig.name}"):
         return simulate(rig, sample_time=sample_time, initial=start, **drive)
 
 
-def _held(text: str, time: NDArray[np.float64]) -> tuple[str, NDArray[np.float64]]:
-    """A signal of steps from ``"valve_command.elbow = 5 V, 8 V @ 1 s"``."""
+def _held(
+    text: str, time: NDArray[np.float64], known: list[str]
+) -> tuple[str, NDArray[np.float64]]:
+    """A signal of steps from ``"valve_command.elbow = 5 V, 8 V @ 1 s"``; ``known`` are those that
+    the rig takes.
+    """
     import numpy as np
 
-    from pamrs.errors import ParameterError
+    from pamrs.errors import ParameterError, meant
 
     name, equals, steps = text.partition("=")
     name = name.strip()
-    dimension = _DIMENSIONS.get(channel_of(name))
-    if not equals or dimension is None:
+    if not equals:
         raise ParameterError(
             f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is "
-            f"needed, one of {', '.join(_DIMENSIONS)}, with the name of the block behind a dot "
-            "where it has one"
+            "needed"
         )
+    same = [one for one in known if channel_of(one) == name]
+    if name not in known and len(same) == 1:
+        name = same[0]  # the only one is meant
+    if name not in known:
+        hint = f"there are: {', '.join(same)}" if same else meant(name, known)
+        raise ParameterError(
+            f"--hold = {text!r} is not allowed: the rig takes no signal {name!r}; {hint}"
+        )
+    dimension = _DIMENSIONS[channel_of(name)]
     values, last = np.zeros(time.size), 0.0
     for k, step in enumerate(steps.split(",")):
         value, at, when = step.partition("@")
@@ -195,25 +218,32 @@ def _held(text: str, time: NDArray[np.float64]) -> tuple[str, NDArray[np.float64
         begin = exact("hold", when, "time") if at else last
         if k > 0 and not last < begin <= time[-1]:
             raise ParameterError(
-                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s are "
-                "needed"
+                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s "
+                "(--duration) are needed"
             )
         last = begin
         values[time >= begin - 1e-9] = exact("hold", value, dimension)
     return name, values
 
 
-def _began(text: str) -> tuple[str, float]:
-    """An initial value from ``"muscle_pressure.elbow = 2 bar"``."""
-    from pamrs.errors import ParameterError
+def _began(text: str, known: list[str]) -> tuple[str, float]:
+    """An initial value from ``"muscle_pressure.elbow = 2 bar"``; ``known`` are the states that the
+    rig has.
+    """
+    from pamrs.errors import ParameterError, meant
 
     name, equals, value = text.partition("=")
-    unit = UNITS.get(channel_of(name.strip()), "")
-    if not equals or unit not in _INITIAL:
+    name = name.strip()
+    if not equals:
         raise ParameterError(
             f"--initial = {text!r} is not allowed: a state like 'muscle_pressure = 2 bar' is needed"
         )
-    return name.strip(), exact("initial", value, _INITIAL[unit])
+    if name not in known:
+        raise ParameterError(
+            f"--initial = {text!r} is not allowed: the rig has no state {name!r} to begin from; "
+            f"{meant(name, known)}"
+        )
+    return name, exact("initial", value, _INITIAL[unit_of(name)])
 
 
 def _write_csv(path: Path, columns: Simulation) -> None:

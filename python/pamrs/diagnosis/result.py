@@ -16,7 +16,7 @@ from typing import Any, Final
 
 from pamrs import report
 from pamrs._writing import write_atomically
-from pamrs.channels import UNITS
+from pamrs.channels import unit_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.findings import (
     DEFINITIONS,
@@ -29,6 +29,7 @@ from pamrs.findings import (
     told,
 )
 from pamrs.report import text as words
+from pamrs.units import with_unit
 
 __all__ = ["READABLE", "SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
 
@@ -204,7 +205,7 @@ class Diagnosis(Findings):
             for name, own in effect.parameters.items():
                 if own.identifiable is not False:
                     value = words.format_uncertain(own.value, own.std, unicode=False)
-                    lines.append(f"  {name} = {value} {own.unit}".rstrip())
+                    lines.append(with_unit(f"  {name} = {value}", own.unit))
                 else:
                     lines.append(f"  {name}: these recordings do not determine it")
         for wrong in self.wrong_parameters:
@@ -240,9 +241,13 @@ class Diagnosis(Findings):
                 lines.append("")
             if rows and len(self.blocks) > 1 and block.blocks:
                 lines.append(f"{words.blocks_label(block)}:")
+            names = [words.hypothesis_label(name) for name, _ in rows]
+            width = min(max(38, *map(len, names)), 56) if names else 38
             lines += [
-                f"{words.hypothesis_label(name):<38.38} {words.format_probability(p):>7}  "
-                f"{'#' * round(30 * p)}".rstrip()
+                (
+                    f"{words.hypothesis_label(name):<{width}.{width}} "
+                    f"{words.format_probability(p):>7}  {'#' * round(30 * p)}"
+                ).rstrip()
                 for place, (name, p) in enumerate(rows)
                 if place == 0 or p >= 0.005
             ]
@@ -268,7 +273,11 @@ class Diagnosis(Findings):
         """What takes the mismatch of each block."""
         lines = []
         for block, own in words.budgets(self).items():
-            told = f"Budget of {block}: {words.budget_sentence(own)}".translate(_ASCII)
+            told = (
+                f"Budget of the {words.spoken_name(block)}: {words.budget_sentence(own)}".translate(
+                    _ASCII
+                )
+            )
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
         return ["", *lines] if lines else []
 
@@ -283,10 +292,10 @@ class Diagnosis(Findings):
         if not own.text:
             return []
         lines = ["", *textwrap.wrap(f"Next experiment: {own.text}", 96, subsequent_indent="  ")]
-        for pair in own.pairs:
-            if pair.text != own.text and own.pairs[0].between[0] in pair.between:
+        for pair, text in words.told_pairs(self):
+            if own.pairs[0].between[0] in pair.between:
                 between = " or ".join(words.hypothesis_label(name) for name in pair.between)
-                told = f"{between}? {pair.text}"
+                told = f"{between}? {text}"
                 lines += textwrap.wrap(told, 96, initial_indent="  ", subsequent_indent="    ")
         return lines
 
@@ -299,7 +308,7 @@ class Diagnosis(Findings):
         lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
         for channel, entry in channels.items():
             sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-            unit, factor = words.display_unit(UNITS.get(channel, ""), max(sizes, default=math.nan))
+            unit, factor = words.display_unit(unit_of(channel), max(sizes, default=math.nan))
             unit = unit.replace("°", "deg")
             row = f"{channel} [{unit}]" if unit else channel
             for key in ("noise", "before", "refit", "after"):

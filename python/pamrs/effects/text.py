@@ -11,6 +11,7 @@ from typing import Final
 
 from pamrs.effects import CATALOGUE, EffectInfo, EffectParameter, Form
 from pamrs.errors import ParameterError
+from pamrs.units import with_unit
 
 __all__ = ["catalogue", "description", "entry", "overview", "range_of", "snippet", "where"]
 
@@ -202,7 +203,7 @@ def _parameters(info: EffectInfo, form: Form) -> list[str]:
     rows = [
         (
             p.name,
-            f"{p.default:g} {p.unit}" if p.unit != "1" else f"{p.default:g}",
+            with_unit(f"{p.default:g}", p.unit),
             range_of(p),
             p.meaning,
         )

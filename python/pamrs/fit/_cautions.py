@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from pamrs.fit._estimate import Estimate, Problem
 from pamrs.fit._statistics import FitParameter
+from pamrs.units import with_unit
 
 __all__ = ["FAR", "cautions", "outlying"]
 
@@ -122,26 +123,24 @@ def _geometry(problem: Problem, found: Estimate, parameters: Parameters) -> list
     )
     for free in problem.free:
         item = parameters[free.name]
-        place = f"{free.name} = {item.value:.4g} {item.unit}"
+        place = with_unit(f"{free.name} = {item.value:.4g}", item.unit)
+        nominal = with_unit(f"{free.nominal:.4g}", item.unit)
         if math.isinf(free.tolerance):
             if abs(item.value - free.nominal) > _MOVED * abs(free.nominal):
                 share = 100.0 * (item.value / free.nominal - 1.0)
                 notes.append(
-                    f"{place} moved by {share:+.0f} % from the nominal {free.nominal:.4g} "
-                    f"{item.unit}: it stands for something else; give a tolerance"
+                    f"{place} moved by {share:+.0f} % from the nominal {nominal}: it stands for "
+                    "something else; give a tolerance"
                 )
             continue
         if item.stderr_plain > _UNINFORMED * free.tolerance:
             notes.append(
                 f"{free.name}: the data say nothing, its value is the prior's (tolerance "
-                f"{free.tolerance:.3g} {item.unit})"
+                f"{with_unit(f'{free.tolerance:.3g}', item.unit)})"
             )
         away = abs(free.moved(item.value))
         if away > FAR:
-            notes.append(
-                f"{place} lies {away:.1f} tolerances from the nominal {free.nominal:.4g} "
-                f"{item.unit}"
-            )
+            notes.append(f"{place} lies {away:.1f} tolerances from the nominal {nominal}")
     return notes
 
 

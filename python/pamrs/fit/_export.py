@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from pamrs.units import with_unit
+
 if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.rig import Rig
@@ -57,7 +59,9 @@ def fit_report(fit: MuscleFit) -> str:
         nominal = "" if item.init_value is None else f"   nominal {item.init_value:.5g}"
         known = "" if item.tolerance is None else f" +- {item.tolerance:.2g}"
         lines.append(
-            f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g}  {item.unit}{nominal}{known}"
+            with_unit(f"  {item.name:18} {item.value:12.5g} {item.stderr:11.2g} ", item.unit)
+            + nominal
+            + known
         )
     errors = fit.error_by_pressure()
     lines += [

@@ -13,7 +13,7 @@ from pamrs.comparison import Comparison, verdicts
 from pamrs.library import entry, names
 from pamrs.library._identify import derive
 from pamrs.library.published import compare, compare_all, table
-from pamrs.units import parse_unit
+from pamrs.units import parse_unit, with_unit
 
 __all__ = ["description", "facts", "overview"]
 
@@ -116,4 +116,4 @@ def _shown(name: str, value: Any) -> str:
     numbers = np.atleast_1d(np.asarray(value, dtype=np.float64)) / parse_unit(unit).scale
     numbers[np.abs(numbers) < 1e-12 * np.abs(numbers).max()] = 0.0
     text = ", ".join(f"{number:.5g}" for number in numbers)
-    return text if unit == "1" else f"{text} {unit}"
+    return with_unit(text, unit)

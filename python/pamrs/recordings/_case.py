@@ -170,7 +170,9 @@ def _document(file: Path, given: Path) -> dict[str, Any]:
     try:
         return parse_toml(read_toml(file))
     except FileNotFoundError:
-        raise CaseError(f"{given}: not a case folder, it has no case.toml") from None
+        below = next(iter(sorted([*given.glob("*/case.toml"), *given.glob("*/*/case.toml")])), None)
+        hint = "" if below is None else f"; did you mean {str(below.parent)!r}?"
+        raise CaseError(f"{given}: not a case folder, it has no case.toml{hint}") from None
     except OSError as error:
         raise CaseError(f"{file}: cannot be read ({error.strerror or error})") from error
     except UnicodeDecodeError as error:

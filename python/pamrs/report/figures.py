@@ -30,6 +30,7 @@ from pamrs.report.text import (
     is_number,
     label,
     ranked_probabilities,
+    spoken_name,
     term_label,
     told_probabilities,
 )
@@ -191,7 +192,9 @@ def _draw_curves(axes: Axes, trace: Trace, *, width: float = 1.2) -> None:
         plot(trace.refit, "refit", "parameters refitted", lw=width, ls=(0, (5, 2)))
     if trace.after is not None and _has(trace.after, trace.refit):
         plot(trace.after, "after", "after: with what was found", lw=width)
-    axes.set_ylabel(f"{label(trace.channel)} [{unit}]" if unit else label(trace.channel))
+    axes.set_ylabel(
+        f"{spoken_name(trace.channel)} [{unit}]" if unit else spoken_name(trace.channel)
+    )
 
 
 def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: float = 1.0) -> None:
@@ -331,7 +334,9 @@ def _separating(curves: Curves) -> Figure:
             {"lw": 2.6, "alpha": 0.75} if place == 0 else {"lw": 1.2, "ls": (0, (4 + place, 2))}
         )
         upper.plot(x, factor * y, color=colours[name], label=hypothesis_label(name), **style)
-    upper.set_ylabel(f"{label(curves.channel)} [{unit}]" if unit else label(curves.channel))
+    upper.set_ylabel(
+        f"{spoken_name(curves.channel)} [{unit}]" if unit else spoken_name(curves.channel)
+    )
     upper.set_title("predicted from the same commands")
     legend_above(upper)
     unit, factor = display_unit(curves.unit, _largest(*left.values()))
@@ -454,7 +459,7 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
     low, high = min(reached), max(reached)
     axes.set_xlim(100.0 * low - 3.0, 100.0 * (high + 0.16 * (high - low)))
     axes.grid(axis="y", visible=False)
-    axes.set_title(label(block), loc="left", fontsize="medium")
+    axes.set_title(spoken_name(block), loc="left", fontsize="medium")
 
 
 def _grids(
@@ -575,7 +580,7 @@ def summary_png(diagnosis: Findings) -> bytes:
             _draw_residuals(lower, trace, _noise(diagnosis, trace), width=0.8)
             role = "held-out recording" if trace.role == "held_out" else "fitted recording"
             upper.set_title(
-                f"{label(trace.channel).capitalize()}, {role} {trace.recording}", pad=20
+                f"{spoken_name(trace.channel).capitalize()}, {role} {trace.recording}", pad=20
             )
             lower.set_title("What the model does not explain", pad=20)
             for panel in (upper, lower):

@@ -9,7 +9,7 @@ from typing import Any
 
 from markupsafe import Markup
 
-from pamrs.channels import UNITS
+from pamrs.channels import UNITS, channel_of
 from pamrs.findings import ChannelError, Findings, Trace
 from pamrs.report import figures
 from pamrs.report import text as words
@@ -123,7 +123,7 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
             ]
             sizes.append(
                 {
-                    "block": words.label(block.block.replace(".", " ")),
+                    "block": words.spoken_name(block.block),
                     "refit": shown[0],
                     "after": shown[1],
                 }
@@ -152,10 +152,10 @@ def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
         errors = []
         for channel, error in entry.held_out.items():
             shown, scale = words.display_unit(
-                UNITS.get(channel.partition(".")[0], ""), max(error.values())
+                UNITS.get(channel_of(channel), ""), max(error.values())
             )
             before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
-            errors.append(f"{words.label(channel)}: {before} to {after} {shown}")
+            errors.append(f"{words.spoken_name(channel)}: {before} to {after} {shown}")
         interval = [float(v) * factor for v in entry.interval]
         rows.append(
             {
@@ -245,7 +245,9 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
     rows = []
     for channel, entry in errors.items():
         sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-        unit, factor = words.display_unit(UNITS.get(channel, ""), max(sizes, default=math.nan))
+        unit, factor = words.display_unit(
+            UNITS.get(channel_of(channel), ""), max(sizes, default=math.nan)
+        )
         noise = entry.noise
         cells = []
         for key in ("noise", "before", "refit", "after"):
@@ -259,7 +261,7 @@ def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
             times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
             shown = words.format_number(float(value) * factor) if good else "–"
             cells.append({"key": key, "value": shown, "times": "" if key == "noise" else times})
-        rows.append({"channel": words.label(channel), "unit": unit, "cells": cells})
+        rows.append({"channel": words.spoken_name(channel), "unit": unit, "cells": cells})
     return rows
 
 
@@ -299,7 +301,7 @@ def _free_run(diagnosis: Findings) -> list[dict[str, Any]]:
             rows.append(
                 {
                     "recording": run.recording if k == 0 else "",
-                    "channel": words.label(channel),
+                    "channel": words.spoken_name(channel),
                     "unit": unit,
                     "cells": cells,
                 }
@@ -383,8 +385,8 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
         )
     if diagnosis.where.block:
         channel = diagnosis.where.channel
-        seen = f"block; seen in {words.label(channel)}" if channel else "block"
-        facts.append((words.label(diagnosis.where.block), seen))
+        seen = f"block; seen in {words.spoken_name(channel)}" if channel else "block"
+        facts.append((words.spoken_name(diagnosis.where.block), seen))
     facts.append(
         (
             f"{diagnosis.seconds:.0f} s"
@@ -416,9 +418,8 @@ def _separating(diagnosis: Findings) -> str | None:
 def _pairs(diagnosis: Findings) -> list[tuple[str, str]]:
     """What tells each two hypotheses that are left open apart."""
     return [
-        (" or ".join(words.hypothesis_label(name) for name in pair.between), pair.text)
-        for pair in diagnosis.next_experiment.pairs
-        if pair.text != diagnosis.next_experiment.text
+        (" or ".join(words.hypothesis_label(name) for name in pair.between), text)
+        for pair, text in words.told_pairs(diagnosis)
     ]
 
 
@@ -472,13 +473,13 @@ def render(diagnosis: Findings) -> str:
         free_notes=_free_notes(diagnosis),
         blocks=_markup(figures.blocks_svg(diagnosis)),
         map=_markup(figures.map_svg(diagnosis)),
-        map_block=words.label(shown or diagnosis.where.block or ""),
+        map_block=words.spoken_name(shown or diagnosis.where.block or ""),
         probabilities=_probabilities(diagnosis),
         effects=_effects(diagnosis),
         verdicts=_blocks(diagnosis),
         budget=_markup(figures.budget_svg(diagnosis)),
         budgets=[
-            f"{words.label(block)}: {words.budget_sentence(own)}"
+            f"{words.spoken_name(block)}: {words.budget_sentence(own)}"
             for block, own in words.budgets(diagnosis).items()
         ],
         wrong=_wrong(diagnosis),

@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -27,21 +27,19 @@ __all__ = ["channels_png", "write_animation"]
 
 Array = NDArray[np.float64]
 
-#: Panels from top to bottom: (title, unit, factor from SI, channels); those of which nothing was
+#: Panels from top to bottom: title and channels, which have one unit; those of which nothing was
 #: simulated are left out.
 _PANELS: Final = (
-    ("valve command", "V", 1.0, ("valve_command",)),
+    ("valve command", ("valve_command",)),
     (
         "pressure, gauge",
-        "bar",
-        1e-5,
         ("supply_command", "supply_pressure", "line_pressure", "muscle_pressure"),
     ),
-    ("joint angle", "deg", 180.0 / math.pi, ("joint_angle",)),
-    ("joint torque of the muscles", "N m", 1.0, ("joint_torque",)),
-    ("length of the muscle", "mm", 1e3, ("length",)),
-    ("muscle force", "N", 1.0, ("muscle_force",)),
-    ("gas temperature", "K", 1.0, ("temperature",)),
+    ("joint angle", ("joint_angle",)),
+    ("joint torque of the muscles", ("joint_torque",)),
+    ("length of the muscle", ("length",)),
+    ("muscle force", ("muscle_force",)),
+    ("gas temperature", ("temperature",)),
 )
 #: A recorded channel that is drawn beside a simulated one of another name.
 _RECORDED_AS: Final = {"muscle_force": "force"}
@@ -59,7 +57,9 @@ _OWN: Final = (COLOURS["after"], "#0f766e", "#b45309", "#7c3aed", "#be123c", "#4
 
 
 def channels_png(
-    result: Simulation, measured: Mapping[str, tuple[Array, Array]] | None = None
+    result: Simulation,
+    measured: Mapping[str, tuple[Array, Array]] | None = None,
+    nominal: Simulation | None = None,
 ) -> bytes:
     """Channels of a simulation over time, a PNG.
 
@@ -69,61 +69,34 @@ def channels_png(
         What :func:`pamrs.simulate` returns.
     measured : mapping of str to (time, value), optional
         Recorded channels to draw beside them [s, SI].
+    nominal : Simulation, optional
+        The same run of the rig file, where ``result`` is that of a model that was made of it.
 
     Returns
     -------
     bytes
     """
     given = measured or {}
-    there = [(title, unit, factor, _of(result, heads)) for title, unit, factor, heads in _PANELS]
-    there = [panel for panel in there if panel[3]]
+    there = [(title, _of(result, heads)) for title, heads in _PANELS]
+    there = [panel for panel in there if panel[1]]
     moving = [
         panel
         for panel in there
-        if any(_tells(result, name) or _recorded(name, given) for name in panel[3])
+        if any(_tells(result, name) or _recorded(name, given) for name in panel[1])
     ] or there
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 1.0 + 1.75 * len(moving)), dpi=110, layout="constrained")
         rows = figure.subplots(len(moving), 1, sharex=True, squeeze=False)[:, 0]
-        for axes, (title, unit, factor, names) in zip(rows, moving, strict=True):
-            heads = [channel_of(name) for name in names]
-            for name, head in zip(names, heads, strict=True):
-                label, nth = (
-                    _label(name, len(set(heads)) > 1),
-                    [n for n in names if channel_of(n) == head].index(name),
-                )
-                other = _recorded(name, given)
-                if other:
-                    time, value = given[other]
-                    axes.plot(
-                        time,
-                        factor * value,
-                        color=COLOURS["measured"],
-                        lw=2.6,  # seen beside a thin line that follows it
-                        alpha=0.6,
-                        label=f"{label} recorded".strip(),
-                    )
-                time, value = decimate(result.time, factor * result[name])
-                faint = (
-                    head in ("supply_pressure", "supply_command", "line_pressure")
-                    and len(set(heads)) > 1
-                )
-                style = {"supply_command": "--", "line_pressure": ":"}.get(head, "-")
-                colour = (
-                    _FAINT
-                    if faint and nth == 0 and head == "supply_pressure"
-                    else _OWN[nth % len(_OWN)]
-                )
-                axes.plot(
-                    time, value, style, color=colour, lw=1.3, label=f"{label} simulated".strip()
-                )
+        for axes, (title, names) in zip(rows, moving, strict=True):
+            for name in names:
+                _draw_channel(axes, name, names, result, given, nominal)
             axes.set_title(title)
-            axes.set_ylabel(unit)
+            axes.set_ylabel(laboratory_unit(names[0])[0])
             if len(axes.lines) > 1:
                 axes.legend(
                     loc="lower right",
                     bbox_to_anchor=(1.0, 1.0),
-                    ncols=4,
+                    ncols=6,
                     fontsize="small",
                     borderaxespad=0.1,
                 )
@@ -131,6 +104,62 @@ def channels_png(
         stream = io.BytesIO()
         figure.savefig(stream, format="png")
     return stream.getvalue()
+
+
+def _draw_channel(
+    axes: Axes,
+    name: str,
+    names: list[str],
+    result: Simulation,
+    given: Mapping[str, tuple[Array, Array]],
+    nominal: Simulation | None,
+) -> None:
+    """One channel of a panel: recorded, of the rig file, simulated. A colour is a block; how a line
+    is drawn says what it is, and the legend says so once.
+    """
+    head, heads = channel_of(name), {channel_of(other) for other in names}
+    label = _label(name, len(heads) > 1)
+    nth = [n for n in names if channel_of(n) == head].index(name)
+    factor = laboratory_unit(name)[1]
+    faint = head == "supply_pressure" and nth == 0 and len(heads) > 1
+    colour = _FAINT if faint else _OWN[nth % len(_OWN)]
+    told = {line.get_label() for line in axes.lines}
+    other = _recorded(name, given)
+    if other:
+        time, value = given[other]
+        axes.plot(
+            time,
+            factor * value,
+            color=COLOURS["measured"],
+            lw=2.6,  # seen beside a thin line that follows it
+            alpha=0.6,
+            label="_" if "recorded" in told else "recorded",
+        )
+    beside = nominal if nominal is not None and name in nominal and _answers(head) else None
+    if beside is not None:
+        time, value = decimate(beside.time, factor * beside[name])
+        axes.plot(
+            time,
+            value,
+            "--",
+            color=colour if len(names) > 1 else COLOURS["before"],
+            lw=1.1,
+            label="_" if "rig file" in told else "rig file",
+        )
+    time, value = decimate(result.time, factor * result[name])
+    axes.plot(
+        time,
+        value,
+        {"supply_command": "--", "line_pressure": ":"}.get(head, "-"),
+        color=colour,
+        lw=1.3,
+        label=f"{label} {'simulated' if beside is None else 'model'}".strip(),
+    )
+
+
+def _answers(head: str) -> bool:
+    """Whether a channel is what a rig does, and not what it is told to do."""
+    return head not in ("valve_command", "supply_command")
 
 
 def _of(result: Simulation, heads: tuple[str, ...]) -> list[str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import os
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeGuard
 
@@ -14,9 +16,12 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     Findings,
+    PairExperiment,
     Unexplained,
     WrongParameter,
 )
+from pamrs.rig.schema import BLOCKS
+from pamrs.units import with_unit
 
 __all__ = [
     "blocks_label",
@@ -47,9 +52,12 @@ __all__ = [
     "sentence_of",
     "set_label",
     "span95",
+    "spoken_block",
+    "spoken_name",
     "term_label",
     "told_apart",
     "told_blocks",
+    "told_pairs",
     "told_probabilities",
 ]
 
@@ -64,6 +72,9 @@ _LABELS = {
 SETTLED = 0.75
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
 settled, `VerdictSettings.settled`)."""
+
+_INSTRUCTION = 40
+"""Characters that two texts share at least before they are said to begin with one instruction."""
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DISPLAY = {
@@ -86,9 +97,7 @@ def set_label(identifiers: list[str]) -> str:
     """Readable name of a hypothesis: effects that act together, parameters that are wrong."""
     if not identifiers:
         return label("none")
-    return " + ".join(
-        f"wrong {label(i.replace('.', ' '))}" if "." in i else label(i) for i in identifiers
-    )
+    return " + ".join(f"wrong {spoken_name(i)}" if "." in i else label(i) for i in identifiers)
 
 
 def hypothesis_label(key: str) -> str:
@@ -210,7 +219,7 @@ def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
 
 def blocks_label(block: BlockVerdict) -> str:
     """The blocks of a group, in words: ``supply and chamber``."""
-    return " and ".join(_spoken(name) for name in block.blocks)
+    return " and ".join(spoken_name(name) for name in block.blocks)
 
 
 def is_named(block: BlockVerdict, hypothesis: str) -> bool:
@@ -240,8 +249,8 @@ def sentence_of(wrong: WrongParameter) -> str:
     values = {key: float(v) * factor if is_number(v := wrong[key]) else math.nan for key in keys}
     found = format_uncertain(values["value"], values["std"], unicode=False)
     stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
-    shown = "" if unit in ("", "1") else f" {unit}".replace("°", "deg")
-    return f"{_spoken(wrong.name)} is {found}{shown}, not {stated}"
+    shown = with_unit(found, unit.replace("°", "deg"))
+    return f"{spoken_name(wrong.name)} is {shown}, not {stated}"
 
 
 def kept_sentence(kept: Unexplained) -> str:
@@ -257,7 +266,7 @@ def kept_sentence(kept: Unexplained) -> str:
     )
     times = format_number(kept.noises, 2, unicode=False)
     return (
-        f"the residual of the {_spoken(kept.block)} is {times} times the noise level ({size} "
+        f"the residual of the {spoken_name(kept.block)} is {times} times the noise level ({size} "
         f"{unit}), and {why}"
     ).replace("°", "deg")
 
@@ -275,11 +284,77 @@ def kept_details(kept: Unexplained) -> str:
     return text
 
 
-def _spoken(name: str) -> str:
-    """A block or a parameter of the rig file by its dotted name, in words: ``chamber flexor``,
-    ``chamber dead volume``.
+def spoken_name(name: str) -> str:
+    """A block, a channel or a parameter by its dotted name, in words.
+
+    Parameters
+    ----------
+    name : str
+        For example ``"chamber.flexor"``.
+
+    Returns
+    -------
+    str
+        What it is first, then of which block where several have one.
+
+    Examples
+    --------
+    >>> spoken_name("chamber.dead_volume"), spoken_name("chamber.flexor.dead_volume")
+    ('chamber dead volume', 'chamber dead volume of flexor')
+    >>> spoken_name("sensors.flexor.pressure_zero"), spoken_name("muscle_pressure.flexor")
+    ('pressure zero of flexor', 'muscle pressure of flexor')
+    >>> spoken_name("sensors.pressure_zero"), spoken_name("chamber.flexor")
+    ('pressure zero of the sensors', 'chamber of flexor')
     """
-    return label(name.replace(".", " "))
+    kind, *rest = name.split(".")
+    keys = {key.name for key in BLOCKS.get(kind, ())}
+    own = rest.pop() if rest and (kind in EFFECTS or rest[-1] in keys or len(rest) > 1) else ""
+    group = " ".join(rest)
+    if kind == "sensors" and own:
+        return f"{label(own)} of {label(group) if group else 'the sensors'}"
+    what = " ".join(label(part) for part in (kind, own) if part)
+    return f"{what} of {label(group)}" if group else what
+
+
+def spoken_block(name: str) -> str:
+    """A block of a diagnosis in words: ``chamber block``, ``chamber block of flexor``."""
+    kind, _, group = name.partition(".")
+    return f"{label(kind)} block of {label(group)}" if group else f"{label(kind)} block"
+
+
+def told_pairs(diagnosis: Findings) -> list[tuple[PairExperiment, str]]:
+    """What tells each two hypotheses that are left open apart; an instruction that was given before
+    is not given again.
+    """
+    own = diagnosis.next_experiment
+    before = {own.text: "The same experiment."}
+    found = []
+    for pair in own.pairs:
+        if pair.text == own.text:
+            continue
+        shared = max((_shared(pair.text, text) for text in before), default=0)
+        first = next(text for text in before if _shared(pair.text, text) == shared)
+        told = pair.text
+        if shared:
+            rest = pair.text[shared:].lstrip(" .;:")
+            told = f"{before[first]} {rest[:1].upper()}{rest[1:]}".strip()
+        found.append((pair, told))
+        between = " or ".join(hypothesis_label(name) for name in pair.between)
+        before.setdefault(pair.text, f"The experiment for {between}.")
+    return found
+
+
+def _shared(one: str, other: str) -> int:
+    """Length of the instruction with which two texts begin: up to the end of a part of a sentence
+    in both; 0 where it is too short to be one.
+    """
+    common = len(os.path.commonprefix([one, other]))
+    ends = [
+        n
+        for n in range(_INSTRUCTION, common + 1)
+        if all(not text[n:] or re.match(r"[.;](\s|$)", text[n:]) for text in (one, other))
+    ]
+    return max(ends, default=0)
 
 
 def headline(diagnosis: Findings) -> str:
@@ -334,7 +409,7 @@ def _place(diagnosis: Findings, block: BlockVerdict) -> str:
         # not the block that the answer is about first: the one of the group that misses most
         worst = max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
         located = worst.block if worst else next(iter(block.blocks), None)
-    return f" in the {_spoken(located)}" if located else ""
+    return f" in the {spoken_name(located)}" if located else ""
 
 
 def _found(diagnosis: Findings, block: BlockVerdict) -> str:
@@ -470,7 +545,7 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
 def _unnamed(diagnosis: Findings) -> str:
     """The headline of a diagnosis without a name."""
     block = diagnosis.where.block
-    place = f" in the {_spoken(block)}" if block else ""
+    place = f" in the {spoken_name(block)}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
     rivals = " or ".join(_answer(s, chance_of(diagnosis.probabilities, s)) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
@@ -478,21 +553,33 @@ def _unnamed(diagnosis: Findings) -> str:
             "The model explains these recordings down to the noise level, but they cannot rule out "
             f"{rivals}{place}"
         )
+    beside = _beside_held(diagnosis)
     if diagnosis.verdict == "none":
-        return "Nothing is missing: the model explains these recordings down to the noise level"
+        return (
+            f"Nothing is missing{beside}: the model explains these recordings down to the noise "
+            "level"
+        )
     if diagnosis.verdict == "parameters" and doubtful:
         return (
             "Parameter values may explain the difference; these recordings cannot rule out "
             f"{rivals}{place}"
         )
     if diagnosis.verdict == "parameters":
-        moved = [label(n.replace(".", " ")) for n in moved_parameters(diagnosis)[:3]]
+        moved = [spoken_name(n) for n in moved_parameters(diagnosis)[:3]]
         which = f": {', '.join(moved)}" if moved else ""
-        return f"No physics is missing; parameter values explain the difference{which}"
+        return f"No physics is missing{beside}; parameter values explain the difference{which}"
     if len(doubtful) > 1:
         apart = told_apart(doubtful, diagnosis.probabilities)
         return f"Physics is missing{place}: these recordings cannot tell {apart}"
     return _outside(diagnosis, place)
+
+
+def _beside_held(diagnosis: Findings) -> str:
+    """The effects that the model had before: `` beside the muscle leak that the model holds``."""
+    ids = [term.id for term in diagnosis.budget if term.kind == "held"]
+    ids += [name.partition(".")[0] for name in diagnosis.parameters]
+    held = [f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS]
+    return f" beside {' and '.join(held)} that the model holds" if held else ""
 
 
 def _outside(diagnosis: Findings, place: str) -> str:

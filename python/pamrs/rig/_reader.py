@@ -30,7 +30,7 @@ from pamrs.rig.schema import (
     qualified,
     tables_of,
 )
-from pamrs.units import to_si
+from pamrs.units import to_si, with_unit
 
 __all__ = ["Content", "Reader", "read_model"]
 
@@ -372,9 +372,10 @@ class Reader:
         except OverflowError:
             value = math.inf
         if not (math.isfinite(value) and lower <= value <= upper):
-            given = "" if unit == si_unit else f" ({number:g} {unit})"
-            allowed = f"a finite number from {lower:g} to {upper:g} {si_unit}"
-            self.problem(f"{label} = {value:g} {si_unit}{given} is not allowed: {allowed}")
+            given = "" if unit == si_unit else f" ({with_unit(f'{number:g}', unit)})"
+            allowed = with_unit(f"a finite number from {lower:g} to {upper:g}", si_unit)
+            wrong = with_unit(f"{label} = {value:g}", si_unit)
+            self.problem(f"{wrong}{given} is not allowed: {allowed}")
             return None
         return value
 

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from pamrs._checks import checked_number, checked_table
 from pamrs._files import read_toml
-from pamrs.errors import ParameterError, RigError, joined
+from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
 from pamrs.rig._switching import Entry, full_name, new_entry, placed, without
@@ -308,8 +308,8 @@ class Rig:
         table = tables_of(model, block).get(name, {}) if block in BLOCKS else {}
         key = next((key for key in BLOCKS.get(block, ()) if key.name == own and own in table), None)
         if key is None or key.kind not in ("scalar", "count"):
-            known = ", ".join(scalar for scalar, _ in self._scalars())
-            raise ParameterError(f"rig {self.name!r} has no parameter {dotted!r}; it has: {known}")
+            hint = meant(dotted, [scalar for scalar, _ in self._scalars()])
+            raise ParameterError(f"rig {self.name!r} has no parameter {dotted!r}; {hint}")
         return table, key
 
     # ----------------------------------------------------------------- changing

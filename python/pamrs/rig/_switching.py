@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pamrs._checks import checked_number, checked_table
-from pamrs.errors import ParameterError, joined
+from pamrs.errors import ParameterError, joined, meant
 from pamrs.rig._ports import bare, effect_problem, hanging_problem, near_name
 from pamrs.rig.schema import qualified
 
@@ -43,7 +43,7 @@ def new_entry(
     spread = {} if std is None else checked_table("std", std)
     known = [parameter.name for parameter in info.form(form).parameters]
     problems = [
-        f"unknown parameter {name!r}; it has: {', '.join(known)}"
+        f"unknown parameter {name!r}; {meant(name, known)}"
         for name in dict.fromkeys([*given, *spread])
         if name not in known
     ]

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from importlib import resources
 from typing import TYPE_CHECKING, Final
 
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, meant
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
@@ -43,7 +43,7 @@ def names() -> list[str]:
 def _text(name: str) -> str:
     if name not in names():
         raise ParameterError(
-            f"rig = {name!r} does not come with the package; there are: {', '.join(names())}"
+            f"rig = {name!r} does not come with the package; {meant(name, names())}"
         )
     return resources.files(__name__).joinpath(f"{name}.toml").read_text(encoding="utf-8")
 
@@ -176,5 +176,7 @@ def sealed_chamber() -> Rig:
 def __getattr__(name: str) -> Callable[[], Rig]:
     """Every rig of the package as a function, as ``shoulder``: ``pamrs.rigs.elbow()``."""
     if name.startswith("_") or name not in names():
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        raise AttributeError(
+            f"module {__name__!r} has no attribute {name!r}; {meant(name, names())}"
+        )
     return functools.partial(named, name)

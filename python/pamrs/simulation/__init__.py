@@ -9,7 +9,7 @@ recording.
 from __future__ import annotations
 
 from pamrs.simulation._batch import Batch, BatchRun, Failure
-from pamrs.simulation._driving import has_frame, regulators_of
+from pamrs.simulation._driving import has_frame, initial_names, input_names, regulators_of
 from pamrs.simulation._replay import differences, replay
 from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
 from pamrs.simulation._simulation import (
@@ -36,6 +36,8 @@ __all__ = [
     "default_step",
     "differences",
     "has_frame",
+    "initial_names",
+    "input_names",
     "regulators_of",
     "replay",
     "simulate",

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs.channels import channel_of, dotted
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, meant
 from pamrs.simulation._plants import rowwise
 
 if TYPE_CHECKING:
@@ -22,7 +22,9 @@ __all__ = [
     "Inputs",
     "Signals",
     "has_frame",
+    "initial_names",
     "initial_values",
+    "input_names",
     "inputs_of",
     "keywords",
     "regulators_of",
@@ -126,6 +128,14 @@ class Inputs:
         self._ambient = float(rig.tables("gas")[""]["ambient_pressure"])
         # One valve and nothing else that must be given: what most loops answer.
         self._only = self._valves[0] if len(self._valves) == 1 and not self._frame else None
+
+    @property
+    def names(self) -> list[str]:
+        """Every signal that can be given."""
+        found = [*self._valves, *(["length"] if self._frame else [])]
+        found += [dotted("supply_command", name) for name in self._names["supply_command"][0]]
+        chambers = [name for name in self._names["pressure"][0] if name not in self._fed]
+        return found + [dotted("pressure", name) for name in chambers]
 
     def named(
         self,
@@ -244,6 +254,39 @@ def inputs_of(rig: Rig) -> Inputs:
     return inputs
 
 
+def input_names(rig: Rig) -> list[str]:
+    """Every signal that a rig takes.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+
+    Returns
+    -------
+    list of str
+        ``valve_command.elbow``, ``supply_command``, ``length``, ``pressure.flexor``: those that it
+        needs first.
+    """
+    return inputs_of(rig).names
+
+
+def initial_names(rig: Rig) -> list[str]:
+    """Every state of a rig that an initial value can be given for.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model.
+
+    Returns
+    -------
+    list of str
+        ``muscle_pressure.flexor``, ``joint_angle.elbow``.
+    """
+    return [dotted(state, name) for state, block in _INITIAL.items() for name in rig.tables(block)]
+
+
 def keywords(answer: Any) -> dict[str, Any]:
     """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
     known = ("valve_command", "supply_command", "length", "pressure")
@@ -262,9 +305,7 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
     for name, value in (initial or {}).items():
         channel, _, block = name.partition(".")
         if channel not in _INITIAL:
-            raise ParameterError(
-                f"initial has the unknown entry {name!r}; allowed: {', '.join(_INITIAL)}"
-            )
+            raise ParameterError(f"initial has the unknown entry {name!r}; {meant(name, _INITIAL)}")
         tables = rig.tables(_INITIAL[channel])
         if not tables:
             raise ParameterError(
@@ -272,8 +313,8 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
             )
         if block not in tables:
             raise ParameterError(
-                f"initial has {name!r}; the rig {rig.name!r} has: "
-                f"{', '.join(dotted(channel, other) for other in tables)}"
+                f"initial has {name!r}, which the rig {rig.name!r} does not have; "
+                f"{meant(name, [dotted(channel, other) for other in tables])}"
             )
         try:
             start[name] = float(value)
@@ -318,8 +359,8 @@ def _named(
     for name in given:
         if name not in names:
             raise ParameterError(
-                f"{channel} has {name!r}, and the rig has no {block} of that name; it has: "
-                f"{', '.join(names) or 'none'}"
+                f"{channel} has {name!r}, and the rig has no {block} of that name; "
+                f"{meant(str(name), names)}"
             )
     return {dotted(channel, name): values for name, values in given.items()}
 
@@ -334,6 +375,11 @@ def _signal(
         raise ParameterError(f"{name} is not allowed: numbers are needed") from None
     if signal.ndim == 0 and rows is not None:
         signal = np.full(rows, float(signal))
+    if signal.ndim == 0:
+        raise ParameterError(
+            f"{name} = {float(signal):g} is one number: duration is missing, how long it is held "
+            "(or give one value for each row)"
+        )
     if signal.ndim != 1 or signal.size == 0 or (rows is not None and signal.size != rows):
         needed = "(n,) with n >= 1" if rows is None else f"({rows},)"
         raise ParameterError(

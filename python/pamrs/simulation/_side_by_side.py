@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import check_column
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
@@ -144,7 +145,7 @@ def simulate_batch(
         _driven(signals, begin, count, rows),
         sample_time,
         chosen_step(sample_time, step),
-        {name: rowwise(name, values, count) for name, values in (parameters or {}).items()},
+        _parameters(rig, parameters or {}, count),
         begin,
         wanted,
         every,
@@ -157,6 +158,17 @@ def simulate_batch(
         status=tuple(None if why is None else Failure(*why) for why in ended),
         reduced=dict(zip(reduced, numbers, strict=True)),
     )
+
+
+def _parameters(rig: Rig, given: Mapping[str, ArrayLike], count: int) -> dict[str, Array]:
+    """Parameters with a value for each plant, inside what a rig file may say."""
+    found = {name: rowwise(name, values, count) for name, values in given.items()}
+    known = rig.parameters if found else {}
+    for name, values in found.items():
+        if name in known:
+            limits = known[name]
+            check_column(name, values, limits.lower, limits.upper, limits.unit)
+    return found
 
 
 def _numbers(name: str, values: ArrayLike) -> Array:

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,8 +16,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of, dotted
-from pamrs.errors import PamrsError, ParameterError
+from pamrs.channels import channel_of, dotted, laboratory_unit
+from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
 
@@ -40,7 +41,8 @@ class Event(NamedTuple):
         ``choked``, ``unchoked``; ``vacuum_reached`` and ``vacuum_left`` (a chamber falls 50 mbar
         below the ambient pressure, and no longer is there); ``max_pressure_passed`` and
         ``max_pressure_kept`` (it rises above ``limits.max_pressure`` of the rig file, and is below
-        it again).
+        it again); ``command_clipped`` and ``command_in_range`` (a valve is asked for more than
+        ``null_voltage`` +- ``half_range`` and stays at that end, and no longer is).
     block : str
         Where: ``joint.elbow``, ``load``, ``chamber``, ``valve.flexor``, ``line``.
     """
@@ -140,6 +142,47 @@ class Balance:
         )
 
 
+class _Clipped(NamedTuple):
+    """A command that is beyond the range of its valve.
+
+    Attributes
+    ----------
+    block : str
+        The valve.
+    times : list of float
+        When it leaves the range and when it is back [s], in turn.
+    worst : float
+        The command that is farthest beyond [V].
+    range : (float, float)
+        What the valve follows [V].
+    """
+
+    block: str
+    times: list[float]
+    worst: float
+    range: tuple[float, float]
+
+    def events(self) -> list[Event]:
+        """When it begins and ends."""
+        kinds = ("command_clipped", "command_in_range")
+        return [Event(time, kinds[k % 2], self.block) for k, time in enumerate(self.times)]
+
+    def words(self) -> str:
+        """The same as one line."""
+        end = f"to {self.times[1]:.4g} s" if len(self.times) > 1 else "to the end"
+        low, high = self.range
+        return (
+            f"{self.block}: command clipped to its range of {low:.4g} to {high:.4g} V from "
+            f"{self.times[0]:.4g} s {end}{_again(-(-len(self.times) // 2))}; "
+            f"{self.worst:.4g} V was asked for"
+        )
+
+
+def _again(count: int) -> str:
+    """How often something happened that was told once."""
+    return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
+
+
 class Simulation(Mapping[str, Array]):
     """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
 
@@ -152,9 +195,31 @@ class Simulation(Mapping[str, Array]):
     ) -> None:
         self._channels = dict(channels)
         self.rig = rig
-        self.events = [Event(*event) for event in events]
-        """Stops that were reached or left, flows that became choked or no longer are, in the order
-        of time."""
+        self._happened = [Event(*event) for event in events]
+
+    @cached_property
+    def events(self) -> list[Event]:
+        """Stops that were reached or left, flows that became choked or no longer are, commands
+        beyond the range of their valve, in the order of time.
+        """
+        clipped = [event for own in self._clipped() for event in own.events()]
+        return sorted([*self._happened, *clipped], key=lambda event: event.time)
+
+    def _clipped(self) -> list[_Clipped]:
+        """Commands that are beyond the range of their valve at some time."""
+        found = []
+        for name, command in self.under("valve_command").items():
+            valve = self.rig.tables("valve")[name]
+            null, half = valve["null_voltage"], valve["half_range"]
+            held = command[:-1] if command.size > 1 else command  # the last one is not run
+            beyond = np.abs(held - null) > half * (1.0 + _BEYOND_RANGE)
+            if beyond.any():
+                edges = np.flatnonzero(np.diff(beyond, prepend=False))
+                times = [float(t) for t in self.time[edges]]
+                worst = float(held[np.argmax(np.abs(held - null))])
+                block = dotted("valve", name)
+                found.append(_Clipped(block, times, worst, (null - half, null + half)))
+        return found
 
     @property
     def time(self) -> Array:
@@ -166,7 +231,7 @@ class Simulation(Mapping[str, Array]):
             return self._channels[channel]
         except KeyError:
             raise KeyError(
-                f"no channel {channel!r}; there are: {', '.join(self._channels)}"
+                f"no channel {channel!r}; {meant(str(channel), self._channels)}"
             ) from None
 
     def __iter__(self) -> Iterator[str]:
@@ -262,11 +327,8 @@ class Simulation(Mapping[str, Array]):
         """
         self._check_whole("summary()")
         said = [f"{self.rig.name}: {self.time[-1]:g} s, {self.time.size} rows"]
-        for channel, unit, factor in (
-            ("muscle_pressure", "bar", 1e-5),
-            ("joint_angle", "deg", 180.0 / math.pi),
-            ("length", "mm", 1e3),
-        ):
+        for channel in ("muscle_pressure", "joint_angle", "length"):
+            unit, factor = laboratory_unit(channel)
             for block, values in self.under(channel).items():
                 low, high, last = (
                     factor * float(v) for v in (values.min(), values.max(), values[-1])
@@ -275,13 +337,15 @@ class Simulation(Mapping[str, Array]):
                     f"{dotted(channel, block)}: from {low:.4g} to {high:.4g} {unit}, at the end "
                     f"{last:.4g} {unit}"
                 )
-        kinds = dict.fromkeys((event.block, event.kind) for event in self.events)
+        kinds = dict.fromkeys((event.block, event.kind) for event in self._happened)
         for block, kind in kinds:
             times = [
-                event.time for event in self.events if (event.block, event.kind) == (block, kind)
+                event.time for event in self._happened if (event.block, event.kind) == (block, kind)
             ]
-            often = "" if len(times) == 1 else f" and {len(times) - 1} times more"
-            said.append(f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{often}")
+            said.append(
+                f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{_again(len(times))}"
+            )
+        said += [own.words() for own in self._clipped()]
         return "\n".join([*said, *self._beyond(), *self._fallen(), str(self.balance)])
 
     def _beyond(self) -> list[str]:
@@ -324,6 +388,7 @@ class Simulation(Mapping[str, Array]):
         path: str | os.PathLike[str],
         *,
         recorded: Mapping[str, tuple[Array, Array]] | None = None,
+        nominal: Simulation | None = None,
     ) -> Path:
         """Write a picture of the channels over time, a PNG.
 
@@ -333,6 +398,9 @@ class Simulation(Mapping[str, Array]):
             The file.
         recorded : mapping of str to (time, value), optional
             Recorded channels to draw beside them [s, SI].
+        nominal : Simulation, optional
+            The same run of another rig to draw beside it: that of the rig file, where this one is
+            of a diagnosed model.
 
         Returns
         -------
@@ -346,7 +414,7 @@ class Simulation(Mapping[str, Array]):
         """
         from pamrs._writing import write_atomically
 
-        return write_atomically(path, _motion().channels_png(self, recorded))
+        return write_atomically(path, _motion().channels_png(self, recorded, nominal))
 
     def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
         """Write the arm as it moves, an animated GIF.
@@ -627,6 +695,8 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
 _TELLING_DEGREES = 1.0
+#: Of a valve's half range: recorded commands that scatter about its end are not beyond it.
+_BEYOND_RANGE = 0.01
 #: Channels of the core that are sums since the start.
 _HEAT_BALANCES = ("enthalpy_gained", "heat_gained", "gas_work")
 _BALANCES = (

@@ -14,9 +14,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import check_column
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
-from pamrs.errors import ParameterError
+from pamrs.errors import ParameterError, meant
 from pamrs.rig import Rig
 
 __all__ = ["INITIAL", "Axes", "Blocks", "Grid", "Quantity", "Samples", "quantity"]
@@ -77,10 +78,9 @@ def quantity(rig: Rig, name: str) -> Quantity:
         return of_effects[name]
     known = rig.parameters
     if name not in known:
-        there = ", ".join([*known, *of_effects])
         raise ParameterError(
             f"{name!r} is no parameter of the rig {rig.name!r}, and no initial value such as "
-            f"'initial.joint_angle'; it has: {there}"
+            f"'initial.joint_angle'; {meant(name, [*known, *of_effects])}"
         )
     found = known[name]
     tol = found.tol if math.isfinite(found.tol) else 0.0
@@ -217,12 +217,7 @@ def _columns(given: Any, what: str) -> dict[str, Array]:
 
 
 def _check_column(known: Quantity, values: Array) -> None:
-    bad = np.flatnonzero(~(np.isfinite(values) & (values >= known.lower) & (values <= known.upper)))
-    if bad.size:
-        raise ParameterError(
-            f"{known.name}[{bad[0]}] = {values[bad[0]]:g} {known.unit} is not allowed: from "
-            f"{known.lower:g} to {known.upper:g} {known.unit}"
-        )
+    check_column(known.name, values, known.lower, known.upper, known.unit)
 
 
 def _digest(values: Array) -> str:

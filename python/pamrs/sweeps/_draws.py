@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Axes, Quantity, chosen, quantity
+from pamrs.units import with_unit
 
 __all__ = ["DrawnSamples", "Range", "ranges", "samples", "whole_number"]
 
@@ -60,10 +61,10 @@ class Range:
     def words(self) -> str:
         """The distribution in words, every digit of it."""
         if self.mean is None:
-            return f"uniform from {self.lower!r} to {self.upper!r} {self.unit}"
+            return with_unit(f"uniform from {self.lower!r} to {self.upper!r}", self.unit)
         return (
-            f"normal about {self.mean!r} with {self.std!r} {self.unit}, "
-            f"from {self.lower!r} to {self.upper!r}"
+            with_unit(f"normal about {self.mean!r} with {self.std!r}", self.unit)
+            + f", from {self.lower!r} to {self.upper!r}"
         )
 
 
@@ -212,7 +213,7 @@ class DrawnSamples(Axes):
             if not found.lower <= drawn.lower <= drawn.upper <= found.upper:
                 raise ParameterError(
                     f"samples of {drawn.name} from {drawn.lower:g} to {drawn.upper:g} are not "
-                    f"allowed: from {found.lower:g} to {found.upper:g} {found.unit}"
+                    "allowed: " + with_unit(f"from {found.lower:g} to {found.upper:g}", found.unit)
                 )
 
 

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
 
 from pamrs import __version__
-from pamrs.errors import ParameterError
-from pamrs.rig import Rig
+from pamrs.errors import ParameterError, RigError
+from pamrs.rig import Rig, parse_rig
 from pamrs.sweeps._axes import Axes, Blocks
 from pamrs.sweeps._drives import Drive, Task
+from pamrs.units import with_unit
 
 __all__ = ["SCHEMA", "Plan", "differences"]
 
 SCHEMA: Final = "pamrs.sweep/1"
+_DIGEST: Final = re.compile(r"\b[0-9a-f]{64}\b")
 _FEWEST, _MOST, _PARTS = 1024, 65_536, 64
 
 
@@ -70,11 +73,30 @@ class Plan:
             "runs of a chunk": str(self.blocks.block),
         }
         text = json.dumps(described, sort_keys=True)
-        return {"digest": hashlib.sha256(text.encode()).hexdigest(), "entries": described}
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        # the rig itself is there so that people are told how another one differs
+        return {"digest": digest, "entries": described, "rig": self.rig}
+
+
+#: Entries of a plan that are one argument of :func:`pamrs.sweep`, by how they begin.
+_ARGUMENTS: Final = {
+    "values of ": "over[{!r}]",
+    "samples of ": "over[{!r}]",
+    "metric ": "metrics[{!r}]",
+    "initial ": "initial[{!r}]",
+    "loop ": "{}",
+}
+_CALLED: Final = {
+    "order of the axes": "over (order of the axes)",
+    "order of the parameters": "over (order of the parameters)",
+    "samples": "over",
+    "runs of a chunk": "chunk",
+}
+_MOST_TOLD: Final = 4
 
 
 def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
-    """What two plans do not have in common, in words.
+    """What two plans do not have in common, in words that name the argument.
 
     Parameters
     ----------
@@ -94,16 +116,58 @@ def differences(stored: dict[str, Any], wanted: dict[str, Any]) -> list[str]:
     for name in dict.fromkeys([*old, *new]):
         if old.get(name) == new.get(name):
             continue
+        argument = _argument(name)
         if name not in new:
-            said.append(f"{name} is in the store only")
+            said.append(f"{argument} is in the store only")
         elif name not in old:
-            said.append(f"{name} is not in the store")
+            said.append(f"{argument} is not in the store")
+        elif name == "rig":
+            said.append(f"rig: {_rigs(stored.get('rig'), wanted.get('rig'))}")
         else:
-            said.append(f"{name}: {_short(old[name])} in the store, {_short(new[name])} now")
+            said.append(f"{argument}: {_change(str(old[name]), str(new[name]))}")
     return said
 
 
-def _short(text: Any) -> str:
-    """Without most of the digits of a digest."""
-    words = [w[:8] if len(w) == 64 and w.isalnum() else w for w in str(text).split(" ")]
-    return " ".join(words)
+def _argument(entry: str) -> str:
+    """The argument of a sweep that an entry of its plan is of."""
+    for begin, called in _ARGUMENTS.items():
+        if entry.startswith(begin):
+            return called.format(entry.removeprefix(begin))
+    return _CALLED.get(entry, entry)
+
+
+def _change(old: str, new: str) -> str:
+    """What an entry was and is; digests stand for numbers that are others."""
+    if _DIGEST.search(old) or _DIGEST.search(new):
+        was, now = (re.sub(r"[ ,]*$", "", _DIGEST.sub("", text)) for text in (old, new))
+        if was == now:
+            return "other numbers"
+        return f"{was or 'other'} numbers in the store, {now or 'other'} now"
+    return f"{old} in the store, {new} now"
+
+
+def _rigs(old: object, new: object) -> str:
+    """What two rigs, as TOML, do not have in common."""
+    if not (isinstance(old, str) and isinstance(new, str)):
+        return "another rig than that of the store"
+    try:
+        was, now = parse_rig(old), parse_rig(new)
+    except RigError:
+        return "another rig than that of the store"
+    told = []
+    for name in dict.fromkeys([*was.parameters, *now.parameters]):
+        one, other = was.parameters.get(name), now.parameters.get(name)
+        if one is None or other is None:
+            told.append(f"{name} is {'not in the store' if one is None else 'in the store only'}")
+        elif one.value != other.value:
+            values = (with_unit(f"{p.value:.6g}", p.unit) for p in (one, other))
+            told.append(f"{name} = {' in the store, '.join(values)} now")
+        elif one.tol != other.tol:
+            told.append(f"another tolerance of {name}")
+    if was.effects != now.effects:
+        told.append("other effects")
+    if was.name != now.name:
+        told.append(f"{was.name!r} in the store, {now.name!r} now")
+    rest = len(told) - _MOST_TOLD
+    more = [f"{rest} more"] if rest > 0 else []
+    return "; ".join([*told[:_MOST_TOLD], *more]) or "other blocks, or what is connected to what"

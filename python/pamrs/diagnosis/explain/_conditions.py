@@ -17,6 +17,7 @@ from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, binned
 from pamrs.findings import Condition, ConditionMap
 from pamrs.rig import Rig
+from pamrs.units import with_unit
 
 __all__ = ["Picture", "describe"]
 
@@ -54,7 +55,7 @@ def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
 def _named(quantity: str, channel: str, unit: str) -> str:
     """A condition's label: ``muscle pressure of flexor [bar]``."""
     name = channel.partition(".")[2]
-    return f"{quantity} of {name} [{unit}]" if name else f"{quantity} [{unit}]"
+    return with_unit(f"{quantity} of {name}" if name else quantity, f"[{unit}]" if unit else "")
 
 
 def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[str, Array]:
@@ -79,7 +80,7 @@ def _conditions(block: Block, prepared: Prepared, rig: Rig, width: int) -> dict[
             opening = np.clip(
                 (prepared.commands[name] - table["null_voltage"]) / table["half_range"], -1, 1
             )
-            out[_named("valve opening", name, "1")] = _binned(opening, all_rows, width)
+            out[_named("valve opening", name, "")] = _binned(opening, all_rows, width)
     for name, (angle, rate) in prepared.signals.items():
         if channel_of(name) == "joint_angle":
             out[_named("joint angle", name, "deg")] = np.degrees(_binned(angle, all_rows, width))

@@ -30,6 +30,7 @@ from pamrs.diagnosis.prepare import Block, Prepared
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
+from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import regulators_of
 
@@ -243,7 +244,8 @@ def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExp
         if j.verdict == "unlisted" and j.group.mismatch is not None
     ]
     if not ambiguity and verdict != "unlisted" and not missing:
-        text = "The name is settled by these recordings; no further one is needed for it."
+        answer = "answer" if verdict in HEALTHY else "name"
+        text = f"The {answer} is settled by these recordings; no further one is needed for it."
         return NextExperiment(text, {}, 0.0)
     names = [name for names in ambiguity for name in names]
     measurable = [n for n in names if is_parameter(n)]
@@ -253,7 +255,11 @@ def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExp
     block = missing[0] if missing and not ambiguity else asked.place(names or [verdict])
     what, shows, experiment = asked.experiment(block)
     begin = "The name is settled. For the rest of the residual in the" if settled else "For the"
-    rest = " and ".join(dict.fromkeys(b.name for b in missing)) if settled else block.name
+    rest = (
+        " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
+        if settled
+        else spoken_name(block.name)
+    )
     text = f"{begin} {rest}: {what}; {shows}."
     excitation: dict[str, Any] = {"kind": _telling(block, asked.nominal).kind, "block": block.name}
     if experiment is None:
@@ -314,24 +320,27 @@ def _pair(
         values = [n for n in differing if is_parameter(n)]
         if values:
             return PairExperiment(
-                labels, f"{_measured(values)}; or, for the {block.name}: {what}; {shows}.", kind
+                labels,
+                f"{_measured(values)}; or, for the {spoken_name(block.name)}: {what}; {shows}.",
+                kind,
             )
         effects = [n for n in differing if n in EFFECTS]
         why = f" {spoken(effects[0])}: {EFFECTS[effects[0]].separates}." if effects else ""
-        return PairExperiment(labels, f"For the {block.name}: {what}; {shows}.{why}", kind)
+        return PairExperiment(
+            labels, f"For the {spoken_name(block.name)}: {what}; {shows}.{why}", kind
+        )
     names = next(names for names in (one, other) if "unlisted" not in names)
     listed = "+".join(names)
     text = (
-        f"For the {block.name}: {what}. A model with {spoken(listed)}, fitted to what there is, "
-        "has to predict that to the noise without being fitted again; what it misses is something "
-        "that is not listed"
+        f"For the {spoken_name(block.name)}: {what}. A model with {spoken(listed)} has to predict "
+        "that to the noise without another fit; what it misses is not listed"
     )
     values = [n for n in names if is_parameter(n)]
     told = _weight(asked, set(names), hypotheses, experiment)
     if told is not None:
         channel, size = told
         text += (
-            f" (without {spoken(listed)} the model would miss the {channel.replace('_', ' ')} by "
+            f" (without {spoken(listed)} the model would miss the {spoken_name(channel)} by "
             f"{size:.2g} times the noise level)"
         )
     text += f". {_measured(values)}." if values else "."
@@ -367,8 +376,8 @@ def _weight(
 def _measured(names: Sequence[str]) -> str:
     """How values of the rig file are told from what looks like them."""
     return (
-        f"Measure {' or '.join(names)} by itself (scale, ruler, known volume): these recordings "
-        "cannot tell which is wrong"
+        f"Measure the {' or the '.join(map(spoken_name, names))} by itself (scale, ruler, known "
+        "volume): these recordings cannot tell which is wrong"
     )
 
 

@@ -22,6 +22,8 @@ from pamrs.report.text import (
     leading,
     name_chance,
     sentence_of,
+    spoken_block,
+    spoken_name,
     told_apart,
 )
 from pamrs.rig import Rig
@@ -53,10 +55,11 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     found = next(g.baseline[located] for g in groups if located in g.baseline)
+    place = spoken_block(located)
     parts = "" if block.covers == located else f" ({block.covers})"
     text = (
-        f"The mismatch lies in the {located} block{parts}. With the measured signals of its "
-        f"neighbours as inputs, the refitted model misses {block.channel.replace('_', ' ')}: what "
+        f"The mismatch lies in the {place}{parts}. With the measured signals of its "
+        f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)}: what "
         f"exceeds the noise is {found.systematic:.2g} times the noise level."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
@@ -65,32 +68,32 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     mistaken = bool(wrong) and (group is None or below_noise)
     if mistaken:
         text = (
-            f"The {located} block{parts} fits down to the noise level, but only with parameters at "
-            f"the ends of their tolerances. With another value of {' and '.join(wrong)} they "
-            "return to their nominal values."
+            f"The {place}{parts} fits down to the noise level, but only with parameters at "
+            "the ends of their tolerances. With another value of the "
+            f"{' and the '.join(map(spoken_name, wrong))} they return to their nominal values."
         )
     elif group is not None and group.instead:
         moved = ", ".join(
             f"{n} by {group.candidates[0].fit.moved[n]:+.1f} tolerances" for n in group.instead
         )
         text = (
-            f"No block's residual is above the noise level, but the refit of the {located} "
-            f"block{parts} had to move {moved}. An effect explains the same data without that."
+            f"No block's residual is above the noise level, but the refit of the "
+            f"{place}{parts} had to move {moved}. An effect explains the same data without that."
         )
     elif below_noise:
         text = (
-            f"No block's residual is above the noise level, but the residual of the {located} "
-            f"block{parts} contains the signature of an effect, in held-out recordings too."
+            f"No block's residual is above the noise level, but the residual of the "
+            f"{place}{parts} contains the signature of an effect, in held-out recordings too."
         )
     elif group is not None and group.probabilities.get("", 0.0) > settings.no_mismatch_probability:
         text = (
-            f"The residual of the {located} block{parts} is barely above the noise level "
-            f"({found.systematic:.2g} times it in {block.channel.replace('_', ' ')}). "
+            f"The residual of the {place}{parts} is barely above the noise level "
+            f"({found.systematic:.2g} times it in {spoken_name(block.channel)}). "
             "The noise level may have been estimated too low."
         )
     elif all(g.mismatch is None for g in groups):
         text = (
-            f"Every block fits down to the noise level, but the {located} block only with a "
+            f"Every block fits down to the noise level, but the {place} only with a "
             "parameter far outside its tolerance (see the warnings)."
         )
     telling = (
@@ -223,7 +226,7 @@ def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: Warn
         }
         told_by = mended or wrong.held_out
         errors = "; ".join(
-            f"the {channel.replace('_', ' ')} is then missed by "
+            f"the {spoken_name(channel)} is then missed by "
             f"{_instead(e.after, e.refit, unit_of(channel))}, which values inside the tolerances "
             "leave"
             for channel, e in told_by.items()
@@ -376,7 +379,7 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
             unit, factor = display_unit(unit_of(channel), error.after)
             now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
             out.append(
-                f"the new model misses {channel.replace('_', ' ')} by {now} {unit}, the {which} "
+                f"the new model misses {spoken_name(channel)} by {now} {unit}, the {which} "
                 f"one by {was} {unit}: what was added spoils this channel".replace("°", "deg")
             )
     return out
@@ -404,7 +407,7 @@ def reservations(
             why = "its equation is not the whole truth" if j.named else "something acts beside it"
             name = "" if j.ambiguity else "the name stands, "
             out.append(
-                f"with {what} the model still misses {channel.replace('_', ' ')} by {times:.2g} "
+                f"with {what} the model still misses {spoken_name(channel)} by {times:.2g} "
                 f"times the noise level: {name}{why}, and standard deviations hold only as far as "
                 "that matters little"
             )

@@ -36,6 +36,7 @@ from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
 from pamrs.recordings import Recording
+from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, regulators_of
 
@@ -401,7 +402,7 @@ def _told(outcome: Outcome) -> str:
 
 
 def _plain(channel: str) -> str:
-    return channel.replace("_", " ")
+    return spoken_name(channel)
 
 
 def _with_more(best: Outcome, best_first: Sequence[Outcome], resolution: float) -> str:
@@ -506,7 +507,7 @@ def spoken(label: str) -> str:
     def told(part: str) -> str:
         if part in EFFECTS:
             return EFFECTS[part].name
-        return _WITHOUT_NAME.get(part, f"another value of {part}")
+        return _WITHOUT_NAME.get(part, f"another {spoken_name(part)}" if "." in part else part)
 
     return " with ".join(told(part) for part in label.split("+"))
 

@@ -6,6 +6,7 @@ import math
 from typing import TYPE_CHECKING, Final
 
 from pamrs.fit._level_line import LawParameter
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, LevelFriction
@@ -107,9 +108,7 @@ def _bound(level: LevelFriction) -> str:
 def _coefficient(parameter: LawParameter) -> str:
     factor, unit = _PRINTED.get(parameter.unit, (1.0, parameter.unit))
     error = "" if math.isnan(parameter.stderr) else f" +- {parameter.stderr * factor:.2g}"
-    return f"{parameter.name} = {parameter.value * factor:.4g}{error}" + (
-        "" if unit == "1" else f" {unit}"
-    )
+    return with_unit(f"{parameter.name} = {parameter.value * factor:.4g}{error}", unit)
 
 
 def _level(level: LevelFriction) -> tuple[str, str]:
