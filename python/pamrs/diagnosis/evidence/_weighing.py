@@ -13,7 +13,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects import EFFECTS, SameData, find_parameter
+from pamrs.effects import EFFECTS, SameData, find_parameter, info_of, term_in
 
 __all__ = [
     "capped",
@@ -190,7 +190,7 @@ def _shared_out(
     """Share probabilities out between sets that are the same data, by the odds before any data."""
     for one in named:
         for effect in one.effects:
-            same = EFFECTS[effect].same_data
+            same = info_of(effect).same_data
             if same is None or not same_recordings(one, effect, seconds, settings):
                 continue
             names = {same.effect if e == effect else e for e in one.effects}
@@ -214,11 +214,11 @@ def same_recordings(
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
     """
-    same = EFFECTS[effect].same_data
+    same = info_of(effect).same_data
     if same is None:
         return False
     own: dict[str, float] = next(
-        (e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect), {}
+        (e["parameters"] for e in candidate.fit.rig.effects if term_in(e) == effect), {}
     )
     if not own:
         return False
@@ -329,7 +329,7 @@ def stands(candidate: Candidate, seconds: float) -> bool:
         )
         return abs(telling) * seconds < abs(size)
 
-    known = ((effect, EFFECTS[effect].same_data) for effect in candidate.effects)
+    known = ((effect, info_of(effect).same_data) for effect in candidate.effects)
     return any(at_rest(effect, same) for effect, same in known if same is not None)
 
 
@@ -345,7 +345,7 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
         prior = find_parameter(name).prior
         if prior is not None:
             lost += 0.5 * ((value - prior[0]) / prior[1]) ** 2
-    for effect in (e for e in candidate.fit.rig.effects if e["id"] in candidate.effects):
+    for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
     for name, value in _effect_values(candidate):
         expected = find_parameter(name).expected
@@ -400,10 +400,10 @@ def _score(
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set pays for the parameters of its effects (of events of one kind only the first
-    counts) and for a file that is wrong.
+    counts), for the places where they could have been, and for a file that is wrong.
     """
     own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(
         settings.fit.most_tolerances
     )
     counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
-    return own + settings.evidence.parameter_price * len(counted)
+    return own + settings.evidence.parameter_price * len(counted) + candidate.places

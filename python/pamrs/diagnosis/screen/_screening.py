@@ -21,7 +21,7 @@ from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Fit, Problem, Start, acts_in, changes, stacked, starts_of
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import ScreenSettings
-from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.effects import EffectParameter, exclude, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
@@ -126,12 +126,12 @@ class Screen:
         stand : Stand, optional
             Another model than the screen's own (a fitted effect).
         without : tuple of str
-            Effects to leave out.
+            Effects to leave out, with those that cannot act beside them.
         """
         own = self.stand if stand is None else stand
         found = []
         for effect, start, signature in self.signatures:
-            if effect in without:
+            if exclude(effect, without):
                 continue
             power = own.power(signature)
             if power < self.settings.invisible:
@@ -214,7 +214,7 @@ def screen(
     fitted : Fit
         The model.
     effects : list of str
-        Ids to screen.
+        Those to screen, by their ids, with a place where they act at one block of several.
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
     sealed : bool
@@ -266,7 +266,7 @@ class _Looking:
     def at(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
-        parameters = EFFECTS[first.effect].form(first.form).parameters
+        parameters = info_of(first.effect).form(first.form).parameters
         if any(p.scan for p in parameters):
             for start in _nearest(first, lambda start: self.try_(start, 1), self.signatures):
                 self.try_(start)
@@ -347,7 +347,8 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     """Starts moved to where they act: a contact to places that were reached, a restriction to the
     size of what it stands beside.
     """
-    info = EFFECTS[starts[0].effect]
+    effect = starts[0].effect
+    info = info_of(effect)
     parameters = info.form(starts[0].form).parameters
     beside = next((p for p in parameters if p.like), None)
     if beside is not None:
@@ -356,12 +357,12 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     reached = None if place is None else _seen(problem, place.channel)
     if place is None or reached is None:
         return starts
-    sides = [f"{info.id}.{side.name}" for side in parameters if side.role == "side"]
+    sides = [f"{effect}.{side.name}" for side in parameters if side.role == "side"]
 
     def at(start: Start, share: float) -> Start:
         lower = any(start.held[side] < 0.0 for side in sides)
         there = float(np.quantile(reached, 1.0 - share if lower else share))
-        return replace(start, free=start.free | {f"{info.id}.{place.name}": there})
+        return replace(start, free=start.free | {f"{effect}.{place.name}": there})
 
     return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
 
@@ -375,7 +376,7 @@ def _nearest(
     They are tried with more damping than the effect has, which makes the resonance broader than the
     distance between two values.
     """
-    parameters = EFFECTS[start.effect].form(start.form).parameters
+    parameters = info_of(start.effect).form(start.form).parameters
     scanned = next(p for p in parameters if p.scan)
     assert scanned.scan is not None
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
@@ -424,7 +425,7 @@ def _shows(start: Start, block: Block) -> bool:
     """Whether an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
     parameters = [
-        p for p in EFFECTS[start.effect].form(start.form).parameters if block.kind in p.needed_in
+        p for p in info_of(start.effect).form(start.form).parameters if block.kind in p.needed_in
     ]
     return acts_in(start.effect, block) and all(
         values[f"{start.effect}.{p.name}"] for p in parameters
@@ -437,7 +438,7 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
 
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
-    on, off = EFFECTS[start.effect].with_role("threshold")
+    on, off = info_of(start.effect).with_role("threshold")
     seen, settings = _seen(problem, on.channel), problem.settings.screen
     if seen is None:
         return None

@@ -49,7 +49,7 @@ from pamrs.diagnosis.search._sets import (
 )
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
-from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData, id_of, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -196,10 +196,11 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
 
 def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
     """Effects of the catalogue that the rig can have, that it does not hold already and that act in
-    some blocks.
+    some blocks: everywhere, and at each place that the blocks tell apart.
     """
     lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
-    return [e for e in lacking if any(acts_in(e, b) for b in blocks)]
+    terms = [term for e in lacking for term in trial.terms_of(e)]
+    return [term for term in terms if any(acts_in(term, b) for b in blocks)]
 
 
 def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
@@ -208,7 +209,7 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     """
     nothing = refit.group([refit.start], {"": 1.0}, None)
     blocks = refit.trial.inner.blocks
-    persistent = [e for e in _acting(refit.trial, blocks) if EFFECTS[e].lasting]
+    persistent = [e for e in _acting(refit.trial, blocks) if info_of(e).lasting]
     trial = replace(refit.trial, suspects=blocks)
     return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
@@ -227,8 +228,8 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
-    transient = [] if marginal else [e for e in acting if EFFECTS[e].transient]
-    persistent = [e for e in acting if EFFECTS[e].lasting]
+    transient = [] if marginal else [e for e in acting if e in EFFECTS and EFFECTS[e].transient]
+    persistent = [e for e in acting if info_of(e).lasting]
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
@@ -498,7 +499,8 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     least = max(settings.least_gain, settings.least_gain_share * most)
-    worth = [e for e, gain in gains.items() if gain > least]
+    worth = _near_places({e: gain for e, gain in gains.items() if gain > least}, settings)
+    families = list(dict.fromkeys(id_of(effect) for effect in worth))
     tell(
         "screened: "
         + (
@@ -508,11 +510,11 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     )
     near = {
         effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
-        if screened.strong or place < settings.effects_with_starts
+        if screened.strong or families.index(id_of(effect)) < settings.effects_with_starts
         else [s.start.scaled(s.size) for s in ranked[effect][:1]]
-        for place, effect in enumerate(worth)
+        for effect in worth
     }
-    chosen = worth[: settings.most_singles]
+    chosen = _of_first(worth, settings.most_singles)
     if screened.strong:
         chosen, near = _shortlisted(trial, near, baseline)
     alike = trial.settings.evidence.form_share_alike
@@ -536,18 +538,34 @@ def _shortlisted(
     """
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
-    for effect in list(near)[: settings.most_strong_singles]:
+    for effect in _of_first(list(near), settings.most_strong_singles):
         tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
         short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
     best = sorted((e for e in short if short[e]), key=lambda e: short[e][0].misfit)
     starts = {}
-    for place, effect in enumerate(best):
+    families = list(dict.fromkeys(id_of(effect) for effect in best))
+    for effect in best:
         # of the leading effects every form may yet be the one that leaves least
         forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
         kept = sorted(forms.values(), key=lambda c: c.misfit)
-        count = settings.most_forms if place < settings.effects_with_starts else 1
+        leads = families.index(id_of(effect)) < settings.effects_with_starts
+        count = settings.most_forms if leads else 1
         starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
-    return best[: settings.most_singles], starts
+    return _of_first(best, settings.most_singles), starts
+
+
+def _of_first(terms: list[str], count: int) -> list[str]:
+    """Those of the first so many effects, with all their places."""
+    first = list(dict.fromkeys(id_of(term) for term in terms))[:count]
+    return [term for term in terms if id_of(term) in first]
+
+
+def _near_places(gains: dict[str, float], settings: SearchSettings) -> list[str]:
+    """Of the places of each effect those whose gain comes near that of its best one."""
+    best: dict[str, float] = {}
+    for term, gain in gains.items():
+        best[id_of(term)] = max(gain, best.get(id_of(term), 0.0))
+    return [t for t, g in gains.items() if g >= settings.near_place * best[id_of(t)]]
 
 
 def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
@@ -557,7 +575,7 @@ def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
     least = min(left_everywhere(c) for c in fitted)
     near = [c for c in fitted if left_everywhere(c) <= least + alike]
     (effect,) = near[0].effects
-    order = ["", *(form.name for form in EFFECTS[effect].forms[1:])]
+    order = ["", *(form.name for form in info_of(effect).forms[1:])]
     return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), left_everywhere(c)))
 
 
@@ -603,7 +621,7 @@ def _with_same_data(
     others: list[Candidate | None] = []
     for single in singles:
         (effect,) = single.effects
-        same = EFFECTS[effect].same_data
+        same = info_of(effect).same_data
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
         if same is not None and same_recordings(own, effect, seconds, evidence):
