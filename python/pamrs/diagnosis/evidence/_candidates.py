@@ -210,6 +210,14 @@ class Attempts:
         return self.inner.settings
 
     @property
+    def compared(self) -> list[Block]:
+        """Blocks by which hypotheses are compared: those with an excess, and others of their kind,
+        which an effect at every block of a kind may spoil.
+        """
+        kinds = {b.name.partition(".")[0] for b in self.suspects}
+        return [b for b in self.inner.blocks if b.name.partition(".")[0] in kinds]
+
+    @property
     def held(self) -> set[str]:
         """Ids of the effects that the nominal model holds already."""
         return {entry["id"] for entry in self.nominal.effects}

@@ -13,7 +13,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects import EFFECTS, SameData, find_parameter, info_of, term_in
+from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in
 
 __all__ = [
     "capped",
@@ -170,6 +170,7 @@ def weigh(
         alike = [c for c in named if len(c.names) == count]
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
+    weights = _between_places(weights, suspects, evidence)
     total = sum(weights.values())
     out: dict[str, float] = {}
     for c, weight in weights.items():
@@ -177,6 +178,37 @@ def weigh(
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def _between_places(
+    weights: dict[Candidate, float], blocks: list[Block], settings: EvidenceSettings
+) -> dict[Candidate, float]:
+    """Weights of sets of the same effects at other places shared out among them, by what each
+    leaves inside the noise as well.
+
+    Their equations are the same, so that no form of one is granted what it leaves; and a noise
+    level that was estimated too high makes all of them equal where one predicts better.
+    """
+    alike: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Candidate]] = {}
+    for c in weights:
+        if c.places > 0.0:
+            alike.setdefault((tuple(sorted(map(id_of, c.effects))), c.wrong), []).append(c)
+    found = dict(weights)
+    for several in (cs for cs in alike.values() if len(cs) > 1):
+        within = {c: _inside_noise(c, blocks) for c in several}
+        least = min(within.values())
+        own = {
+            c: weights[c] * math.exp(0.25 * settings.looks * (least - within[c])) for c in within
+        }
+        share = sum(weights[c] for c in several) / sum(own.values())
+        found |= {c: share * weight for c, weight in own.items()}
+    return found
+
+
+def _inside_noise(candidate: Candidate, blocks: list[Block]) -> float:
+    """Logarithm of what a set leaves of blocks in which that is less than the noise."""
+    stages = (candidate.fitted, candidate.held_out)
+    return sum(math.log(min(max(e[b.name].ratio, 1e-9), 1.0)) for e in stages for b in blocks)
 
 
 def _shared_out(

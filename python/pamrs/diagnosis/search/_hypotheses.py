@@ -315,7 +315,7 @@ def _hypotheses(
     singles = _with_same_data(trial, start, singles, seconds)
     least = trial.settings.search.transient_from
     if transient and all(
-        share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)
+        share_left(c, start, trial.compared, evidence) > least for c in (*singles, *mistaken)
     ):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
@@ -333,13 +333,13 @@ def _weighed(
     start, settings = candidates[0], trial.settings
 
     def weights(sets: list[Candidate]) -> dict[str, float]:
-        return weigh(sets, trial.suspects, terms.most, terms.seconds, settings, terms.ranging)
+        return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
 
     found = weights(candidates)
     likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
     close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
     if len(close) > 1 or (
-        close and not explains(close[0], start, trial.suspects, settings.evidence)
+        close and not explains(close[0], start, trial.compared, settings.evidence)
     ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
         ended = [trial.polished(c) if c in close else c for c in candidates]
@@ -606,7 +606,7 @@ def _with_same_data(
     evidence = trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.suspects, evidence)
+        return share_left(candidate, start, trial.compared, evidence)
 
     there = {c.effects: c for c in singles}
 
@@ -645,7 +645,7 @@ def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameDa
     if alike is None:
         return single
     evidence = trial.settings.evidence
-    shaped, free = (share_left(c, start, trial.suspects, evidence) for c in (alike, single))
+    shaped, free = (share_left(c, start, trial.compared, evidence) for c in (alike, single))
     return single if shaped > free + evidence.form_share_alike else replace(alike, gain=single.gain)
 
 

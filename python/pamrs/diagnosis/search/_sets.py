@@ -142,7 +142,7 @@ def _telling_together(
     """
     settings, evidence = trial.settings.search, trial.settings.evidence
     left = {
-        c: share_left(c, start, trial.suspects, evidence)
+        c: share_left(c, start, trial.compared, evidence)
         for c in (*singles, *mistaken)
         if c.fit.events is None
     }
@@ -197,7 +197,7 @@ def _beside(
     settings, evidence = trial.settings.search, trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.suspects, evidence)
+        return share_left(candidate, start, trial.compared, evidence)
 
     steady = [c for c in singles if c.fit.events is None]
     best = min(steady, key=left_by, default=start)
@@ -340,9 +340,9 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     truth.
     """
     evidence = trial.settings.evidence
-    if explains(candidate, start, trial.suspects, evidence):
+    if explains(candidate, start, trial.compared, evidence):
         return True
-    little = share_left(candidate, start, trial.suspects, evidence) < evidence.form_share
+    little = share_left(candidate, start, trial.compared, evidence) < evidence.form_share
     return little and not _untouched(candidate, start, trial)
 
 
