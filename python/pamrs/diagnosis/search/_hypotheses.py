@@ -4,6 +4,7 @@ recordings.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -499,8 +500,7 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     least = max(settings.least_gain, settings.least_gain_share * most)
-    worth = _near_places({e: gain for e, gain in gains.items() if gain > least}, settings)
-    families = list(dict.fromkeys(id_of(effect) for effect in worth))
+    worth = _by_family([e for e, gain in gains.items() if gain > least])
     tell(
         "screened: "
         + (
@@ -510,13 +510,19 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     )
     near = {
         effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
-        if screened.strong or families.index(id_of(effect)) < settings.effects_with_starts
+        if screened.strong or rank < settings.effects_with_starts
         else [s.start.scaled(s.size) for s in ranked[effect][:1]]
-        for effect in worth
+        for rank, places in enumerate(worth)
+        for effect in places
     }
-    chosen = _of_first(worth, settings.most_singles)
     if screened.strong:
-        chosen, near = _shortlisted(trial, near, baseline)
+        chosen, near = _shortlisted(trial, worth, near, baseline)
+    else:
+        chosen = []
+        for rank, places in enumerate(worth[: settings.most_singles]):
+            close = [e for e in places if gains[e] >= settings.near_place * gains[places[0]]]
+            # of the leading effects another place may yet be the one that leaves least
+            chosen += close if rank < settings.effects_with_starts else places[:1]
     alike = trial.settings.evidence.form_share_alike
     found = []
     for effect in chosen:
@@ -528,44 +534,46 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
 
 
 def _shortlisted(
-    trial: Attempts, near: dict[str, list[Start]], baseline: Fit
+    trial: Attempts, worth: list[list[str]], near: dict[str, list[Start]], baseline: Fit
 ) -> tuple[list[str], dict[str, list[Start]]]:
-    """Of many effects those that leave least after a few steps from each of their starts, and where
-    the best of these steps led.
+    """Of many effects (each a list of its places) those that leave least after a few steps from
+    each of their starts, and where the best of these steps led.
 
     Signatures rank strong effects and rule none out: they are linear in what a strong effect is
     not.
     """
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
-    for effect in _of_first(list(near), settings.most_strong_singles):
-        tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
-        short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
-    best = sorted((e for e in short if short[e]), key=lambda e: short[e][0].misfit)
+
+    def least(effect: str) -> float:
+        if effect not in short:
+            tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
+            short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
+        return short[effect][0].misfit if short[effect] else math.inf
+
+    first = sorted(worth[: settings.most_strong_singles], key=lambda places: least(places[0]))
+    best: list[str] = []
     starts = {}
-    families = list(dict.fromkeys(id_of(effect) for effect in best))
-    for effect in best:
-        # of the leading effects every form may yet be the one that leaves least
-        forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
-        kept = sorted(forms.values(), key=lambda c: c.misfit)
-        leads = families.index(id_of(effect)) < settings.effects_with_starts
-        count = settings.most_forms if leads else 1
-        starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
-    return _of_first(best, settings.most_singles), starts
+    for rank, places in enumerate(first[: settings.most_singles]):
+        leads = rank < settings.effects_with_starts
+        tried = [e for e in places[: None if leads else 1] if least(e) < math.inf]
+        most = min(map(least, tried), default=math.inf) / settings.near_place
+        for effect in sorted((e for e in tried if least(e) <= most), key=least):
+            # of the leading effects every form may yet be the one that leaves least
+            forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
+            kept = sorted(forms.values(), key=lambda c: c.misfit)
+            count = settings.most_forms if leads else 1
+            starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
+            best.append(effect)
+    return best, starts
 
 
-def _of_first(terms: list[str], count: int) -> list[str]:
-    """Those of the first so many effects, with all their places."""
-    first = list(dict.fromkeys(id_of(term) for term in terms))[:count]
-    return [term for term in terms if id_of(term) in first]
-
-
-def _near_places(gains: dict[str, float], settings: SearchSettings) -> list[str]:
-    """Of the places of each effect those whose gain comes near that of its best one."""
-    best: dict[str, float] = {}
-    for term, gain in gains.items():
-        best[id_of(term)] = max(gain, best.get(id_of(term), 0.0))
-    return [t for t, g in gains.items() if g >= settings.near_place * best[id_of(t)]]
+def _by_family(terms: list[str]) -> list[list[str]]:
+    """The places of each effect, in the order in which they come."""
+    found: dict[str, list[str]] = {}
+    for term in terms:
+        found.setdefault(id_of(term), []).append(term)
+    return list(found.values())
 
 
 def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:

@@ -132,7 +132,7 @@ class SearchSettings(SettingsGroup):
         unit="1",
         above=0.0,
         most=1.0,
-        reason="share of an effect's best gain from which it is fitted at another place too, where "
+        reason="share of an effect's best gain from which another place of it is fitted too, where "
         "a rig has several blocks of a kind: of an effect at one of two alike blocks half shows at "
         "both",
         origin="docs/decisions/0101",
