@@ -458,12 +458,17 @@ def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> fl
 
 
 def changes(
-    problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str
+    problem: Problem,
+    rig: Rig,
+    base: dict[Key, Residual],
+    effect: str,
+    known: Mapping[Key, Residual] | None = None,
 ) -> dict[Key, Residual]:
     """Residuals of a model near to another whose residuals (with the starts of their windows) are
     known; values alone.
 
-    Only blocks in which the effect that makes the difference acts are predicted again.
+    Only blocks in which the effect that makes the difference acts are predicted again, but for
+    those that are ``known``.
 
     Raises
     ------
@@ -476,6 +481,8 @@ def changes(
         was = base[block.name, prepared.recording.name]
         if not acts_in(effect, block):
             return replace(was, jacobian=None)
+        if known and (block.name, prepared.recording.name) in known:
+            return known[block.name, prepared.recording.name]
         return replace(was, value=change(block, core, prepared, was), jacobian=None)
 
     return _everywhere(problem, one)

@@ -65,6 +65,20 @@ class Start:
         at = place_of(self.effect)
         return rig.with_effect(id_of(self.effect), values, at=at, form=self.form)
 
+    def moved(self, effect: str) -> Start:
+        """The same start of the effect at another place."""
+
+        def named(name: str) -> str:
+            return effect + name.removeprefix(self.effect)
+
+        return replace(
+            self,
+            effect=effect,
+            free={named(name): value for name, value in self.free.items()},
+            held={named(name): value for name, value in self.held.items()},
+            sizes=tuple(map(named, self.sizes)),
+        )
+
     def scaled(self, size: float) -> Start:
         """The same start with its sizes multiplied (a restriction divided by the root), inside
         their bounds.

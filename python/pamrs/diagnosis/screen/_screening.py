@@ -18,10 +18,20 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of
-from pamrs.diagnosis.fit import Fit, Problem, Start, acts_in, changes, stacked, starts_of
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    changes,
+    places_of,
+    stacked,
+    starts_of,
+)
+from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import ScreenSettings
-from pamrs.effects import EffectParameter, exclude, info_of
+from pamrs.effects import EffectParameter, exclude, id_of, info_of, place_of, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
@@ -31,6 +41,8 @@ __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stan
 Array = NDArray[np.float64]
 Signature = tuple[str, Start, Array]
 """Effect, where it starts, and what it does to the stacked residuals there."""
+_Values = tuple[str, str, tuple[tuple[str, float], ...]]
+"""Effect, form, and its parameters with their values, SI."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,6 +237,8 @@ def screen(
     """
     looking = _Looking(problem, fitted, inflation, stand_of(fitted, problem, inflation), strong)
     for effect in effects:
+        if not place_of(effect):
+            looking.seen.clear()
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
             looking.at([start for start in starts if start.form == form])
@@ -249,6 +263,11 @@ class _Looking:
         As in :func:`screen`.
     signatures : list of (effect, start, (n,) array)
         Those that were taken.
+    everywhere : dict of values to Start
+        Where the looks at an effect at every block of its kind ended, by where they began: those at
+        one of these blocks begin there.
+    seen : dict of values to dict
+        What it does there, by block and recording.
     """
 
     problem: Problem
@@ -257,6 +276,8 @@ class _Looking:
     stand: Stand
     strong: bool
     signatures: list[Signature] = field(default_factory=list)
+    everywhere: dict[_Values, Start] = field(default_factory=dict)
+    seen: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
 
     @property
     def settings(self) -> ScreenSettings:
@@ -280,7 +301,8 @@ class _Looking:
 
     def try_(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; what it would bring."""
-        tried, best = start, None
+        begun = self.everywhere.get(_values(start)) if place_of(start.effect) else None
+        tried, best = start if begun is None else begun.moved(start.effect), None
         for _ in range(self.settings.most_signatures if looks is None else looks):
             seen = self._look(tried)
             if seen is None:
@@ -295,7 +317,7 @@ class _Looking:
             if wanted == tried:
                 break  # its bounds hold it
             tried = wanted
-        if self.strong and start.scalable and looks is None:
+        if self.strong and start.scalable and looks is None and begun is None:
             others = [self._look(start.scaled(size)) for size in self.settings.strong_sizes]
             # what a signature says of other sizes than its own is not relied on
             known = [seen for seen in (best, *others) if seen is not None]
@@ -303,18 +325,37 @@ class _Looking:
         if best is None:
             return -math.inf
         self.signatures.append(best[0])
+        if not place_of(start.effect):
+            self.everywhere[_values(start)] = best[0][1]
         return _gain(best)
 
     def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         fitted = self.fitted
         try:
-            found = changes(self.problem, start.applied(fitted.rig), fitted.residuals, start.effect)
+            rig = start.applied(fitted.rig)
+            known = self._known(start)
+            found = changes(self.problem, rig, fitted.residuals, start.effect, known)
         except SimulationError:
             return None  # this size leaves the range in which the model holds
+        if not place_of(start.effect):
+            self.seen[_values(start)] = found
         rows, _ = stacked(self.problem, found, self.inflation)
         entry = (start.effect, start, rows - self.stand.rows)
         return entry, next(iter(Screen(self.stand, [entry], self.settings).scores()), None)
+
+    def _known(self, start: Start) -> dict[Key, Residual]:
+        """What is known of an effect at one place: in a block in which it acts at no other one, it
+        does what it does where it is everywhere.
+        """
+        term = start.effect
+        seen = self.seen.get(_values(start), {}) if place_of(term) else {}
+        if not seen:
+            return {}
+        others = places_of(self.fitted.rig, id_of(term), self.problem.blocks)
+        rivals = [t for at in others if (t := term_of(id_of(term), at)) != term]
+        own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
+        return {key: r for key, r in seen.items() if key[0] in own}
 
     def _placed(self, score: Score) -> bool:
         """Whether a signature says that its effect has about the size at which it was taken."""
@@ -325,6 +366,13 @@ class _Looking:
         signature = entry[2]
         along = float(self.stand.left @ signature)
         return -2.0 * along - self.stand.power(signature)
+
+
+def _values(start: Start) -> _Values:
+    """Effect, form and values of a start, wherever it acts."""
+    values = start.free | start.held
+    own = tuple(sorted((n.removeprefix(start.effect), v) for n, v in values.items()))
+    return id_of(start.effect), start.form, own
 
 
 def _gain(seen: tuple[Signature, Score | None]) -> float:
