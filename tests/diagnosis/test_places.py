@@ -5,6 +5,7 @@ muscles of which one leaks.
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import jsonschema
@@ -14,11 +15,20 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Attempts
-from pamrs.diagnosis.fit import Problem, acts_in, fits, places_of, residuals, starts_of
+from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
+from pamrs.diagnosis.fit import Fit, Problem, acts_in, places_of, residuals, starts_of
+from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
-from pamrs.effects import CATALOGUE, exclude, find_parameter, info_of, term_of
+from pamrs.effects import (
+    CATALOGUE,
+    exclude,
+    find_parameter,
+    id_of,
+    info_of,
+    place_of,
+    term_of,
+)
 from pamrs.recordings import Recording
 from pamrs.report.text import headline, label, told_apart
 from pamrs.simulation import core_rig
@@ -143,17 +153,48 @@ def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
         assert not np.any(found["chamber.extensor", "one"].jacobian)
 
 
-def test_the_odds_of_an_effect_are_shared_among_its_places() -> None:
+def made_up(term: str, left: float, places: int) -> Candidate:
+    """A hypothesis that leaves such a ratio of either chamber, fitted and held out."""
+    rig = PAIR.with_effect(id_of(term), at=place_of(term)) if term else PAIR
+    names = [f"{term}.{info_of(term).leading.name}"] if term else []
+    values = dict.fromkeys(names, 1e-11)
+    found = Fit((term,), rig, values, values, np.zeros((0, 0)), 0.0, {})
+    kept = {
+        b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
+        for b in blocks_of(PAIR)
+        if b.kind == "chamber"
+    }
+    effects = (term,) if term else ()
+    return Candidate(effects, found, kept, kept, 0.0, places=math.log(places))
+
+
+def weighed(*found: Candidate) -> dict[str, float]:
+    chambers = [b for b in blocks_of(PAIR) if b.kind == "chamber"]
+    return weigh([made_up("", 40.0, 1), *found], chambers, 0.985, 30.0, SETTINGS)
+
+
+def test_an_effect_at_many_places_is_no_more_probable_for_it() -> None:
     blocks = blocks_of(PAIR)
     problem = Problem(blocks, [], core_rig(PAIR), SETTINGS)
     trial = Attempts(problem, problem, PAIR, {}, {}, blocks)
-    assert trial.terms_of("leak_muscle") == [
-        "leak_muscle",
-        "leak_muscle@flexor",
-        "leak_muscle@extensor",
-    ]
+    terms = ["leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"]
+    assert trial.terms_of("leak_muscle") == terms
     assert trial.terms_of("supply_leak") == ["supply_leak"]
-    assert all(fits(PAIR, effect) for effect in ("leak_muscle", "supply_leak"))
+    rival = made_up("valve_area", 3.0, 1)
+    alone = weighed(made_up("leak_muscle", 3.0, 1), rival)
+    shared = weighed(*(made_up(term, 3.0, len(terms)) for term in terms), rival)
+    assert [shared[term] for term in terms] == pytest.approx([alone["leak_muscle"] / 3.0] * 3)
+    assert shared["valve_area"] == pytest.approx(alone["valve_area"])
+
+
+def test_places_are_told_apart_by_what_they_leave_inside_the_noise() -> None:
+    """And the effect is no more and no less probable for it."""
+    rival = made_up("valve_area", 1.0, 1)
+    even = weighed(*(made_up(f"leak_muscle{at}", 0.9, 2) for at in ("", "@flexor")), rival)
+    better = weighed(made_up("leak_muscle", 0.9, 2), made_up("leak_muscle@flexor", 0.3, 2), rival)
+    assert even["leak_muscle"] == pytest.approx(even["leak_muscle@flexor"])
+    assert better["leak_muscle@flexor"] > 10.0 * better["leak_muscle"]
+    assert better["valve_area"] == pytest.approx(even["valve_area"])
 
 
 @pytest.fixture(scope="module")
