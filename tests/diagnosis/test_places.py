@@ -29,10 +29,11 @@ from pamrs.effects import (
     place_of,
     term_of,
 )
+from pamrs.findings import BlockVerdict
 from pamrs.recordings import Recording
 from pamrs.report.text import headline, label, told_apart
 from pamrs.simulation import core_rig
-from tests.diagnosis import again
+from tests.diagnosis import again, synthetic
 from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
@@ -195,6 +196,17 @@ def test_places_are_told_apart_by_what_they_leave_inside_the_noise() -> None:
     assert even["leak_muscle"] == pytest.approx(even["leak_muscle@flexor"])
     assert better["leak_muscle@flexor"] > 10.0 * better["leak_muscle"]
     assert better["valve_area"] == pytest.approx(even["valve_area"])
+
+
+def test_only_the_place_is_open() -> None:
+    chances = {"leak_muscle@flexor": 0.5, "leak_muscle": 0.4, "unlisted": 0.1}
+    sets = [[key] for key in chances]
+    block = BlockVerdict(["chamber.flexor"], "effects", chances, ["leak_muscle@flexor"], [], sets)
+    given = synthetic.diagnosis(effects=[], blocks=[block])
+    assert headline(given) == (
+        f"The model leaves out: {effect_words()} in the chamber flexor, probability 0.90, and "
+        "these recordings cannot tell whether at flexor (0.50) or at every chamber (0.40)"
+    )
 
 
 @pytest.fixture(scope="module")

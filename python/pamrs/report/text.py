@@ -348,6 +348,8 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
     if len(block.ambiguity) > 1:
+        if where := _places(block, place):
+            return where
         rivals = "these recordings cannot tell " + told_apart(block.ambiguity, block.probabilities)
         healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
         if all(
@@ -367,6 +369,26 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     wrong = {w.name: w for w in diagnosis.wrong_parameters}
     values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
     return f"the rig file is wrong: {values}{_how_sure(_of_names(diagnosis, block))}"
+
+
+def _places(block: BlockVerdict, place: str) -> str:
+    """That one effect is missing and only where it acts is open, with its probability wherever that
+    is; empty where something else is open.
+    """
+    sets = [s for s in block.ambiguity if s != ["unlisted"]]
+    names = [name for s in sets for name in s]
+    effect = id_of(names[0]) if names else ""
+    if len(names) != len(sets) or len(sets) < 2 or {id_of(n) for n in names} != {effect}:
+        return ""
+    chances = [chance_of(block.probabilities, s) for s in sets]
+    told = [
+        f"at {place_of(n) or info_of(effect).everywhere} ({format_probability(p)})"
+        for n, p in zip(names, chances, strict=True)
+    ]
+    return (
+        f"the model leaves out: {info_of(effect).name}{place}{_how_sure(sum(chances))}, and "
+        f"these recordings cannot tell whether {', '.join(told[:-1])} or {told[-1]}"
+    )
 
 
 def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float:
