@@ -60,14 +60,17 @@ class Diagnosis(Findings):
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
         which the intervals belong.
     effects : list of EffectFound
-        What is named (with another verdict what comes closest): ``id``, ``probability``,
-        ``name`` (in words), ``parameters`` {name: {value, std, unit, interval?, identifiable?}},
-        most probable first; SI, 95 % intervals; ``events``, what happened in single recordings
-        (``recording``, ``time`` and the effect's other parameters, SI), and ``inclusion``, the
-        share of resampled recordings in which the screen would have taken the effect.
+        What is named (with another verdict what comes closest): ``id``, ``at`` (the block at which
+        it acts, where it is one of several), ``probability``, ``name`` (in words), ``parameters``
+        {name: {value, std, unit, interval?, identifiable?}}, most probable first; SI, 95 %
+        intervals; ``events``, what happened in single recordings (``recording``, ``time`` and the
+        effect's other parameters, SI), and ``inclusion``, the share of resampled recordings in
+        which the screen would have taken the effect.
     ambiguity : list of list of str
         Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
-        the data cannot separate; empty when settled.
+        the data cannot separate; empty when settled. Here and in ``probabilities``, ``blocks``,
+        ``tried`` and ``tested`` an effect at one of several blocks has the block's name behind an
+        ``@``: ``leak_muscle@flexor``.
     probabilities : dict
         Probability of what the case may be told to have: names of all its blocks joined by ``+``,
         ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something is

@@ -3,7 +3,8 @@ effect.
 
 Equations, parameters, bounds and sources stand in the core, one file for each effect
 (``crates/pam-core/src/effects``), and its words here in ``words/ID.toml``. Public are
-:data:`EFFECTS`, :data:`CATALOGUE`, the types of their entries, and :mod:`pamrs.effects.text`.
+:data:`EFFECTS`, :data:`CATALOGUE`, the types of their entries, what an effect at one of several
+blocks is called (``term_of`` and its likes), and :mod:`pamrs.effects.text`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,15 @@ from pamrs.effects._catalogue import (
     ports_of,
 )
 from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
+from pamrs.effects._terms import (
+    exclude,
+    id_of,
+    info_of,
+    is_effect,
+    place_of,
+    term_in,
+    term_of,
+)
 
 __all__ = [
     "CATALOGUE",
@@ -33,6 +43,13 @@ __all__ = [
     "SameData",
     "Term",
     "Words",
+    "exclude",
     "find_parameter",
+    "id_of",
+    "info_of",
+    "is_effect",
+    "place_of",
     "ports_of",
+    "term_in",
+    "term_of",
 ]

@@ -164,8 +164,9 @@ def ports_of(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def find_parameter(name: str) -> EffectParameter:
-    """The parameter of a dotted name such as ``leak_muscle.conductance``; KeyError if there is
-    none.
+    """The parameter of a dotted name such as ``leak_muscle.conductance``, or of the same effect at
+    one place, ``leak_muscle@flexor.conductance``; KeyError if there is none.
     """
-    effect, _, short = name.partition(".")
+    term, _, short = name.partition(".")
+    effect = term.partition("@")[0]
     return {p.name: p for form in reversed(EFFECTS[effect].forms) for p in form.parameters}[short]

@@ -126,6 +126,9 @@ class EffectFound(Entry):
     ----------
     id, name : str
         Id in the catalogue, and in words.
+    at : str
+        Name of the block at which it acts, where the rig has several of that kind; empty where it
+        acts at every one.
     form : str
         Which form of its equation predicts best, where it has several; empty for the usual one.
     probability : float
@@ -141,6 +144,14 @@ class EffectFound(Entry):
 
     id: str = field(metadata=told(least_length=1))
     name: str = field(default="", metadata=told(json=False))
+    at: str = field(
+        default="",
+        metadata=told(
+            "block at which the effect acts, where the rig has several of its kind; every one "
+            "where it is left out",
+            omit_empty=True,
+        ),
+    )
     form: str = field(
         default="",
         metadata=told("form of the effect's equation, where it is not the usual", omit_empty=True),
@@ -159,6 +170,11 @@ class EffectFound(Entry):
         default_factory=list,
         metadata=told("what happened in single recordings, SI", omit_empty=True, kind="events"),
     )
+
+    @property
+    def term(self) -> str:
+        """What hypotheses call it: its id, and behind an ``@`` the block at which it acts."""
+        return f"{self.id}@{self.at}" if self.at else self.id
 
 
 @dataclass(frozen=True, eq=False)

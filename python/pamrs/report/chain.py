@@ -185,9 +185,8 @@ def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
     open_ = {n for b in diagnosis.blocks if len(b.ambiguity) > 1 for s in b.ambiguity for n in s}
     for effect in named:
         kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
-        doubt = "perhaps " if effect.id in open_ else ""
-        where = {t.at for t in diagnosis.budget if t.id == effect.id}
-        for part in _at(parts, kind, next(iter(where), "")):
+        doubt = "perhaps " if effect.term in open_ else ""
+        for part in _at(parts, kind, effect.at):
             part.found.append(f"{doubt}missing: {label(effect.id)}")
     for wrong in diagnosis.wrong_parameters:
         kind, _, rest = wrong.name.partition(".")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, TypeGuard
 
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
 from pamrs.findings import (
     HEALTHY,
     BlockVerdict,
@@ -32,6 +32,7 @@ __all__ = [
     "data_sentence",
     "display_unit",
     "effect_heading",
+    "effect_name",
     "effect_title",
     "format_number",
     "format_probability",
@@ -88,9 +89,15 @@ _DISPLAY = {
 
 
 def label(identifier: str) -> str:
-    """Readable name of a hypothesis, effect, block or channel id; pairs are joined by ``+``."""
-    parts = [part.strip() for part in identifier.split("+")]
-    return " + ".join(_LABELS.get(part, part.replace("_", " ")) for part in parts)
+    """Readable name of a hypothesis, effect, block or channel id; pairs are joined by ``+``, and an
+    effect at one block of several has its name behind an ``@``.
+    """
+
+    def told(part: str) -> str:
+        own, at = id_of(part), place_of(part)
+        return _LABELS.get(own, own.replace("_", " ")) + (f" at {at.replace('_', ' ')}" * bool(at))
+
+    return " + ".join(told(part.strip()) for part in identifier.split("+"))
 
 
 def set_label(identifiers: list[str]) -> str:
@@ -211,7 +218,7 @@ def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
     found = [b for b in blocks if b.verdict not in HEALTHY or b.wrong_parameters or b.ambiguity]
     if not diagnosis.blocks or not found:
         names = [w.name for w in diagnosis.wrong_parameters]
-        effects = [e.id for e in diagnosis.effects if diagnosis.verdict == "effects"]
+        effects = [e.term for e in diagnosis.effects if diagnosis.verdict == "effects"]
         whole = BlockVerdict([], diagnosis.verdict, diagnosis.probabilities, effects, names, [])
         return [whole]
     return sorted(found, key=lambda b: diagnosis.where.block not in b.blocks)
@@ -395,7 +402,7 @@ def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
             blocks=[block] if block else [],
             verdict="",  # that of the case, which is told apart
             probabilities=diagnosis.probabilities,
-            effects=[e.id for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
+            effects=[e.term for e in diagnosis.effects] if diagnosis.verdict == "effects" else [],
             wrong_parameters=[w.name for w in diagnosis.wrong_parameters],
             ambiguity=diagnosis.ambiguity,
         )
@@ -416,6 +423,8 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     """What was found in one group of blocks."""
     place = _place(diagnosis, block)
     if len(block.ambiguity) > 1:
+        if where := _places(block, place):
+            return where
         rivals = "these recordings cannot tell " + told_apart(block.ambiguity, block.probabilities)
         healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
         if all(
@@ -427,14 +436,34 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
         if any("." in name for s in block.ambiguity for name in s):
             return f"physics is missing{place}, or the rig file is wrong: {rivals}"
         return f"physics is missing{place}: {rivals}"
-    told = {e.id: e for e in diagnosis.effects}
+    told = {e.term: effect_name(e) for e in diagnosis.effects}
     if block.effects:
-        names = " and ".join((told[e].name if e in told else "") or label(e) for e in block.effects)
+        names = " and ".join(told.get(e) or label(e) for e in block.effects)
         how_sure = _how_sure(_of_names(diagnosis, block))
         return f"the model leaves out: {names}{place}{how_sure}"
     wrong = {w.name: w for w in diagnosis.wrong_parameters}
     values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
     return f"the rig file is wrong: {values}{_how_sure(_of_names(diagnosis, block))}"
+
+
+def _places(block: BlockVerdict, place: str) -> str:
+    """That one effect is missing and only where it acts is open, with its probability wherever that
+    is; empty where something else is open.
+    """
+    sets = [s for s in block.ambiguity if s != ["unlisted"]]
+    names = [name for s in sets for name in s]
+    effect = id_of(names[0]) if names else ""
+    if len(names) != len(sets) or len(sets) < 2 or {id_of(n) for n in names} != {effect}:
+        return ""
+    chances = [chance_of(block.probabilities, s) for s in sets]
+    told = [
+        f"at {place_of(n) or info_of(effect).everywhere} ({format_probability(p)})"
+        for n, p in zip(names, chances, strict=True)
+    ]
+    return (
+        f"the model leaves out: {info_of(effect).name}{place}{_how_sure(sum(chances))}, and "
+        f"these recordings cannot tell whether {', '.join(told[:-1])} or {told[-1]}"
+    )
 
 
 def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float:
@@ -456,7 +485,7 @@ def _of_names(diagnosis: Findings, block: BlockVerdict) -> float:
     if is_number(together) and together >= max(known):
         return together
     every: list[EffectFound | WrongParameter] = [
-        *(e for e in diagnosis.effects if e.id in names),
+        *(e for e in diagnosis.effects if e.term in names),
         *(w for w in diagnosis.wrong_parameters if w.name in names),
     ]
     return min((e.probability for e in every if is_number(e.probability)), default=math.nan)
@@ -466,7 +495,7 @@ def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str
     """Probability of one name, and that it counts sets with others where these make a
     difference: ``0.93, alone or with others``.
     """
-    name = entry.id if isinstance(entry, EffectFound) else entry.name
+    name = entry.term if isinstance(entry, EffectFound) else entry.name
     text = format_probability(entry.probability)
     for block in told_blocks(diagnosis):
         named = [*block.effects, *block.wrong_parameters]
@@ -481,7 +510,7 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
     """
     probabilities = diagnosis.probabilities
     wrong = [w.name for w in diagnosis.wrong_parameters]
-    names = wrong + [e.id for e in diagnosis.effects if diagnosis.verdict == "effects"]
+    names = wrong + [e.term for e in diagnosis.effects if diagnosis.verdict == "effects"]
     if not names and diagnosis.verdict == "unlisted":
         return label("unlisted"), chance_of(probabilities, ["unlisted"])
     if not names:
@@ -519,12 +548,19 @@ def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str
     """Hypotheses that are left, the most probable first: ``a (0.80) from b (0.12)``, ``a (0.50), b
     (0.30) and c (0.20) apart``.
     """
-    told = [_answer(s, chance_of(probabilities, s)) for s in sets]
+    names = {name for s in sets for name in s}
+    told = [_answer([_spread(n, names) for n in s], chance_of(probabilities, s)) for s in sets]
     return (
         f"{told[0]} from {told[1]}"
         if len(told) == 2
         else f"{', '.join(told[:-1])} and {told[-1]} apart"
     )
+
+
+def _spread(name: str, others: Collection[str]) -> str:
+    """An effect that acts everywhere, with that said where it stands beside itself at one block."""
+    apart = is_effect(name) and any(id_of(o) == name and place_of(o) for o in others)
+    return term_of(name, info_of(name).everywhere) if apart else name
 
 
 def _answer(names: list[str], chance: float = math.nan) -> str:
@@ -610,7 +646,7 @@ def term_label(term: BudgetTerm) -> str:
         return fixed[term.kind]
     held = ", in the model already" if term.kind == "held" else ""
     form = f" ({label(term.form)})" if term.form else ""
-    return set_label(term.id.split("+")) + form + held
+    return set_label(term_of(term.id, term.at).split("+")) + form + held
 
 
 def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:
@@ -621,10 +657,16 @@ def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:
     return found
 
 
+def effect_name(effect: EffectFound) -> str:
+    """Name of an effect, with the block at which it acts where the rig has several of its kind."""
+    at = f" at {effect.at.replace('_', ' ')}" if effect.at else ""
+    return (effect.name or label(effect.id)) + at
+
+
 def effect_title(effect: EffectFound) -> str:
     """Name of an effect, with its form where it is not the usual one."""
     form = f", form: {label(effect.form)}" if effect.form else ""
-    return (effect.name or label(effect.id)) + form
+    return effect_name(effect) + form
 
 
 def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:

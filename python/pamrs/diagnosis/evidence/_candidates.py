@@ -14,12 +14,14 @@ from pamrs.diagnosis.fit import (
     Problem,
     Start,
     acts_in,
+    entry_of,
     fit,
     fit_events,
     form_in,
     free_baseline,
     known_parameters,
     look_for_events,
+    places_of,
     predicted_with_doubt,
     residuals,
     with_effects_of,
@@ -28,7 +30,7 @@ from pamrs.diagnosis.noise import Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import left_out
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter, id_of, info_of, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -50,7 +52,8 @@ class Candidate:
     Attributes
     ----------
     effects : tuple of str
-        Its effects; empty for the baseline.
+        Its effects, each with a place where it acts at one block of several; empty for the
+        baseline.
     fit : Fit
         On the recordings to fit.
     held_out : dict of str to Excess
@@ -65,6 +68,9 @@ class Candidate:
         Gain in chi-square that the screen predicted for a single effect.
     wrong : tuple of str
         Dotted names of the parameters that were freed from their tolerance.
+    places : float
+        Logarithm of how many places its effects could have been said to act at: by so much each is
+        less probable before any data.
     """
 
     effects: tuple[str, ...]
@@ -75,6 +81,7 @@ class Candidate:
     scatter: float = 0.0
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
+    places: float = 0.0
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -203,6 +210,14 @@ class Attempts:
         return self.inner.settings
 
     @property
+    def compared(self) -> list[Block]:
+        """Blocks by which hypotheses are compared: those with an excess, and others of their kind,
+        which an effect at every block of a kind may spoil.
+        """
+        kinds = {b.name.partition(".")[0] for b in self.suspects}
+        return [b for b in self.inner.blocks if b.name.partition(".")[0] in kinds]
+
+    @property
     def held(self) -> set[str]:
         """Ids of the effects that the nominal model holds already."""
         return {entry["id"] for entry in self.nominal.effects}
@@ -229,6 +244,8 @@ class Attempts:
         """An effect with times of its own in every recording, held-out ones included, beside the
         effects of a candidate.
         """
+        if effect in {id_of(e) for e in beside.effects}:
+            return None  # it would replace what it is to happen beside
         try:
             return self._transient(effect, beside)
         except SimulationError:
@@ -325,7 +342,20 @@ class Attempts:
         ]
         total = sum(math.sqrt(max(0.0, g)) for g, _ in gaps)
         gap = 1.0 - sum(math.sqrt(a) for _, a in gaps) / total if total > 0 else 0.0
-        return Candidate(effects, found, after, inside, gap, _scatter(effects, self.inner, found))
+        return Candidate(
+            effects,
+            found,
+            after,
+            inside,
+            gap,
+            _scatter(effects, self.inner, found),
+            places=sum(math.log(len(self.terms_of(id_of(e)))) for e in effects),
+        )
+
+    def terms_of(self, effect: str) -> list[str]:
+        """An effect everywhere, and at each place that the blocks tell from the others."""
+        places = places_of(self.nominal, effect, self.inner.blocks)
+        return [effect, *(term_of(effect, at) for at in places)]
 
     def fitted(
         self,
@@ -341,7 +371,7 @@ class Attempts:
         step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
-        if not self.held.isdisjoint(effects):
+        if not self.held.isdisjoint(id_of(e) for e in effects):
             return None  # it would replace what the model holds
         free, held, forms = parts_of(starts)
         settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
@@ -384,7 +414,7 @@ class Attempts:
         """An effect fitted in a few steps: enough to see which of many are worth a whole fit; None
         where it cannot be run.
         """
-        if start.effect in self.held:
+        if id_of(start.effect) in self.held:
             return None
         free, held, forms = parts_of([start])
         try:
@@ -628,7 +658,7 @@ def start_of(found: Fit, effect: str, least: float) -> Start:
         for name, value in found.values.items()
         if name.partition(".")[0] == effect
     }
-    entry = next(e for e in found.rig.effects if e["id"] == effect)
+    entry = entry_of(found.rig, effect)
     held = {
         f"{effect}.{n}": v
         for n, v in entry["parameters"].items()
@@ -659,8 +689,8 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     """
     if len(effects) != 1 or len(problem.recordings) < 2:
         return 0.0
-    info, settings = EFFECTS[effects[0]], problem.settings
-    leading = next((f"{info.id}.{p.name}" for p in info.parameters if p.same_everywhere), None)
+    info, settings = info_of(effects[0]), problem.settings
+    leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
     # of a transient effect one size was fitted to all recordings
     if info.transient or leading is None or best.values.get(leading, 0.0) <= 0:
         return 0.0

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
 from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
+from pamrs.effects import exclude, is_effect
 from pamrs.findings import HEALTHY
 
 __all__ = [
@@ -136,6 +137,8 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
     beside: list[dict[str, float]] = [{} for _ in groups]
     for choice in itertools.product(*(p.items() for p in own)):
         effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
+        if not _together(effects):
+            continue  # one effect everywhere and at a place of its own
         weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (
             len(effects) - len(set(effects))
         )
@@ -145,6 +148,12 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
         _judged(group, _normalised(found), settings.verdict)
         for group, found in zip(groups, beside, strict=True)
     ]
+
+
+def _together(names: list[str]) -> bool:
+    """Whether the names of several groups can hold at once."""
+    unique = sorted({name for name in names if is_effect(name)})
+    return not any(exclude(one, unique[k + 1 :]) for k, one in enumerate(unique))
 
 
 def _normalised(weights: dict[str, float]) -> dict[str, float]:

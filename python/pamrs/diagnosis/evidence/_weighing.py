@@ -13,7 +13,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects import EFFECTS, SameData, find_parameter
+from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in
 
 __all__ = [
     "capped",
@@ -170,6 +170,7 @@ def weigh(
         alike = [c for c in named if len(c.names) == count]
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
+    weights = _between_places(weights, suspects, evidence)
     total = sum(weights.values())
     out: dict[str, float] = {}
     for c, weight in weights.items():
@@ -177,6 +178,37 @@ def weigh(
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def _between_places(
+    weights: dict[Candidate, float], blocks: list[Block], settings: EvidenceSettings
+) -> dict[Candidate, float]:
+    """Weights of sets of the same effects at other places shared out among them, by what each
+    leaves inside the noise as well.
+
+    Their equations are the same, so that no form of one is granted what it leaves; and a noise
+    level that was estimated too high makes all of them equal where one predicts better.
+    """
+    alike: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Candidate]] = {}
+    for c in weights:
+        if c.places > 0.0:
+            alike.setdefault((tuple(sorted(map(id_of, c.effects))), c.wrong), []).append(c)
+    found = dict(weights)
+    for several in (cs for cs in alike.values() if len(cs) > 1):
+        within = {c: _inside_noise(c, blocks) for c in several}
+        least = min(within.values())
+        own = {
+            c: weights[c] * math.exp(0.25 * settings.looks * (least - within[c])) for c in within
+        }
+        share = sum(weights[c] for c in several) / sum(own.values())
+        found |= {c: share * weight for c, weight in own.items()}
+    return found
+
+
+def _inside_noise(candidate: Candidate, blocks: list[Block]) -> float:
+    """Logarithm of what a set leaves of blocks in which that is less than the noise."""
+    stages = (candidate.fitted, candidate.held_out)
+    return sum(math.log(min(max(e[b.name].ratio, 1e-9), 1.0)) for e in stages for b in blocks)
 
 
 def _shared_out(
@@ -190,7 +222,7 @@ def _shared_out(
     """Share probabilities out between sets that are the same data, by the odds before any data."""
     for one in named:
         for effect in one.effects:
-            same = EFFECTS[effect].same_data
+            same = info_of(effect).same_data
             if same is None or not same_recordings(one, effect, seconds, settings):
                 continue
             names = {same.effect if e == effect else e for e in one.effects}
@@ -214,11 +246,11 @@ def same_recordings(
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
     """
-    same = EFFECTS[effect].same_data
+    same = info_of(effect).same_data
     if same is None:
         return False
     own: dict[str, float] = next(
-        (e["parameters"] for e in candidate.fit.rig.effects if e["id"] == effect), {}
+        (e["parameters"] for e in candidate.fit.rig.effects if term_in(e) == effect), {}
     )
     if not own:
         return False
@@ -329,7 +361,7 @@ def stands(candidate: Candidate, seconds: float) -> bool:
         )
         return abs(telling) * seconds < abs(size)
 
-    known = ((effect, EFFECTS[effect].same_data) for effect in candidate.effects)
+    known = ((effect, info_of(effect).same_data) for effect in candidate.effects)
     return any(at_rest(effect, same) for effect, same in known if same is not None)
 
 
@@ -345,7 +377,7 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
         prior = find_parameter(name).prior
         if prior is not None:
             lost += 0.5 * ((value - prior[0]) / prior[1]) ** 2
-    for effect in (e for e in candidate.fit.rig.effects if e["id"] in candidate.effects):
+    for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
     for name, value in _effect_values(candidate):
         expected = find_parameter(name).expected
@@ -400,10 +432,10 @@ def _score(
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set pays for the parameters of its effects (of events of one kind only the first
-    counts) and for a file that is wrong.
+    counts), for the places where they could have been, and for a file that is wrong.
     """
     own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(
         settings.fit.most_tolerances
     )
     counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
-    return own + settings.evidence.parameter_price * len(counted)
+    return own + settings.evidence.parameter_price * len(counted) + candidate.places

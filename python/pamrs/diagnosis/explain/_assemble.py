@@ -38,6 +38,7 @@ from pamrs.diagnosis.fit import (
     Key,
     Problem,
     depends,
+    entry_of,
     events_of,
     fit,
     form_in,
@@ -51,7 +52,7 @@ from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
-from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.effects import CATALOGUE, EFFECTS, id_of, info_of, is_effect, place_of, term_in
 from pamrs.errors import SimulationError
 from pamrs.findings import (
     HEALTHY,
@@ -290,7 +291,7 @@ def _tried(groups: list[Group]) -> list[Tried]:
             std={
                 n: s
                 for n, s in candidate.fit.std.items()
-                if n not in candidate.fit.moved and n.partition(".")[0] in EFFECTS
+                if n not in candidate.fit.moved and is_effect(n.partition(".")[0])
             },
             prior=sum(v * v for v in candidate.fit.moved.values()),
             suspects=[b.name for b in group.suspects],
@@ -334,7 +335,7 @@ def _hypotheses(
         found.append((likeliest, rig, sum(healthy.values())))
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
-        if p < least or not all(name in CATALOGUE or is_parameter(name) for name in wanted):
+        if p < least or not all(id_of(name) in CATALOGUE or is_parameter(name) for name in wanted):
             continue
         chosen = [_inside(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
@@ -456,14 +457,14 @@ def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate]) -> Rig:
         for effect in candidate.fit.rig.effects:
             if effect["id"] in _ids(nominal):
                 continue
-            own = effect["id"] + "."
+            own = term_in(effect) + "."
             std = {
                 n.removeprefix(own): s
                 for n, s in candidate.fit.std.items()
                 if n.startswith(own) and math.isfinite(s)
             }
-            form = effect.get("form", "")
-            rig = rig.with_effect(effect["id"], effect["parameters"], std=std, form=form)
+            form, at = effect.get("form", ""), effect.get("at", "")
+            rig = rig.with_effect(effect["id"], effect["parameters"], std=std, at=at, form=form)
     return rig
 
 
@@ -529,7 +530,8 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
     found: dict[str, tuple[float, Candidate]] = {}
     for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
-        for effect in j.named if verdict == "effects" else names & set(CATALOGUE):
+        listed = {effect for effect in names if id_of(effect) in CATALOGUE}
+        for effect in j.named if verdict == "effects" else listed:
             p = j.probability(effect)
             if verdict == "effects":
                 # of one effect in two groups the model has the parameters of the group that comes
@@ -543,8 +545,9 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
                 )
     return [
         EffectFound(
-            id=effect,
-            name=EFFECTS[effect].name,
+            id=id_of(effect),
+            name=info_of(effect).name,
+            at=place_of(effect),
             form=form_in(candidate.fit.rig, effect),
             probability=p,
             inclusion=max(
@@ -622,10 +625,10 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectPar
     rig = candidate.fit.rig
     unknown_volume = bool(words.unknown_volumes(rig))
     out: dict[str, EffectParameterFound] = {}
-    for parameter in EFFECTS[effect].form(form_in(rig, effect)).parameters:
+    for parameter in info_of(effect).form(form_in(rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.role in (*CHOSEN, "threshold"):
-            chosen = next(e["parameters"] for e in rig.effects if e["id"] == effect)[parameter.name]
+            chosen = entry_of(rig, effect)["parameters"][parameter.name]
             out[parameter.name] = EffectParameterFound(chosen, None, parameter.unit)
             continue
         if name not in candidate.fit.values:
@@ -640,7 +643,7 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectPar
             parameter.lower,
         )
     if (
-        EFFECTS[effect].block == "chamber"
+        info_of(effect).block == "chamber"
         and rig.model["valve"] is None
         and "" in rig.tables("chamber")
     ):
@@ -658,7 +661,7 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFou
     """
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
-    for parameter in EFFECTS[effect].form(form_in(candidate.fit.rig, effect)).parameters:
+    for parameter in info_of(effect).form(form_in(candidate.fit.rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
             continue

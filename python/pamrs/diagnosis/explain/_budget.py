@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, is_parameter, significant
-from pamrs.diagnosis.fit import Events, Key, Problem, acts_in, form_in, residuals
+from pamrs.diagnosis.fit import Events, Key, Problem, acts_in, form_in, residuals, without_term
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS
+from pamrs.effects import id_of, info_of, is_effect, place_of
 from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm, EffectParameterFound
 from pamrs.rig import Rig
@@ -170,7 +170,7 @@ def _with_only(present: tuple[str, ...], every: tuple[str, ...], nominal: Rig, f
         if name and is_parameter(name):
             wrong |= dict.fromkeys(name.split("+"), name in present)
         elif name and name not in present:
-            rig = rig.without_effect(name)
+            rig = without_term(rig, name)
     there = "" in present
     back = {n: p.value for n, p in nominal.parameters.items() if not wrong.get(n, there)}
     return rig.with_parameters(back)
@@ -210,7 +210,7 @@ def _in_order(judged: Judged) -> list[str]:
         if len(c.effects) == 1
     }
     wrong = ["+".join(judged.wrong)] if judged.wrong else []
-    effects = [name for name in judged.named if name in EFFECTS]
+    effects = [name for name in judged.named if is_effect(name)]
     return [*wrong, *sorted(effects, key=lambda name: alone.get(name, np.inf))]
 
 
@@ -235,7 +235,7 @@ def _terms(
         yield BudgetTerm(
             block=block.name,
             kind=stage.kind,
-            id=name,
+            id=id_of(name),
             form=form_in(final, name),
             share=share,
             interval=interval,
@@ -243,7 +243,8 @@ def _terms(
             noises=now.systematic,
             size=now.systematic * now.noise,
             unit=unit_of(block.channel),
-            at=next((e.get("at", "") for e in final.effects if e["id"] == name), ""),
+            at=place_of(name)
+            or next((e.get("at", "") for e in final.effects if e["id"] == name), ""),
             parameters=_values(name, judged),
         )
         was = now
@@ -265,7 +266,7 @@ def _terms(
 def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
     """What the recordings say of a term: values of the effect, or of the wrong parameters, SI."""
     found, names = judged.chosen.fit, set(name.split("+"))
-    form = EFFECTS[name].form(form_in(found.rig, name)).parameters if name in EFFECTS else ()
+    form = info_of(name).form(form_in(found.rig, name)).parameters if is_effect(name) else ()
     units = {p.name: p.unit for p in form}
     out = {}
     for full, value in found.values.items():

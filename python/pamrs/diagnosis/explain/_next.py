@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from pamrs.diagnosis.evidence import Judged, is_parameter
-from pamrs.diagnosis.fit import Problem, depends
+from pamrs.diagnosis.fit import Problem, depends, without_term
 from pamrs.diagnosis.next_experiment import (
     Experiment,
     Hypothesis,
@@ -27,7 +27,7 @@ from pamrs.diagnosis.next_experiment import (
     usual_noise,
 )
 from pamrs.diagnosis.prepare import Block, Prepared
-from pamrs.effects import EFFECTS
+from pamrs.effects import info_of, is_effect
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
 from pamrs.report.text import spoken_name
@@ -150,7 +150,7 @@ class _Question:
         """The block that a question about some names is about: where the group that has one of them
         keeps its mismatch, or else the group that is most likely to lack what has no name.
         """
-        own = {n for n in names if n in EFFECTS or is_parameter(n)}
+        own = {n for n in names if is_effect(n) or is_parameter(n)}
 
         def merit(judged: Judged) -> tuple[bool, bool, float]:
             there = {n for s in judged.ambiguity for n in s} | {*judged.named, *judged.wrong}
@@ -324,8 +324,8 @@ def _pair(
                 f"{_measured(values)}; or, for the {spoken_name(block.name)}: {what}; {shows}.",
                 kind,
             )
-        effects = [n for n in differing if n in EFFECTS]
-        why = f" {spoken(effects[0])}: {EFFECTS[effects[0]].separates}." if effects else ""
+        effects = [n for n in differing if is_effect(n)]
+        why = f" {spoken(effects[0])}: {info_of(effects[0]).separates}." if effects else ""
         return PairExperiment(
             labels, f"For the {spoken_name(block.name)}: {what}; {shows}.{why}", kind
         )
@@ -358,12 +358,12 @@ def _weight(
     """
     of = {frozenset(label.split("+")): rig for label, rig, _ in hypotheses}
     own = next((rig for label, rig in of.items() if names and names <= label), None)
-    effects = [n for n in names if n in EFFECTS]
+    effects = [n for n in names if is_effect(n)]
     if own is None or experiment is None or not effects:
         return None
     bare = own
     for effect in effects:
-        bare = bare.without_effect(effect)
+        bare = without_term(bare, effect)
     settings = asked.problem.settings
     channels = tuple(asked.recordings[0].recording.channels)
     noise = {**usual_noise(settings.next_experiment), **asked.noise}
@@ -387,7 +387,7 @@ def same_data(ambiguity: list[list[str]]) -> str:
     """
     for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
         for effect in one:
-            same = EFFECTS[effect].same_data if effect in EFFECTS else None
+            same = info_of(effect).same_data if is_effect(effect) else None
             if same is not None and other == one - {effect} | {same.effect}:
                 return same.told_by
     return ""

@@ -9,11 +9,12 @@ from pamrs.diagnosis.evidence import Candidate, Judged, symptoms_of
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
-from pamrs.effects import CATALOGUE
+from pamrs.effects import CATALOGUE, id_of
 from pamrs.findings import BlockVerdict, ChannelError, Findings, Where
 from pamrs.recordings import Case
 from pamrs.report.text import (
     display_unit,
+    effect_name,
     format_number,
     format_probability,
     is_number,
@@ -149,7 +150,9 @@ def verdict(
         )
     place = diagnosis.where.text
     if kind == "unlisted":
-        tried = ", ".join(f"{e.id} ({e.probability:.0%})" for e in diagnosis.effects)
+        tried = ", ".join(
+            f"{e.id}{f' at {e.at}' * bool(e.at)} ({e.probability:.0%})" for e in diagnosis.effects
+        )
         text = (
             "Physics is missing, and no effect of the catalogue explains the data well enough to "
             f"be named{_outside(leading(diagnosis)[1])}. {place}"
@@ -176,7 +179,8 @@ def verdict(
         )
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(
-        f"{e.name} ({e.id}, probability {name_chance(diagnosis, e)})" for e in diagnosis.effects
+        f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e)})"
+        for e in diagnosis.effects
     )
     text = f"{_opening(diagnosis, 'the model leaves out')}: {names}. {place}"
     if gap is not None:
@@ -411,7 +415,7 @@ def reservations(
                 f"times the noise level: {name}{why}, and standard deviations hold only as far as "
                 "that matters little"
             )
-    named = [c for c in chosen if any(effect in CATALOGUE for effect in c.effects)]
+    named = [c for c in chosen if any(id_of(effect) in CATALOGUE for effect in c.effects)]
     far = settings.moved_tolerances
     moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
     out += [

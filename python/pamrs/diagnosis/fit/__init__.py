@@ -3,17 +3,17 @@ from several starts.
 
 Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
 `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`,
-`starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `with_effects_of` (effects of
-a rig and their forms);
+`starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
+`with_effects_of`, `without_term` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
-`depends`, `fits` (where effects act); `holdable`, `without_passing`, `named_entries`,
+`depends`, `fits`, `places_of` (where effects act); `holdable`, `without_passing`, `named_entries`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
 parameters); `spread_over_pieces` (standard deviations that hold for coloured residuals).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.fit._acting import ACTS, acts_in, depends, fits
+from pamrs.diagnosis.fit._acting import ACTS, acts_in, depends, fits, places_of
 from pamrs.diagnosis.fit._fitting import (
     Events,
     Fit,
@@ -38,7 +38,15 @@ from pamrs.diagnosis.fit._held import (
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._spread import spread_over_pieces
-from pamrs.diagnosis.fit._starts import CHOSEN, Start, form_in, starts_of, with_effects_of
+from pamrs.diagnosis.fit._starts import (
+    CHOSEN,
+    Start,
+    entry_of,
+    form_in,
+    starts_of,
+    with_effects_of,
+    without_term,
+)
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
@@ -54,6 +62,7 @@ __all__ = [
     "bin_width",
     "changes",
     "depends",
+    "entry_of",
     "events_of",
     "fit",
     "fit_events",
@@ -65,6 +74,7 @@ __all__ = [
     "levenberg_marquardt",
     "look_for_events",
     "named_entries",
+    "places_of",
     "predicted_with_doubt",
     "residuals",
     "spread_over_pieces",
@@ -74,4 +84,5 @@ __all__ = [
     "with_known",
     "with_priors",
     "without_passing",
+    "without_term",
 ]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
+from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rig.schema import kind_of
 
-__all__ = ["ACTS", "acts_in", "depends", "fits"]
+__all__ = ["ACTS", "acts_in", "core_names", "depends", "fits", "places_of"]
 
 ACTS: dict[str, tuple[str, ...]] = {
     "supply": ("supply",),
@@ -21,26 +24,95 @@ ACTS: dict[str, tuple[str, ...]] = {
 """Kinds of block of the cut rig in which the effects of a block of the rig act, unless they say
 others themselves.
 
-Of several tanks, chambers or joints an effect acts on every one, with the same parameters: so the
-core has it where the effect has no ``at``, and one parameter that all recordings and blocks share
-is what they can decide. An effect of one muscle alone shows as a block that keeps its mismatch
-while its neighbours lose theirs; ``Rig.with_effect(..., at="flexor")`` then has it.
+Of several tanks, chambers or joints an effect acts on every one, with the same parameters, where it
+has no place; with one (``leak_muscle@flexor``), on that block alone.
 """
+_CHANNELS = {
+    "supply": ("supply_pressure", "supply_command"),
+    "valve": ("valve_command",),
+    "chamber": ("muscle_pressure",),
+    "joint": ("joint_angle",),
+}
+"""Channels that belong to a block of the rig."""
 
 
 def depends(block: Block, name: str) -> bool:
     """Whether a block's output depends on a parameter."""
     effect = name.partition(".")[0]
-    if effect in EFFECTS:
+    if is_effect(effect):
         return acts_in(effect, block)
     return name in block.parameters
 
 
 def acts_in(effect: str, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain."""
+    info, at = info_of(effect), place_of(effect)
+    kinds = info.acts_in or ACTS.get(info.block, ())
+    there = any(kind in kinds for kind in (block.kind, *block.beside))
+    return there and (not at or _has(block, info.at, at))
+
+
+def _has(block: Block, kind: str, name: str) -> bool:
+    """Whether a block of the cut chain depends on one of several blocks of the rig: it is that
+    block, has parameters of it, or is driven by a channel of it.
+    """
+    channels = {f"{channel}.{name}" for channel in _CHANNELS.get(kind, ())}
+    return (
+        block.name == f"{kind}.{name}"
+        or any(parameter.startswith(f"{kind}.{name}.") for parameter in block.parameters)
+        or not channels.isdisjoint((block.channel, *block.drives))
+    )
+
+
+def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
+    """Names of the blocks of a rig at each of which alone an effect may act, where some blocks of
+    the cut chain tell them apart; none where there are not two of them.
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    effect : str
+        Id of an effect that is the same in all recordings.
+    blocks : sequence of Block
+        Those that are judged together.
+    """
     info = EFFECTS[effect]
-    places = info.acts_in or ACTS.get(info.block, ())
-    return any(kind in places for kind in (block.kind, *block.beside))
+    if not info.at or info.last_only or info.transient:
+        return []
+    found = [
+        name
+        for name in rig.tables(info.at)
+        if name
+        and any(acts_in(term_of(effect, name), block) for block in blocks)
+        and _possible(rig, effect, name)
+    ]
+    return found if len(found) > 1 else []
+
+
+def _possible(rig: Rig, effect: str, at: str) -> bool:
+    """Whether a rig can have an effect at a block."""
+    try:
+        rig.with_effect(effect, at=at)
+    except ParameterError:
+        return False
+    return True
+
+
+def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
+    """Dotted names of parameters as the core has them: it says the place of an effect where a rig
+    has several of its id.
+    """
+    ids = [entry["id"] for entry in rig.effects]
+
+    def told(name: str) -> str:
+        term, _, short = name.partition(".")
+        effect, at = id_of(term), place_of(term)
+        if not at:
+            return name
+        return f"{effect}.{at}.{short}" if ids.count(effect) > 1 else f"{effect}.{short}"
+
+    return [told(name) for name in names]
 
 
 def fits(rig: Rig, effect: str) -> bool:

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.diagnosis.fit._acting import acts_in, depends
+from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
 from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
-from pamrs.effects import EFFECTS, find_parameter
+from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
@@ -51,6 +51,12 @@ LOGARITHMIC = frozenset(
     if parameter.neutral != 0.0 and parameter.lower > 0.0
 )
 """Shapes that are positive: fitted by their logarithm."""
+
+
+def _unplaced(name: str) -> str:
+    """A dotted name without the place of the effect."""
+    term, dot, short = name.partition(".")
+    return id_of(term) + dot + short
 
 
 class Stopped(Exception):
@@ -166,7 +172,7 @@ class Fit:
         return {
             name: value
             for name, value in self.values.items()
-            if name not in self.moved and name.partition(".")[0] in EFFECTS
+            if name not in self.moved and is_effect(name.partition(".")[0])
         }
 
     @property
@@ -205,7 +211,8 @@ def residuals(
             events is not None and prepared.recording.name not in own
         ):  # nothing happens here that could be differentiated
             relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
-        found = residual(block, own.get(prepared.recording.name, core), prepared, relevant)
+        told = core_names(rig, relevant)
+        found = residual(block, own.get(prepared.recording.name, core), prepared, told)
         if len(relevant) == len(names):
             return found
         full = np.zeros((found.value.size, len(names)))
@@ -311,7 +318,7 @@ class Scaling:
         ]
         for name, start in starts.items():
             info = find_parameter(name)
-            if name in LOGARITHMIC:
+            if _unplaced(name) in LOGARITHMIC:
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
@@ -323,7 +330,7 @@ class Scaling:
         self.bounds = (np.array(lower), np.array(upper))
         self.start = np.array(
             [0.0] * len(self.baseline)
-            + [0.0 if n in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()]
+            + [0.0 if _unplaced(n) in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()]
         )
 
     def value(self, name: str, x: float) -> float:
@@ -332,12 +339,16 @@ class Scaling:
             known = self.known[name]
             return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
         info = find_parameter(name)
-        found = self.starts[name] * math.exp(x) if name in LOGARITHMIC else x * self.scale[name]
+        found = (
+            self.starts[name] * math.exp(x)
+            if _unplaced(name) in LOGARITHMIC
+            else x * self.scale[name]
+        )
         return min(max(found, info.lower), info.upper)
 
     def slope(self, name: str, x: float) -> float:
         """Change of a parameter [SI] with its scaled number."""
-        return self.value(name, x) if name in LOGARITHMIC else self.scale[name]
+        return self.value(name, x) if _unplaced(name) in LOGARITHMIC else self.scale[name]
 
     def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
         """The model of scaled numbers, with effect parameters that are held."""
@@ -346,7 +357,8 @@ class Scaling:
         chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
         for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
             own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
-            rig = rig.with_effect(effect, own, form=self.forms.get(effect, ""))
+            form, at = self.forms.get(effect, ""), place_of(effect)
+            rig = rig.with_effect(id_of(effect), own, at=at, form=form)
         return rig
 
 
@@ -446,12 +458,17 @@ def with_priors(problem: Problem, found: Fit, inflation: dict[str, float]) -> fl
 
 
 def changes(
-    problem: Problem, rig: Rig, base: dict[Key, Residual], effect: str
+    problem: Problem,
+    rig: Rig,
+    base: dict[Key, Residual],
+    effect: str,
+    known: Mapping[Key, Residual] | None = None,
 ) -> dict[Key, Residual]:
     """Residuals of a model near to another whose residuals (with the starts of their windows) are
     known; values alone.
 
-    Only blocks in which the effect that makes the difference acts are predicted again.
+    Only blocks in which the effect that makes the difference acts are predicted again, but for
+    those that are ``known``.
 
     Raises
     ------
@@ -464,6 +481,8 @@ def changes(
         was = base[block.name, prepared.recording.name]
         if not acts_in(effect, block):
             return replace(was, jacobian=None)
+        if known and (block.name, prepared.recording.name) in known:
+            return known[block.name, prepared.recording.name]
         return replace(was, value=change(block, core, prepared, was), jacobian=None)
 
     return _everywhere(problem, one)

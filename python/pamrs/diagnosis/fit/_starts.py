@@ -8,11 +8,20 @@ import itertools
 import math
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from typing import Any
 
-from pamrs.effects import EFFECTS, Form
+from pamrs.effects import Form, id_of, info_of, place_of, term_in
 from pamrs.rig import Rig
 
-__all__ = ["CHOSEN", "Start", "form_in", "starts_of", "with_effects_of"]
+__all__ = [
+    "CHOSEN",
+    "Start",
+    "entry_of",
+    "form_in",
+    "starts_of",
+    "with_effects_of",
+    "without_term",
+]
 
 CHOSEN = ("choice", "side")
 """Roles of parameters that are tried at both ends of their range and not fitted."""
@@ -27,7 +36,7 @@ class Start:
     Attributes
     ----------
     effect : str
-        Its id.
+        Its id, with a place where it acts at one block of several.
     free, held : dict of str to float
         Dotted parameters that a fit moves, and those that it leaves, SI.
     sizes : tuple of str
@@ -53,14 +62,29 @@ class Start:
     def applied(self, rig: Rig) -> Rig:
         """The rig with the effect as it starts."""
         values = {name.partition(".")[2]: value for name, value in (self.free | self.held).items()}
-        return rig.with_effect(self.effect, values, form=self.form)
+        at = place_of(self.effect)
+        return rig.with_effect(id_of(self.effect), values, at=at, form=self.form)
+
+    def moved(self, effect: str) -> Start:
+        """The same start of the effect at another place."""
+
+        def named(name: str) -> str:
+            return effect + name.removeprefix(self.effect)
+
+        return replace(
+            self,
+            effect=effect,
+            free={named(name): value for name, value in self.free.items()},
+            held={named(name): value for name, value in self.held.items()},
+            sizes=tuple(map(named, self.sizes)),
+        )
 
     def scaled(self, size: float) -> Start:
         """The same start with its sizes multiplied (a restriction divided by the root), inside
         their bounds.
         """
         bounds = {
-            f"{self.effect}.{p.name}": p for p in EFFECTS[self.effect].form(self.form).parameters
+            f"{self.effect}.{p.name}": p for p in info_of(self.effect).form(self.form).parameters
         }
 
         def sized(name: str, value: float) -> float:
@@ -76,14 +100,28 @@ class Start:
 
 def form_in(rig: Rig, effect: str) -> str:
     """Form of an effect in a rig; empty for the first, and where the rig does not have it."""
-    return next((e.get("form", "") for e in rig.effects if e["id"] == effect), "")
+    return next((e.get("form", "") for e in rig.effects if effect in (e["id"], term_in(e))), "")
+
+
+def entry_of(rig: Rig, effect: str) -> dict[str, Any]:
+    """An effect of a rig, by its id or by its id and place."""
+    return next(e for e in rig.effects if effect in (e["id"], term_in(e)))
+
+
+def without_term(rig: Rig, effect: str) -> Rig:
+    """A rig without an effect; where it has a place, without that at this place."""
+    at = place_of(effect)
+    if at and not any(term_in(e) == effect for e in rig.effects):
+        return rig
+    return rig.without_effect(id_of(effect), at=at or None)
 
 
 def with_effects_of(rig: Rig, other: Rig, but: Collection[str] = ()) -> Rig:
     """A rig with the effects of another one as well, in their forms, but for some ids."""
     for entry in other.effects:
         if entry["id"] not in but:
-            rig = rig.with_effect(entry["id"], entry["parameters"], form=entry.get("form", ""))
+            form, at = entry.get("form", ""), entry.get("at", "")
+            rig = rig.with_effect(entry["id"], entry["parameters"], at=at, form=form)
     return rig
 
 
@@ -93,7 +131,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
     Parameters
     ----------
     effect : str
-        Its id.
+        Its id, with a place where it acts at one block of several.
     sealed : bool
         Whether the rig has no valve: a recording may then begin just after a fill.
 
@@ -103,7 +141,7 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
         One for each form and each combination of its shapes and choices; sizes at their typical
         value.
     """
-    info = EFFECTS[effect]
+    info = info_of(effect)
     # of an effect that only ever happens at times of its own the first form stands for all
     forms = info.lasting or info.forms[:1]
     return [start for form in forms for start in _starts_of_form(effect, form, sealed=sealed)]
@@ -115,7 +153,7 @@ def _starts_of_form(effect: str, form: Form, *, sealed: bool) -> list[Start]:
     sizes: dict[str, float] = {}
     held: list[list[tuple[str, float]]] = []
     signed = False
-    own = "" if form is EFFECTS[effect].forms[0] else form.name
+    own = "" if form is info_of(effect).forms[0] else form.name
     for parameter in form.parameters:
         name = f"{effect}.{parameter.name}"
         role = parameter.role_in(sealed=sealed)

@@ -32,7 +32,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 from pamrs.diagnosis.next_experiment._protocols import Experiment, is_sealed, library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.effects import EFFECTS
+from pamrs.effects import info_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
 from pamrs.recordings import Recording
@@ -505,8 +505,9 @@ def spoken(label: str) -> str:
     """A hypothesis in words: names joined by ``+``, ``parameters``, ``none`` or ``unlisted``."""
 
     def told(part: str) -> str:
-        if part in EFFECTS:
-            return EFFECTS[part].name
+        if is_effect(part):
+            place = f" at {place_of(part)}" if place_of(part) else ""
+            return info_of(part).name + place
         return _WITHOUT_NAME.get(part, f"another {spoken_name(part)}" if "." in part else part)
 
     return " with ".join(told(part) for part in label.split("+"))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import exclude
 
 __all__ = ["inclusion"]
 
@@ -89,7 +90,7 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
             for column, (effect, start, _), along, power in zip(
                 columns, screened.signatures, alongs, powers, strict=True
             )
-            if effect not in chosen
+            if not exclude(effect, chosen)
         ]
         gain, effect, column = max(gains, default=(0.0, "", 0))
         if gain <= threshold:

@@ -18,10 +18,20 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of
-from pamrs.diagnosis.fit import Fit, Problem, Start, acts_in, changes, stacked, starts_of
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.fit import (
+    Fit,
+    Key,
+    Problem,
+    Start,
+    acts_in,
+    changes,
+    places_of,
+    stacked,
+    starts_of,
+)
+from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import ScreenSettings
-from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.effects import EffectParameter, exclude, id_of, info_of, place_of, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
@@ -31,6 +41,8 @@ __all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stan
 Array = NDArray[np.float64]
 Signature = tuple[str, Start, Array]
 """Effect, where it starts, and what it does to the stacked residuals there."""
+_Values = tuple[str, str, tuple[tuple[str, float], ...]]
+"""Effect, form, and its parameters with their values, SI."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,12 +138,12 @@ class Screen:
         stand : Stand, optional
             Another model than the screen's own (a fitted effect).
         without : tuple of str
-            Effects to leave out.
+            Effects to leave out, with those that cannot act beside them.
         """
         own = self.stand if stand is None else stand
         found = []
         for effect, start, signature in self.signatures:
-            if effect in without:
+            if exclude(effect, without):
                 continue
             power = own.power(signature)
             if power < self.settings.invisible:
@@ -214,7 +226,7 @@ def screen(
     fitted : Fit
         The model.
     effects : list of str
-        Ids to screen.
+        Those to screen, by their ids, with a place where they act at one block of several.
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
     sealed : bool
@@ -225,6 +237,8 @@ def screen(
     """
     looking = _Looking(problem, fitted, inflation, stand_of(fitted, problem, inflation), strong)
     for effect in effects:
+        if not place_of(effect):
+            looking.seen.clear()
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
             looking.at([start for start in starts if start.form == form])
@@ -249,6 +263,11 @@ class _Looking:
         As in :func:`screen`.
     signatures : list of (effect, start, (n,) array)
         Those that were taken.
+    everywhere : dict of values to Start
+        Where the looks at an effect at every block of its kind ended, by where they began: those at
+        one of these blocks begin there.
+    seen : dict of values to dict
+        What it does there, by block and recording.
     """
 
     problem: Problem
@@ -257,6 +276,8 @@ class _Looking:
     stand: Stand
     strong: bool
     signatures: list[Signature] = field(default_factory=list)
+    everywhere: dict[_Values, Start] = field(default_factory=dict)
+    seen: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
 
     @property
     def settings(self) -> ScreenSettings:
@@ -266,7 +287,7 @@ class _Looking:
     def at(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
-        parameters = EFFECTS[first.effect].form(first.form).parameters
+        parameters = info_of(first.effect).form(first.form).parameters
         if any(p.scan for p in parameters):
             for start in _nearest(first, lambda start: self.try_(start, 1), self.signatures):
                 self.try_(start)
@@ -280,7 +301,8 @@ class _Looking:
 
     def try_(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; what it would bring."""
-        tried, best = start, None
+        begun = self.everywhere.get(_values(start)) if place_of(start.effect) else None
+        tried, best = start if begun is None else begun.moved(start.effect), None
         for _ in range(self.settings.most_signatures if looks is None else looks):
             seen = self._look(tried)
             if seen is None:
@@ -295,7 +317,7 @@ class _Looking:
             if wanted == tried:
                 break  # its bounds hold it
             tried = wanted
-        if self.strong and start.scalable and looks is None:
+        if self.strong and start.scalable and looks is None and begun is None:
             others = [self._look(start.scaled(size)) for size in self.settings.strong_sizes]
             # what a signature says of other sizes than its own is not relied on
             known = [seen for seen in (best, *others) if seen is not None]
@@ -303,18 +325,37 @@ class _Looking:
         if best is None:
             return -math.inf
         self.signatures.append(best[0])
+        if not place_of(start.effect):
+            self.everywhere[_values(start)] = best[0][1]
         return _gain(best)
 
     def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
         fitted = self.fitted
         try:
-            found = changes(self.problem, start.applied(fitted.rig), fitted.residuals, start.effect)
+            rig = start.applied(fitted.rig)
+            known = self._known(start)
+            found = changes(self.problem, rig, fitted.residuals, start.effect, known)
         except SimulationError:
             return None  # this size leaves the range in which the model holds
+        if not place_of(start.effect):
+            self.seen[_values(start)] = found
         rows, _ = stacked(self.problem, found, self.inflation)
         entry = (start.effect, start, rows - self.stand.rows)
         return entry, next(iter(Screen(self.stand, [entry], self.settings).scores()), None)
+
+    def _known(self, start: Start) -> dict[Key, Residual]:
+        """What is known of an effect at one place: in a block in which it acts at no other one, it
+        does what it does where it is everywhere.
+        """
+        term = start.effect
+        seen = self.seen.get(_values(start), {}) if place_of(term) else {}
+        if not seen:
+            return {}
+        others = places_of(self.fitted.rig, id_of(term), self.problem.blocks)
+        rivals = [t for at in others if (t := term_of(id_of(term), at)) != term]
+        own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
+        return {key: r for key, r in seen.items() if key[0] in own}
 
     def _placed(self, score: Score) -> bool:
         """Whether a signature says that its effect has about the size at which it was taken."""
@@ -325,6 +366,13 @@ class _Looking:
         signature = entry[2]
         along = float(self.stand.left @ signature)
         return -2.0 * along - self.stand.power(signature)
+
+
+def _values(start: Start) -> _Values:
+    """Effect, form and values of a start, wherever it acts."""
+    values = start.free | start.held
+    own = tuple(sorted((n.removeprefix(start.effect), v) for n, v in values.items()))
+    return id_of(start.effect), start.form, own
 
 
 def _gain(seen: tuple[Signature, Score | None]) -> float:
@@ -347,7 +395,8 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     """Starts moved to where they act: a contact to places that were reached, a restriction to the
     size of what it stands beside.
     """
-    info = EFFECTS[starts[0].effect]
+    effect = starts[0].effect
+    info = info_of(effect)
     parameters = info.form(starts[0].form).parameters
     beside = next((p for p in parameters if p.like), None)
     if beside is not None:
@@ -356,12 +405,12 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     reached = None if place is None else _seen(problem, place.channel)
     if place is None or reached is None:
         return starts
-    sides = [f"{info.id}.{side.name}" for side in parameters if side.role == "side"]
+    sides = [f"{effect}.{side.name}" for side in parameters if side.role == "side"]
 
     def at(start: Start, share: float) -> Start:
         lower = any(start.held[side] < 0.0 for side in sides)
         there = float(np.quantile(reached, 1.0 - share if lower else share))
-        return replace(start, free=start.free | {f"{info.id}.{place.name}": there})
+        return replace(start, free=start.free | {f"{effect}.{place.name}": there})
 
     return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
 
@@ -375,7 +424,7 @@ def _nearest(
     They are tried with more damping than the effect has, which makes the resonance broader than the
     distance between two values.
     """
-    parameters = EFFECTS[start.effect].form(start.form).parameters
+    parameters = info_of(start.effect).form(start.form).parameters
     scanned = next(p for p in parameters if p.scan)
     assert scanned.scan is not None
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
@@ -424,7 +473,7 @@ def _shows(start: Start, block: Block) -> bool:
     """Whether an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
     parameters = [
-        p for p in EFFECTS[start.effect].form(start.form).parameters if block.kind in p.needed_in
+        p for p in info_of(start.effect).form(start.form).parameters if block.kind in p.needed_in
     ]
     return acts_in(start.effect, block) and all(
         values[f"{start.effect}.{p.name}"] for p in parameters
@@ -437,7 +486,7 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
 
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
-    on, off = EFFECTS[start.effect].with_role("threshold")
+    on, off = info_of(start.effect).with_role("threshold")
     seen, settings = _seen(problem, on.channel), problem.settings.screen
     if seen is None:
         return None

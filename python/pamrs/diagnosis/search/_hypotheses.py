@@ -4,6 +4,7 @@ recordings.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -49,7 +50,7 @@ from pamrs.diagnosis.search._sets import (
 )
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
-from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData, id_of, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -196,10 +197,11 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
 
 def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
     """Effects of the catalogue that the rig can have, that it does not hold already and that act in
-    some blocks.
+    some blocks: everywhere, and at each place that the blocks tell apart.
     """
     lacking = [e for e in CATALOGUE if e not in trial.held and fits(trial.nominal, e)]
-    return [e for e in lacking if any(acts_in(e, b) for b in blocks)]
+    terms = [term for e in lacking for term in trial.terms_of(e)]
+    return [term for term in terms if any(acts_in(term, b) for b in blocks)]
 
 
 def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
@@ -208,7 +210,7 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     """
     nothing = refit.group([refit.start], {"": 1.0}, None)
     blocks = refit.trial.inner.blocks
-    persistent = [e for e in _acting(refit.trial, blocks) if EFFECTS[e].lasting]
+    persistent = [e for e in _acting(refit.trial, blocks) if info_of(e).lasting]
     trial = replace(refit.trial, suspects=blocks)
     return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
@@ -227,8 +229,8 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
-    transient = [] if marginal else [e for e in acting if EFFECTS[e].transient]
-    persistent = [e for e in acting if EFFECTS[e].lasting]
+    transient = [] if marginal else [e for e in acting if e in EFFECTS and EFFECTS[e].transient]
+    persistent = [e for e in acting if info_of(e).lasting]
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
@@ -314,7 +316,7 @@ def _hypotheses(
     singles = _with_same_data(trial, start, singles, seconds)
     least = trial.settings.search.transient_from
     if transient and all(
-        share_left(c, start, trial.suspects, evidence) > least for c in (*singles, *mistaken)
+        share_left(c, start, trial.compared, evidence) > least for c in (*singles, *mistaken)
     ):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
@@ -332,13 +334,13 @@ def _weighed(
     start, settings = candidates[0], trial.settings
 
     def weights(sets: list[Candidate]) -> dict[str, float]:
-        return weigh(sets, trial.suspects, terms.most, terms.seconds, settings, terms.ranging)
+        return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
 
     found = weights(candidates)
     likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
     close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
     if len(close) > 1 or (
-        close and not explains(close[0], start, trial.suspects, settings.evidence)
+        close and not explains(close[0], start, trial.compared, settings.evidence)
     ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
         ended = [trial.polished(c) if c in close else c for c in candidates]
@@ -498,7 +500,7 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     least = max(settings.least_gain, settings.least_gain_share * most)
-    worth = [e for e, gain in gains.items() if gain > least]
+    worth = _by_family([e for e, gain in gains.items() if gain > least])
     tell(
         "screened: "
         + (
@@ -508,13 +510,19 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     )
     near = {
         effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
-        if screened.strong or place < settings.effects_with_starts
+        if screened.strong or rank < settings.effects_with_starts
         else [s.start.scaled(s.size) for s in ranked[effect][:1]]
-        for place, effect in enumerate(worth)
+        for rank, places in enumerate(worth)
+        for effect in places
     }
-    chosen = worth[: settings.most_singles]
     if screened.strong:
-        chosen, near = _shortlisted(trial, near, baseline)
+        chosen, near = _shortlisted(trial, worth, near, baseline)
+    else:
+        chosen = []
+        for rank, places in enumerate(worth[: settings.most_singles]):
+            close = [e for e in places if gains[e] >= settings.near_place * gains[places[0]]]
+            # of the leading effects another place may yet be the one that leaves least
+            chosen += close if rank < settings.effects_with_starts else places[:1]
     alike = trial.settings.evidence.form_share_alike
     found = []
     for effect in chosen:
@@ -526,28 +534,46 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
 
 
 def _shortlisted(
-    trial: Attempts, near: dict[str, list[Start]], baseline: Fit
+    trial: Attempts, worth: list[list[str]], near: dict[str, list[Start]], baseline: Fit
 ) -> tuple[list[str], dict[str, list[Start]]]:
-    """Of many effects those that leave least after a few steps from each of their starts, and where
-    the best of these steps led.
+    """Of many effects (each a list of its places) those that leave least after a few steps from
+    each of their starts, and where the best of these steps led.
 
     Signatures rank strong effects and rule none out: they are linear in what a strong effect is
     not.
     """
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
-    for effect in list(near)[: settings.most_strong_singles]:
-        tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
-        short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
-    best = sorted((e for e in short if short[e]), key=lambda e: short[e][0].misfit)
+
+    def least(effect: str) -> float:
+        if effect not in short:
+            tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
+            short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
+        return short[effect][0].misfit if short[effect] else math.inf
+
+    first = sorted(worth[: settings.most_strong_singles], key=lambda places: least(places[0]))
+    best: list[str] = []
     starts = {}
-    for place, effect in enumerate(best):
-        # of the leading effects every form may yet be the one that leaves least
-        forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
-        kept = sorted(forms.values(), key=lambda c: c.misfit)
-        count = settings.most_forms if place < settings.effects_with_starts else 1
-        starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
-    return best[: settings.most_singles], starts
+    for rank, places in enumerate(first[: settings.most_singles]):
+        leads = rank < settings.effects_with_starts
+        tried = [e for e in places[: None if leads else 1] if least(e) < math.inf]
+        most = min(map(least, tried), default=math.inf) / settings.near_place
+        for effect in sorted((e for e in tried if least(e) <= most), key=least):
+            # of the leading effects every form may yet be the one that leaves least
+            forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
+            kept = sorted(forms.values(), key=lambda c: c.misfit)
+            count = settings.most_forms if leads else 1
+            starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
+            best.append(effect)
+    return best, starts
+
+
+def _by_family(terms: list[str]) -> list[list[str]]:
+    """The places of each effect, in the order in which they come."""
+    found: dict[str, list[str]] = {}
+    for term in terms:
+        found.setdefault(id_of(term), []).append(term)
+    return list(found.values())
 
 
 def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
@@ -557,7 +583,7 @@ def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
     least = min(left_everywhere(c) for c in fitted)
     near = [c for c in fitted if left_everywhere(c) <= least + alike]
     (effect,) = near[0].effects
-    order = ["", *(form.name for form in EFFECTS[effect].forms[1:])]
+    order = ["", *(form.name for form in info_of(effect).forms[1:])]
     return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), left_everywhere(c)))
 
 
@@ -588,7 +614,7 @@ def _with_same_data(
     evidence = trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.suspects, evidence)
+        return share_left(candidate, start, trial.compared, evidence)
 
     there = {c.effects: c for c in singles}
 
@@ -603,7 +629,7 @@ def _with_same_data(
     others: list[Candidate | None] = []
     for single in singles:
         (effect,) = single.effects
-        same = EFFECTS[effect].same_data
+        same = info_of(effect).same_data
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
         if same is not None and same_recordings(own, effect, seconds, evidence):
@@ -627,7 +653,7 @@ def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameDa
     if alike is None:
         return single
     evidence = trial.settings.evidence
-    shaped, free = (share_left(c, start, trial.suspects, evidence) for c in (alike, single))
+    shaped, free = (share_left(c, start, trial.compared, evidence) for c in (alike, single))
     return single if shaped > free + evidence.form_share_alike else replace(alike, gain=single.gain)
 
 

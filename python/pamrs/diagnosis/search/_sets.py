@@ -15,6 +15,7 @@ from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
+from pamrs.effects import exclude, id_of
 
 __all__ = ["beside_wrong", "left_everywhere", "settles", "several", "without_needless"]
 
@@ -101,7 +102,8 @@ def _pairs(
             for scores in by_effect(screened.scores(stand, without=single.effects)).values()
         ]
         least = max(settings.least_gain, settings.partner_share * mismatch)
-        best = [score for score in partners if score.gain > least][: settings.most_partners]
+        likely = [score for score in partners if score.gain > least]
+        best = _one_place_each(likely)[: settings.most_partners]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
         for block in _untouched(single, start, trial):
@@ -140,7 +142,7 @@ def _telling_together(
     """
     settings, evidence = trial.settings.search, trial.settings.evidence
     left = {
-        c: share_left(c, start, trial.suspects, evidence)
+        c: share_left(c, start, trial.compared, evidence)
         for c in (*singles, *mistaken)
         if c.fit.events is None
     }
@@ -151,13 +153,21 @@ def _telling_together(
     for one in leading:
         for other in [c for c in telling if c is not one][: settings.most_partners]:
             names = frozenset({*one.names, *other.names})
-            if names in done:
+            if names in done or any(exclude(e, one.effects) for e in other.effects):
                 continue
             done.add(names)
             tell(f"trying {' + '.join(sorted(names))}")
             both = _joined(trial, one, other)
             found += [] if both is None else [both]
     return found
+
+
+def _one_place_each(scores: list[Score]) -> list[Score]:
+    """Of scores in the order of their gain the first of each effect, wherever it acts."""
+    best: dict[str, Score] = {}
+    for score in scores:
+        best.setdefault(id_of(score.effect), score)
+    return list(best.values())
 
 
 def _joined(trial: Attempts, one: Candidate, other: Candidate) -> Candidate | None:
@@ -187,7 +197,7 @@ def _beside(
     settings, evidence = trial.settings.search, trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.suspects, evidence)
+        return share_left(candidate, start, trial.compared, evidence)
 
     steady = [c for c in singles if c.fit.events is None]
     best = min(steady, key=left_by, default=start)
@@ -286,7 +296,7 @@ def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say)
         stand = stand_of(best.fit, trial.inner, trial.white)
         ranked = by_effect(screened.scores(stand, without=best.effects)).values()
         least = max(settings.least_gain, settings.partner_share * stand.power_left)
-        likely = [scores[0] for scores in ranked if scores[0].gain > least]
+        likely = _one_place_each([s[0] for s in ranked if s[0].gain > least])
         tried = []
         for score in likely[: settings.most_partners]:
             tell(f"trying {' + '.join([*best.effects, score.effect])}")
@@ -330,9 +340,9 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     truth.
     """
     evidence = trial.settings.evidence
-    if explains(candidate, start, trial.suspects, evidence):
+    if explains(candidate, start, trial.compared, evidence):
         return True
-    little = share_left(candidate, start, trial.suspects, evidence) < evidence.form_share
+    little = share_left(candidate, start, trial.compared, evidence) < evidence.form_share
     return little and not _untouched(candidate, start, trial)
 
 

@@ -127,6 +127,16 @@ class SearchSettings(SettingsGroup):
     most_forms: int = setting(
         4, unit="count", least=1, reason="forms of an effect that are fitted", origin="judgement"
     )
+    near_place: float = setting(
+        0.3,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of an effect's best gain from which another place of it is fitted too, where "
+        "a rig has several blocks of a kind: of an effect at one of two alike blocks half shows at "
+        "both",
+        origin="docs/decisions/0101",
+    )
     most_starts: int = setting(
         2,
         unit="count",

@@ -1,0 +1,262 @@
+"""Effects at one of several blocks of a kind: what they are called, where they act, and a pair of
+muscles of which one leaks.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
+from pamrs.diagnosis.fit import Fit, Problem, acts_in, places_of, residuals, starts_of
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.result import schema
+from pamrs.effects import (
+    CATALOGUE,
+    exclude,
+    find_parameter,
+    id_of,
+    info_of,
+    place_of,
+    term_of,
+)
+from pamrs.findings import BlockVerdict
+from pamrs.recordings import Recording
+from pamrs.report.text import headline, label, told_apart
+from pamrs.simulation import core_rig
+from tests.diagnosis import again, synthetic
+from tests.diagnosis.noisy import noisy
+
+SETTINGS = DiagnosisSettings()
+PAIR = pamrs.rigs.antagonistic_joint()
+NOISE = {"supply_pressure": 400.0} | {
+    f"muscle_pressure.{name}": 400.0 for name in ("flexor", "extensor")
+}
+LEAK = 2e-11
+
+
+def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1600) -> Recording:
+    """Both valves of the pair moved against each other, 8 s at 200 Hz; the angle is read finely."""
+    time, phase = 0.005 * np.arange(n), np.random.default_rng([7, seed]).uniform(0.0, 6.0, 3)
+    flexor = 5.0 + 0.5 * np.sin(1.3 * time + phase[0]) + 0.35 * np.sin(3.1 * time + phase[1])
+    extensor = 5.0 - 0.5 * np.sin(1.3 * time + phase[0] + 0.4) - 0.3 * np.sin(2.7 * time + phase[2])
+    run = pamrs.simulate(rig, {"flexor": flexor, "extensor": extensor}, sample_time=0.005)
+    names = ["valve_command.flexor", "valve_command.extensor", *NOISE, "joint_angle.elbow"]
+    noise = NOISE | {"joint_angle.elbow": 3e-3}
+    return noisy(name, role, 0.005, {n: run[n] for n in names}, noise, [11, seed])
+
+
+def case(truth: pamrs.Rig) -> pamrs.Case:
+    """Two recordings to fit and one held out."""
+    found = [recorded(truth, name, role, k) for k, (name, role) in enumerate(again.ROLES)]
+    units = {"valve_command": "V", "joint_angle": "rad"}
+    for recording in found:
+        recording.units.update(
+            {name: units.get(name.partition(".")[0], "Pa") for name in recording.channels}
+        )
+    return pamrs.Case("pair", PAIR, found, Path())
+
+
+def blocks_of(rig: pamrs.Rig, *without: str):
+    """The blocks of a rig whose pressures and angles are measured, but for some channels."""
+    kinds = (("supply_pressure", "supply"), ("muscle_pressure", "chamber"))
+    kinds += (("joint_angle", "joint"), ("valve_command", "valve"))
+    channels = [
+        f"{channel}.{name}" if name else channel
+        for channel, kind in kinds
+        for name in rig.tables(kind)
+    ]
+    told = tuple(name for name in channels if name not in without)
+    return available_blocks(rig, told, SETTINGS.prepare)
+
+
+def test_one_block_of_each_kind_leaves_every_effect_as_it_was() -> None:
+    shoulder = pamrs.rigs.shoulder()
+    assert not any(places_of(shoulder, effect, blocks_of(shoulder)) for effect in CATALOGUE)
+
+
+def test_an_effect_can_be_at_each_block_that_the_channels_tell_from_the_others() -> None:
+    blocks = blocks_of(PAIR)
+    both = ["flexor", "extensor"]
+    for effect in ("leak_muscle", "valve_dead_zone", "muscle_hysteresis", "pressure_lag"):
+        assert places_of(PAIR, effect, blocks) == both
+    # one tank, one joint, the whole rig, and what happens at times of its own
+    for effect in ("supply_leak", "joint_end_stop", "clock_skew", "external_torque"):
+        assert places_of(PAIR, effect, blocks) == []
+    # with one gauge alone a leak everywhere is a leak there
+    assert places_of(PAIR, "leak_muscle", blocks_of(PAIR, "muscle_pressure.extensor")) == []
+    two = pamrs.rigs.named("two_joint_arm")
+    assert places_of(two, "joint_coulomb_stribeck", blocks_of(two)) == ["elbow", "wrist"]
+
+
+@pytest.mark.parametrize(
+    ("term", "acting"),
+    [
+        ("leak_muscle", {"chamber.flexor", "chamber.extensor"}),
+        ("leak_muscle@flexor", {"chamber.flexor"}),
+        ("valve_dead_zone@extensor", {"supply", "chamber.extensor"}),
+        ("muscle_hysteresis@flexor", {"arm.elbow"}),
+        ("pressure_lag@flexor", {"chamber.flexor", "arm.elbow"}),
+    ],
+)
+def test_an_effect_at_one_place_acts_in_the_blocks_that_depend_on_it(term, acting) -> None:
+    assert {b.name for b in blocks_of(PAIR) if acts_in(term, b)} == acting
+
+
+def test_names_with_a_place() -> None:
+    assert term_of("leak_muscle") == "leak_muscle"
+    assert info_of("leak_muscle@flexor") is info_of("leak_muscle")
+    one, other = (find_parameter(f"leak_muscle{at}.conductance") for at in ("", "@flexor"))
+    assert one is other
+    assert exclude("leak_muscle", ["leak_muscle@flexor"])
+    assert exclude("leak_muscle@flexor", ["leak_muscle"])
+    assert exclude("leak_muscle@flexor", ["leak_muscle@flexor"])
+    assert not exclude("leak_muscle@flexor", ["leak_muscle@extensor", "valve_area"])
+    assert (
+        label("leak_muscle@flexor+valve_area") == f"{label('leak_muscle')} at flexor + valve area"
+    )
+    told = told_apart([["leak_muscle"], ["leak_muscle@flexor"]], {})
+    assert "at every chamber from" in told
+    assert told.endswith("at flexor")
+
+
+def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
+    """Against a finite difference, for one instance of an effect and for two."""
+    prepared = prepare(recorded(PAIR, "one", "fit", 0, n=400), PAIR, SETTINGS)
+    problem = Problem(blocks_of(PAIR), [prepared], core_rig(PAIR), SETTINGS)
+    here, there = (starts_of(f"leak_muscle@{at}", sealed=False)[0] for at in ("flexor", "extensor"))
+    name, step = "leak_muscle@flexor.conductance", 1e-13
+
+    for begun in (PAIR, there.applied(PAIR)):
+        rig = here.applied(begun)
+        entry = next(e for e in rig.effects if e["at"] == "flexor")
+        more = rig.with_effect(
+            "leak_muscle", {"conductance": entry["parameters"]["conductance"] + step}, at="flexor"
+        )
+        found = residuals(problem, rig, [name])
+        moved = residuals(problem, more, [name])
+        own = found["chamber.flexor", "one"]
+        slope = (moved["chamber.flexor", "one"].prediction - own.prediction) / step
+        assert own.jacobian is not None
+        assert np.abs(slope).max() > 0.0
+        # without what a window's start can do in its place
+        expected = own.freed(slope)
+        np.testing.assert_allclose(own.jacobian[:, 0], expected, atol=2e-2 * np.abs(expected).max())
+        assert not np.any(found["chamber.extensor", "one"].jacobian)
+
+
+def made_up(term: str, left: float, places: int) -> Candidate:
+    """A hypothesis that leaves such a ratio of either chamber, fitted and held out."""
+    rig = PAIR.with_effect(id_of(term), at=place_of(term)) if term else PAIR
+    names = [f"{term}.{info_of(term).leading.name}"] if term else []
+    values = dict.fromkeys(names, 1e-11)
+    found = Fit((term,), rig, values, values, np.zeros((0, 0)), 0.0, {})
+    kept = {
+        b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
+        for b in blocks_of(PAIR)
+        if b.kind == "chamber"
+    }
+    effects = (term,) if term else ()
+    return Candidate(effects, found, kept, kept, 0.0, places=math.log(places))
+
+
+def weighed(*found: Candidate) -> dict[str, float]:
+    chambers = [b for b in blocks_of(PAIR) if b.kind == "chamber"]
+    return weigh([made_up("", 40.0, 1), *found], chambers, 0.985, 30.0, SETTINGS)
+
+
+def test_an_effect_at_many_places_is_no_more_probable_for_it() -> None:
+    blocks = blocks_of(PAIR)
+    problem = Problem(blocks, [], core_rig(PAIR), SETTINGS)
+    trial = Attempts(problem, problem, PAIR, {}, {}, blocks)
+    terms = ["leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"]
+    assert trial.terms_of("leak_muscle") == terms
+    assert trial.terms_of("supply_leak") == ["supply_leak"]
+    rival = made_up("valve_area", 3.0, 1)
+    alone = weighed(made_up("leak_muscle", 3.0, 1), rival)
+    shared = weighed(*(made_up(term, 3.0, len(terms)) for term in terms), rival)
+    assert [shared[term] for term in terms] == pytest.approx([alone["leak_muscle"] / 3.0] * 3)
+    assert shared["valve_area"] == pytest.approx(alone["valve_area"])
+
+
+def test_places_are_told_apart_by_what_they_leave_inside_the_noise() -> None:
+    """And the effect is no more and no less probable for it."""
+    rival = made_up("valve_area", 1.0, 1)
+    even = weighed(*(made_up(f"leak_muscle{at}", 0.9, 2) for at in ("", "@flexor")), rival)
+    better = weighed(made_up("leak_muscle", 0.9, 2), made_up("leak_muscle@flexor", 0.3, 2), rival)
+    assert even["leak_muscle"] == pytest.approx(even["leak_muscle@flexor"])
+    assert better["leak_muscle@flexor"] > 10.0 * better["leak_muscle"]
+    assert better["valve_area"] == pytest.approx(even["valve_area"])
+
+
+def test_only_the_place_is_open() -> None:
+    chances = {"leak_muscle@flexor": 0.5, "leak_muscle": 0.4, "unlisted": 0.1}
+    sets = [[key] for key in chances]
+    block = BlockVerdict(["chamber.flexor"], "effects", chances, ["leak_muscle@flexor"], [], sets)
+    given = synthetic.diagnosis(effects=[], blocks=[block])
+    assert headline(given) == (
+        f"The model leaves out: {effect_words()} in the chamber flexor, probability 0.90, and "
+        "these recordings cannot tell whether at flexor (0.50) or at every chamber (0.40)"
+    )
+
+
+@pytest.fixture(scope="module")
+def leaking() -> pamrs.Diagnosis:
+    return pamrs.diagnose(case(PAIR.with_effect("leak_muscle", {"conductance": LEAK}, at="flexor")))
+
+
+def test_a_leak_of_one_muscle_of_a_pair_is_named_with_its_place(leaking) -> None:
+    assert leaking.verdict == "effects"
+    (effect,) = leaking.effects
+    assert (effect.id, effect.at) == ("leak_muscle", "flexor")
+    assert effect.probability > 0.7
+    assert max(leaking.probabilities, key=leaking.probabilities.__getitem__) == effect.term
+    low, high = effect.parameters["conductance"].interval
+    assert low < LEAK < high
+    assert high - low < 0.6 * LEAK
+    terms = [t for t in leaking.budget if t.kind == "effect"]
+    assert [(t.block, t.id, t.at) for t in terms] == [("chamber.flexor", "leak_muscle", "flexor")]
+    assert terms[0].share > 0.9
+
+
+def test_its_place_is_said_in_text_page_and_json(leaking, tmp_path) -> None:
+    said = f"{effect_words()} at flexor"
+    assert said in headline(leaking)
+    assert said in leaking.text
+    assert said in leaking.summary()
+    assert said in leaking.report(tmp_path / "report.html").read_text(encoding="utf-8").lower()
+    told = json.loads(leaking.to_json())
+    jsonschema.validate(told, schema())
+    assert told["effects"][0]["at"] == "flexor"
+
+
+def effect_words() -> str:
+    return info_of("leak_muscle").name
+
+
+def test_the_model_has_it_there_and_serves_again(leaking, tmp_path, capsys) -> None:
+    home = again.written(case(leaking.rig), tmp_path / "case")
+    model = leaking.rig.with_case("case").to_toml(tmp_path / "model.toml")
+    assert 'at = "flexor"' in model.read_text(encoding="utf-8")
+    (entry,) = pamrs.load_rig(model).effects
+    assert (entry["id"], entry["at"]) == ("leak_muscle", "flexor")
+    assert pamrs.load_rig(model).effect_std["leak_muscle"]["conductance"] > 0.0
+    assert cli.main(["replay", str(model), "--recording", "slow"]) == 0
+    capsys.readouterr()
+    found = pamrs.diagnose(pamrs.load_case(home), rig=pamrs.load_rig(model))
+    assert found.verdict in ("none", "parameters")
+    assert "leak_muscle at flexor" in found.warnings[0]
+
+
+def test_nothing_is_named_in_a_healthy_pair() -> None:
+    found = pamrs.diagnose(case(PAIR))
+    assert found.verdict in ("none", "parameters")
