@@ -75,7 +75,7 @@ $(VENV)/.flags: $(VENV)/.created FORCE
 
 $(VENV)/.built: $(VENV)/.installed $(VENV)/.flags pyproject.toml $(RUST_SOURCES)
 	@echo "compiling the Rust core: some minutes the first time"
-	@env -u MAKEFLAGS -u MFLAGS PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
+	@env -u MAKEFLAGS -u MFLAGS PIP_QUIET=1 PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
 	    $(BIN)/maturin develop --release --quiet $(LOCKED)
 	@touch $@
 

@@ -20,7 +20,7 @@ from fingerprints.sheet import (
 )
 from pamrs import Simulation
 
-__all__ = ["change", "end_stop", "mounting", "push", "stiction", "swing"]
+__all__ = ["change", "end_stop", "mounting", "offset", "push", "stiction", "swing"]
 
 NAMES = ("without", "with the effect")
 
@@ -263,3 +263,28 @@ def _gain(run: Simulation, step: float) -> tuple[Array, Array]:
     frequency = np.fft.rfftfreq(size, step)
     keep = (frequency > 0.9) & (frequency < 15.0)
     return np.asarray(frequency[keep], dtype=np.float64), np.abs(top[keep] / bottom[keep])
+
+
+def offset(sheet: Sheet) -> None:
+    """A slow triangle of the pressure (no Coulomb friction)."""
+    time = clock(60.0, 0.05)
+    runs = sheet.run(
+        {"arm.coulomb": 0.0},
+        supply_command=BAR * through(time, (0.0, 0.0), (30.0, 3.2), (60.0, 0.0)),
+        sample_time=0.05,
+    )
+    axes = sheet.axes("at", width_ratios=[1, 1])
+    sheet.both(axes["a"], runs, angle)
+    label(axes["a"], "joint: off where it hangs", y="angle [deg]", legend="upper right")
+    for run, colour, name in zip(runs, (WITHOUT, WITH), NAMES, strict=True):
+        off_stop = angle(run) > angle(run).min() + 1.0
+        axes["t"].plot(
+            angle(run)[off_stop], missing_torque(sheet, run)[off_stop], color=colour, label=name
+        )
+    label(
+        axes["t"],
+        "torque that the model lacks: a cosine of the angle",
+        "angle [deg]",
+        "[N m]",
+        "lower right",
+    )

@@ -22,7 +22,7 @@ from fingerprints.sheet import (
 )
 from pamrs import Simulation, rigs, simulate
 
-__all__ = ["activation", "creep", "crowding", "damping", "hysteresis", "softening"]
+__all__ = ["activation", "creep", "crowding", "damping", "drift", "hysteresis", "softening"]
 
 NAMES = ("without", "with the effect")
 REST = 0.276  # m, rest length of the muscle on the bench, which is that of the joint
@@ -312,6 +312,41 @@ def crowding(sheet: Sheet) -> None:
     label(
         axes["x"],
         "joint: falls short the same way up and down",
+        "muscle [bar]",
+        "angle [deg]",
+        "upper left",
+    )
+
+
+def drift(sheet: Sheet) -> None:
+    """The same slow triangle again and again (no Coulomb friction)."""
+    over = 15.0
+    time = clock(8 * over, 0.05)
+    runs = sheet.run(
+        {"arm.coulomb": 0.0},
+        supply_command=BAR * zigzag(time, *(0.0, 2.5) * 4, 0.0, over=over),
+        sample_time=0.05,
+    )
+    axes = sheet.axes("ax", width_ratios=[1.1, 1])
+    sheet.both(axes["a"], runs, angle)
+    label(axes["a"], "joint: each cycle goes further", y="angle [deg]", legend="upper left")
+    cycle = round(2 * over / 0.05)
+    first, last = slice(10, cycle - 10), slice(3 * cycle + 10, 4 * cycle - 10)
+    axes["x"].plot(
+        pressure(runs[0])[last],
+        angle(runs[0])[last],
+        color=WITHOUT,
+        lw=4.0,
+        alpha=0.5,
+        label="without, every cycle",
+    )
+    for part, style, words in ((first, ":", "with, first cycle"), (last, "-", "with, last cycle")):
+        axes["x"].plot(
+            pressure(runs[1])[part], angle(runs[1])[part], style, color=WITH, label=words
+        )
+    label(
+        axes["x"],
+        "the same pressure holds another angle later",
         "muscle [bar]",
         "angle [deg]",
         "upper left",

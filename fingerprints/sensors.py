@@ -17,7 +17,7 @@ from fingerprints.sheet import (
     through,
 )
 
-__all__ = ["erring_encoder", "late_clock", "late_pressure"]
+__all__ = ["erring_encoder", "late_angle", "late_clock", "late_pressure"]
 
 NAMES = ("without", "with the effect")
 
@@ -123,3 +123,24 @@ def late_clock(sheet: Sheet) -> None:
             low_end, high_end = axes[letter].get_ylim()
             middle = 0.5 * (low_end + high_end)
             axes[letter].set_ylim(middle - 0.5 * max(sizes), middle + 0.5 * max(sizes))
+
+
+def late_angle(sheet: Sheet) -> None:
+    """A fill, then the arm swings on the shut-in air."""
+    time = clock(4.0, 0.002)
+    runs = sheet.run(
+        valve_command=hold(time, (0.0, 5.0), (0.2, 8.0), (0.3, 5.0)), sample_time=0.002
+    )
+    axes = sheet.axes("px;ax", width_ratios=[1.1, 1])
+    sheet.both(axes["p"], runs, pressure, part=slice(500, None))
+    label(axes["p"], "valve shut: the same pressure", y="muscle [bar]", legend="upper right")
+    sheet.both(axes["a"], runs, angle, part=slice(500, None))
+    label(axes["a"], "the angle is recorded later", y="angle [deg]")
+    sheet.both(axes["x"], runs, pressure, angle, part=slice(500, None))
+    label(
+        axes["x"],
+        "valve shut: pressure against angle, a loop",
+        "angle [deg]",
+        "muscle [bar]",
+        "upper right",
+    )

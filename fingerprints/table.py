@@ -155,6 +155,14 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"softening": 0.3},
         ),
         Experiment(
+            "parameter_drift",
+            "regulated_joint",
+            "the same slow triangle of the pressure again and again (no Coulomb friction)",
+            "the same pressure holds another angle later, whatever was done before",
+            muscle.drift,
+            {"change": -0.3, "time_constant": 40.0},
+        ),
+        Experiment(
             "pam_crowding_contact",
             "regulated_joint",
             (
@@ -197,6 +205,14 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"mass_change": -2.0, "time": 40.0},
         ),
         Experiment(
+            "com_offset",
+            "regulated_joint",
+            "a slow triangle of the pressure (no Coulomb friction)",
+            "a torque that is largest where the link hangs, at any pressure",
+            motion.offset,
+            {"moment": 4.0},
+        ),
+        Experiment(
             "external_torque",
             "regulated_joint",
             (
@@ -221,6 +237,14 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             "the recorded pressure is late, also where motion makes it with the valve shut",
             sensors.late_pressure,
             {"time_constant": 0.02},
+        ),
+        Experiment(
+            "sensor_lag",
+            "shoulder",
+            "a short fill, then the arm swings on the air that is shut in",
+            "the angle is recorded later than the pressure that moves it",
+            sensors.late_angle,
+            {"delay": 0.03},
         ),
         Experiment(
             "encoder_error",

@@ -115,7 +115,7 @@ fn switched_on_it_moves_its_channel() {
         let (plain, on) = (with(spec.clone(), vec![]), with(spec, vec![typical.on()]));
         let (a, b) = (run(&plain, ROWS), run(&on, ROWS));
         let name = match EFFECTS.iter().find(|e| e.id == typical.id).map(|e| e.block) {
-            _ if typical.id == "encoder_error" => "joint_angle",
+            _ if ["encoder_error", "sensor_lag"].contains(&typical.id) => "joint_angle",
             Some("supply") => "supply_pressure",
             Some("valve" | "line" | "chamber" | "sensors") => "muscle_pressure",
             _ => "joint_angle",
@@ -313,7 +313,7 @@ fn sensitivities_are_those_of_differences() {
         };
         let blind = blind(typical.id);
         sensitivities(typical, &spec, &truth, block, blind);
-        if ["pressure_lag", "encoder_error"].contains(&typical.id) {
+        if ["pressure_lag", "encoder_error", "sensor_lag"].contains(&typical.id) {
             sensitivities(typical, &spec, &truth, "arm", &[]);
         }
         if info.block == "valve" {

@@ -40,6 +40,8 @@ pub enum Port {
     Torque,
     /// Joint: a torque from outside on its link.
     Push,
+    /// Joint: what its link weighs beside what its first moment and payload do.
+    Weight,
     /// Arm: the mass at the end of a link.
     Payload,
     /// Arm: a part of that mass that hangs on a cord. One effect at most, with two states: angle and
@@ -332,6 +334,12 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
 
     /// [`Port::Push`]: torque from outside [N m] at a time [s].
     fn push(&self, _time: f64) -> S {
+        constant(0.0)
+    }
+
+    /// [`Port::Weight`]: torque [N m] on the joint of a link, and on all before it, where the link
+    /// stands at an angle from the direction of gravity [rad].
+    fn weight(&self, _direction: S) -> S {
         constant(0.0)
     }
 

@@ -208,7 +208,7 @@ impl<S: Scalar> Body<S> {
     }
 
     /// Angle of the first link from the gravity vector where its joint's is zero [rad].
-    fn base_angle(&self) -> S {
+    pub fn base_angle(&self) -> S {
         match self {
             Self::Fixed | Self::Mass(..) => constant(0.0),
             Self::OneLink(arm, _) => arm.mounting.base_angle(),

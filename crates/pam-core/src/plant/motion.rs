@@ -53,6 +53,14 @@ impl<S: Scalar> Plant<'_, S> {
                 *load += self.effect(acting).push(time);
             }
         }
+        let mut direction = self.body.base_angle();
+        for (k, weight) in ports.weight.iter().enumerate() {
+            direction += pose[k];
+            for acting in weight {
+                let torque = self.effect(acting).weight(direction);
+                load[..=k].iter_mut().for_each(|load| *load += torque);
+            }
+        }
         let body = self.carrying(time);
         let accelerations = layout.rate(0)..layout.effect(0);
         body.accelerations(pose, turn, load, &mut out[accelerations.clone()]);

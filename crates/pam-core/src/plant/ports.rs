@@ -82,6 +82,7 @@ pub(crate) struct Ports {
     /// Of each coordinate.
     pub torque: Vec<Vec<Acting>>,
     pub push: Vec<Vec<Acting>>,
+    pub weight: Vec<Vec<Acting>>,
     /// With the link at whose end they act.
     pub payload: Vec<(usize, Acting)>,
     pub hanging: Option<(usize, Acting)>,
@@ -101,7 +102,8 @@ impl Ports {
 
     /// Some effect acts on joints, arm or load.
     pub fn on_motion(&self) -> bool {
-        let joints = self.torque.iter().chain(&self.push).any(|acting| !acting.is_empty());
+        let on_joints = self.torque.iter().chain(&self.push).chain(&self.weight);
+        let joints = on_joints.into_iter().any(|acting| !acting.is_empty());
         joints || !self.payload.is_empty() || self.hanging.is_some() || self.mounting.is_some()
     }
 
@@ -202,6 +204,7 @@ pub(super) fn switch_on(
         muscles: vec![MusclePorts::default(); wiring.groups.len()],
         torque: vec![Vec::new(); wiring.coordinates.len()],
         push: vec![Vec::new(); wiring.coordinates.len()],
+        weight: vec![Vec::new(); wiring.coordinates.len()],
         encoder: vec![None; wiring.coordinates.len()],
         ..Ports::default()
     };
@@ -476,6 +479,7 @@ impl Ports {
             }
             (Port::Torque, Place::Joint(k)) => push(&mut self.torque[k], acting),
             (Port::Push, Place::Joint(k)) => push(&mut self.push[k], acting),
+            (Port::Weight, Place::Joint(k)) => push(&mut self.weight[k], acting),
             (Port::Payload, Place::Joint(k)) => push(&mut self.payload, (k, acting)),
             (Port::Hanging, Place::Joint(k)) => self.hang(k, acting, wiring, spec)?,
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),

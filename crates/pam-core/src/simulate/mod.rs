@@ -280,8 +280,8 @@ pub struct Progress {
     /// Conditions that an event ends, see [`Watch`].
     flags: Vec<bool>,
     samples: u64,
-    /// Commands and pressure readings of the samples before, newest last, as far back as the effect
-    /// `clock_skew` reaches.
+    /// Commands and readings of the samples before, newest last, as far back as clocks that are apart
+    /// reach.
     past: Vec<f64>,
     /// How many of them a sample has: all commands and readings, or none.
     kept: usize,
@@ -332,7 +332,7 @@ impl Progress {
         // what a run begins with does not happen in it; a pressure that is out of bounds does
         let others = 2 * rig.wiring.chambers + rig.wiring.valves.len() + rig.wiring.lines.len();
         flags.extend(std::iter::repeat_n(false, others));
-        let readings = if plant.skewed() { gauges(rig).count() } else { 0 };
+        let readings = if plant.skewed() { readings(rig).count() } else { 0 };
         let kept = if plant.delayed() { rig.names.inputs.len() + readings } else { 0 };
         Self { state, memory, flags, samples: 0, past: Vec::new(), kept }
     }
@@ -491,10 +491,11 @@ impl Progress {
     ) {
         plant.observe(&self.state, &self.memory, scratch, out);
         if self.keeps_readings(plant) {
-            let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
-            let later = (pressures.max(0.0) - angles.max(0.0)) / timing.sample_time;
+            let late_by = Late::at(plant, self.samples as f64 * timing.sample_time);
             let first = plant.rig().names.inputs.len();
-            for (column, channel) in gauges(plant.rig()).enumerate() {
+            for (column, (channel, pressure)) in readings(plant.rig()).enumerate() {
+                let shift = if pressure { late_by.pressures } else { late_by.motion };
+                let later = shift / timing.sample_time;
                 let rows = || self.past.chunks(self.kept).rev();
                 let seen = out.get_mut(channel).and_then(|samples| samples.last_mut());
                 if let Some(reading) = seen {
@@ -505,12 +506,12 @@ impl Progress {
         }
     }
 
-    /// Whether pressures of past samples are kept beside the commands.
+    /// Whether readings of past samples are kept beside the commands.
     fn keeps_readings(&self, plant: &Plant<'_, f64>) -> bool {
         self.kept > plant.rig().names.inputs.len()
     }
 
-    /// Note the commands of a sample, and its pressures where another clock records them; forget
+    /// Note the commands of a sample, and its readings where another clock records them; forget
     /// what nobody asks for any more.
     fn remember(
         &mut self,
@@ -522,19 +523,19 @@ impl Progress {
     ) {
         self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
         if self.keeps_readings(plant) {
-            let mut readings = vec![Vec::new(); plant.rig().names.channels.len()];
-            plant.observe(&self.state, &self.memory, scratch, &mut readings);
-            let gauges = gauges(plant.rig());
-            self.past.extend(gauges.flat_map(|channel| readings[channel].last().copied()));
+            let mut seen = vec![Vec::new(); plant.rig().names.channels.len()];
+            plant.observe(&self.state, &self.memory, scratch, &mut seen);
+            let kept = readings(plant.rig());
+            self.past.extend(kept.flat_map(|(channel, _)| seen[channel].last().copied()));
         }
-        let (skew, _) = plant.skew(self.samples as f64 * timing.sample_time);
-        let latest = skew.max(0.0) + plant.dead_time();
+        let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
+        let latest = pressures.max(angles).max(0.0) + plant.dead_time();
         let most = self.kept * (2 + (latest / timing.sample_time).ceil() as usize);
         self.past.drain(..self.past.len().saturating_sub(most));
     }
 
     /// Commands over the step that begins at a time, the newest being those of the present sample:
-    /// as late as the angles.
+    /// as late as what is recorded first.
     fn delayed(&self, plant: &Plant<'_, f64>, time: f64, timing: Timing) -> Controls<f64> {
         let rows = self.past.len() / self.kept;
         let command = |input: usize, sample: i64| {
@@ -544,10 +545,10 @@ impl Progress {
             let back = (self.samples as i64 - sample).clamp(0, rows as i64 - 1) as usize;
             self.past[(rows - 1 - back) * self.kept + input]
         };
-        let (_, shift) = plant.skew(time);
+        let shift = Late::at(plant, time).commands;
         let (step, sample_time) = (timing.step(), timing.sample_time);
         let mut controls = plant.controls(|_| 0.0);
-        plant.delayed_controls(shift.max(0.0), time, step, sample_time, command, &mut controls);
+        plant.delayed_controls(shift, time, step, sample_time, command, &mut controls);
         controls
     }
 
@@ -702,10 +703,32 @@ impl Progress {
     }
 }
 
-/// Channels that are readings of pressures.
-fn gauges(rig: &Rig) -> impl Iterator<Item = usize> + '_ {
-    let pressure = |channel: &Channel| matches!(channel, Channel::Supply(_) | Channel::Pressure(_));
-    rig.names.channels.iter().enumerate().filter(move |(_, (_, c))| pressure(c)).map(|(k, _)| k)
+/// Channels that are readings of pressures (true) and of what moves.
+fn readings(rig: &Rig) -> impl Iterator<Item = (usize, bool)> + '_ {
+    rig.names.channels.iter().enumerate().filter_map(|(k, (_, channel))| match channel {
+        Channel::Supply(_) | Channel::Pressure(_) => Some((k, true)),
+        Channel::Angle(_) | Channel::Rate(_) | Channel::Length | Channel::LengthRate => {
+            Some((k, false))
+        }
+        _ => None,
+    })
+}
+
+/// How late a run sees its commands and records what it reads [s]: it runs on the clock of what is
+/// recorded first.
+struct Late {
+    commands: f64,
+    pressures: f64,
+    motion: f64,
+}
+
+impl Late {
+    fn at(plant: &Plant<'_, f64>, time: f64) -> Self {
+        let (pressures, angles) = plant.skew(time);
+        let (pressures, angles) = (pressures.max(0.0), angles.max(0.0));
+        let commands = pressures.min(angles);
+        Self { commands, pressures: pressures - commands, motion: angles - commands }
+    }
 }
 
 /// The gas of a prescribed pressure is at the temperature of the room, and what that takes was

@@ -222,10 +222,13 @@ pub const TYPICAL: &[Typical] = &[
         &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.03)],
         &[("compliance", 0.0)],
     ),
+    typical("com_offset", &[("moment", 8.0)], &[("moment", 0.0)]),
+    typical("sensor_lag", &[("delay", 0.0123)], &[("delay", 0.0)]),
+    typical("parameter_drift", &[("change", -0.3), ("time_constant", 0.4)], &[("change", 0.0)]),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
     typical(
         "encoder_error",
-        &[("sine", 0.01), ("cosine", -0.02)],
+        &[("sine", 0.01), ("cosine", -0.02), ("set_angle", 0.3)],
         &[("sine", 0.0), ("cosine", 0.0)],
     ),
     typical(
@@ -361,9 +364,16 @@ pub const FORMS: &[Typical] = &[
     formed(
         "encoder_error",
         "first_and_second",
-        &[("sine", 0.01), ("cosine", -0.02), ("sine_2", 0.003), ("cosine_2", 0.004)],
+        &[
+            ("sine", 0.01),
+            ("cosine", -0.02),
+            ("sine_2", 0.003),
+            ("cosine_2", 0.004),
+            ("set_angle", 0.3),
+        ],
         &[("sine", 0.0), ("cosine", 0.0), ("sine_2", 0.0), ("cosine_2", 0.0)],
     ),
+    formed("parameter_drift", "straight", &[("rate", -0.06)], &[("rate", 0.0)]),
     formed("external_torque", "constant", &[("torque", 6.0)], &[("torque", 0.0)]),
     formed(
         "external_torque",
