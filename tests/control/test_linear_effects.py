@@ -116,7 +116,15 @@ def test_behind_a_lag_a_valve_still_has_sides(rig, side):
 
 
 @pytest.mark.parametrize(
-    "effect", ["valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"]
+    "effect",
+    [
+        "valve_dead_zone",
+        "valve_hysteresis",
+        "mullins_softening",
+        "parameter_drift",
+        "clock_skew",
+        "sensor_lag",
+    ],
 )
 def test_what_has_no_linear_model_is_refused_by_name(rig, effect):
     with pytest.raises(ParameterError, match=f"{effect}.*no linear model"):
@@ -149,7 +157,14 @@ def test_play_and_dead_zone_of_no_width_and_lags_of_no_time_are_none(rig):
 
 
 def test_every_effect_is_known_and_all_together_too(rig):
-    kinks = {"valve_dead_zone", "valve_hysteresis", "mullins_softening", "clock_skew"}
+    kinks = {
+        "valve_dead_zone",
+        "valve_hysteresis",
+        "mullins_softening",
+        "parameter_drift",
+        "clock_skew",
+        "sensor_lag",
+    }
     every = rig
     for effect in reversed(EFFECTS):
         if effect not in kinks and effect != "supply_regulator_deadband":

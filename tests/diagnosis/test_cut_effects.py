@@ -17,8 +17,8 @@ from pamrs.simulation import core_rig
 
 DT = 0.001
 SAMPLES = 3001
-# a clock that is late is read between samples, and has tests of its own
-ELSEWHERE = {"clock_skew"}
+# what is late is read between samples, and has tests of its own
+ELSEWHERE = {"clock_skew", "sensor_lag"}
 # a flow that chokes in the tube hides the pressure behind it (Tube::other_end)
 UNTOLD = {("tube_flow_restriction", "arm")}
 

@@ -2,8 +2,8 @@
 //!
 //! `F_b -> F_b (1 + D (1 - exp(-t/tau)))` of the bladder's part of the force, `t` the time since
 //! the recording began: rubber that warms up while it works softens towards another value. This is
-//! the form `exponential`. `straight`: `F_b -> F_b (1 + r t)`, while that is above zero, for a
-//! change that has no end in sight. Mullins' softening goes with the largest stretch and creep with
+//! the form `exponential`. `straight`: `F_b -> F_b (1 + D t/60 s)`, while that is above zero, for a
+//! change that has no end in sight, `D` in a minute. Mullins' softening goes with the largest stretch and creep with
 //! what was done before, this one with time alone. L. R. G. Treloar, *The Physics of Rubber
 //! Elasticity* (1975), ch. 2 and 13 (moduli and temperature);
 //! B. Tondu & P. Lopez, IEEE Control Systems 20, 2000 (muscles that warm up).
@@ -13,10 +13,13 @@ use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 
+const CHANGE: EffectParameter =
+    EffectParameter::new("change", "1", -0.9, 10.0, 0.2).starts(&[-0.1, 0.1]).off(0.0);
+
 const EXPONENTIAL: Form = Form {
     name: "exponential",
     parameters: &[
-        EffectParameter::new("change", "1", -0.9, 10.0, 0.2).starts(&[-0.1, 0.1]).off(0.0),
+        CHANGE,
         EffectParameter::new("time_constant", "s", 0.1, 1e5, 20.0)
             .starts(&[10.0, 60.0])
             .time_constant(),
@@ -34,7 +37,7 @@ pub const INFO: EffectInfo = EffectInfo {
     at: "muscle",
     order: 1,
     kink: Some(Kink {
-        where_not_zero: &["change", "rate"],
+        where_not_zero: &["change"],
         why: "it goes on with time, and has no state of rest",
         of_supplies: false,
     }),
@@ -43,9 +46,7 @@ pub const INFO: EffectInfo = EffectInfo {
         EXPONENTIAL,
         Form {
             name: "straight",
-            parameters: &[EffectParameter::new("rate", "1/s", -0.1, 0.1, 0.003)
-                .starts(&[-0.003, 0.003])
-                .off(0.0)],
+            parameters: &[CHANGE],
             states: &[EffectState { name: "time", role: Role::Keeps }],
             make: made_by!(straight),
             ..EXPONENTIAL
@@ -54,6 +55,9 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
+/// A minute [s].
+const MINUTE: f64 = 60.0;
+
 /// Towards another value; its state is the share of the way [1].
 #[derive(Debug, Clone, Copy)]
 struct Exponential<S> {
@@ -61,7 +65,8 @@ struct Exponential<S> {
     time_constant: S,
 }
 
-/// With a constant rate; its state is the time since the recording began [s].
+/// With a constant rate, a change in a minute; its state is the time since the recording began
+/// [min].
 #[derive(Debug, Clone, Copy)]
 struct Straight<S>(S);
 
@@ -89,7 +94,7 @@ impl<S: Scalar> Effect<S> for Exponential<S> {
 
 impl<S: Scalar> Effect<S> for Straight<S> {
     fn rates(&self, _at: &At<S>, _own: &[S], rates: &mut [S]) {
-        rates[0] = constant(1.0);
+        rates[0] = constant(1.0 / MINUTE);
     }
 
     fn bladder(&self, own: &[S], bladder: S, _contraction: S) -> S {
@@ -114,11 +119,11 @@ mod tests {
 
     #[test]
     fn it_goes_with_time_alone() {
-        let (warm, on) = (made("exponential", &[-0.2, 30.0]), made("straight", &[-0.01]));
+        let (warm, on) = (made("exponential", &[-0.2, 30.0]), made("straight", &[-0.2]));
         assert_eq!(warm.bladder(&[0.0], -80.0, 0.1), 0.0);
         assert_eq!(warm.bladder(&[1.0], -80.0, 0.1), 16.0);
-        assert_eq!(on.bladder(&[10.0], -80.0, 0.3), 8.0);
-        assert_eq!(on.bladder(&[500.0], -80.0, 0.3), 80.0);
+        assert_eq!(on.bladder(&[0.5], -80.0, 0.3), 8.0);
+        assert_eq!(on.bladder(&[9.0], -80.0, 0.3), 80.0);
     }
 
     #[test]
@@ -127,7 +132,7 @@ mod tests {
         let at = At::Valve { fed: 1e5 };
         made("exponential", &[-0.2, 30.0]).rates(&at, &[0.25], &mut rate);
         assert_eq!(rate, [0.025]);
-        made("straight", &[-0.01]).rates(&at, &[7.0], &mut rate);
-        assert_eq!(rate, [1.0]);
+        made("straight", &[-0.2]).rates(&at, &[7.0], &mut rate);
+        assert_eq!(rate, [1.0 / 60.0]);
     }
 }

@@ -373,7 +373,7 @@ pub const FORMS: &[Typical] = &[
         ],
         &[("sine", 0.0), ("cosine", 0.0), ("sine_2", 0.0), ("cosine_2", 0.0)],
     ),
-    formed("parameter_drift", "straight", &[("rate", -0.06)], &[("rate", 0.0)]),
+    formed("parameter_drift", "straight", &[("change", -0.8)], &[("change", 0.0)]),
     formed("external_torque", "constant", &[("torque", 6.0)], &[("torque", 0.0)]),
     formed(
         "external_torque",

@@ -498,8 +498,9 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     settings = trial.settings.search
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
-    most = max(gains.values(), default=0.0)
-    least = max(settings.least_gain, settings.least_gain_share * most)
+    least = settings.least_gain
+    if not screened.strong:  # of a strong effect a signature ranks, and rules nothing out
+        least = max(least, settings.least_gain_share * max(gains.values(), default=0.0))
     worth = _by_family([e for e, gain in gains.items() if gain > least])
     tell(
         "screened: "
