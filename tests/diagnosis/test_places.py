@@ -204,7 +204,7 @@ def test_only_the_place_is_open() -> None:
     block = BlockVerdict(["chamber.flexor"], "effects", chances, ["leak_muscle@flexor"], [], sets)
     given = synthetic.diagnosis(effects=[], blocks=[block])
     assert headline(given) == (
-        f"The model leaves out: {effect_words()} in the chamber flexor, probability 0.90, and "
+        f"The model leaves out: {effect_words()} in the chamber of flexor, probability 0.90, and "
         "these recordings cannot tell whether at flexor (0.50) or at every chamber (0.40)"
     )
 
@@ -226,6 +226,12 @@ def test_a_leak_of_one_muscle_of_a_pair_is_named_with_its_place(leaking) -> None
     terms = [t for t in leaking.budget if t.kind == "effect"]
     assert [(t.block, t.id, t.at) for t in terms] == [("chamber.flexor", "leak_muscle", "flexor")]
     assert terms[0].share > 0.9
+
+
+def test_a_channel_that_was_right_stays_right(leaking) -> None:
+    """Groups share the zeros of gauges: the arm keeps the ones that were settled before."""
+    angle = leaking.fit.held_out["joint_angle.elbow"]
+    assert angle.after < 1.3 * angle.refit
 
 
 def test_its_place_is_said_in_text_page_and_json(leaking, tmp_path) -> None:

@@ -386,16 +386,21 @@ def _settled(
     owners = _owners(chosen)
     found = list(chosen)
     for k, candidate in enumerate(chosen):
+        own = replace(problem, blocks=judged[k].group.blocks)
+        # those that were held before too: a fit that frees one again is right beside its own only
         common = {
-            n: chosen[owners[n]].fit
-            for n in candidate.fit.moved
-            if owners[n] != k and n.startswith("sensors.")
+            n: chosen[owner].fit
+            for n, owner in owners.items()
+            if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in own.blocks)
         }
         settings = problem.settings.fit
-        differences = [abs(candidate.fit.moved[n] - other.moved[n]) for n, other in common.items()]
-        apart = any(difference > settings.zero_difference for difference in differences)
+        own_values = candidate.fit.rig.parameters
+        apart = any(
+            abs(own_values[n].value - other.values[n])
+            > settings.zero_difference * nominal.parameters[n].tol
+            for n, other in common.items()
+        )
         if apart and candidate.fit.events is None:
-            own = replace(problem, blocks=judged[k].group.blocks)
             effects = candidate.fit.effects
             free, fixed, forms = parts_of(
                 start_of(candidate.fit, effect, settings.least_start) for effect in effects
