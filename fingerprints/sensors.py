@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from fingerprints.sheet import (
     BAR,
@@ -16,18 +17,36 @@ from fingerprints.sheet import (
     pressure,
     through,
 )
+from pamrs import Simulation
 
 __all__ = ["erring_encoder", "late_angle", "late_clock", "late_pressure"]
 
 NAMES = ("without", "with the effect")
 
 
-def late_pressure(sheet: Sheet) -> None:
+def _swinging(sheet: Sheet) -> tuple[Simulation, Simulation]:
     """A fill, then the arm swings on the shut-in air."""
     time = clock(4.0, 0.002)
-    runs = sheet.run(
+    return sheet.run(
         valve_command=hold(time, (0.0, 5.0), (0.2, 8.0), (0.3, 5.0)), sample_time=0.002
     )
+
+
+def _loop(sheet: Sheet, axes: Axes, runs: tuple[Simulation, Simulation]) -> None:
+    """Pressure against angle while the valve is shut."""
+    sheet.both(axes, runs, pressure, angle, part=slice(500, None))
+    label(
+        axes,
+        "valve shut: pressure against angle, a loop",
+        "angle [deg]",
+        "muscle [bar]",
+        "upper right",
+    )
+
+
+def late_pressure(sheet: Sheet) -> None:
+    """A fill, then the arm swings on the shut-in air."""
+    runs = _swinging(sheet)
     axes = sheet.axes("fx;sx", width_ratios=[1.1, 1])
     sheet.both(axes["f"], runs, pressure, part=slice(75, 225))
     axes["f"].axvspan(0.2, 0.3, color="#dfe3e8", lw=0, zorder=0, label="valve open")
@@ -39,14 +58,7 @@ def late_pressure(sheet: Sheet) -> None:
         y="muscle [bar]",
         legend="upper right",
     )
-    sheet.both(axes["x"], runs, pressure, angle, part=slice(500, None))
-    label(
-        axes["x"],
-        "valve shut: pressure against angle, a loop",
-        "angle [deg]",
-        "muscle [bar]",
-        "upper right",
-    )
+    _loop(sheet, axes["x"], runs)
 
 
 def erring_encoder(sheet: Sheet) -> None:
@@ -127,20 +139,10 @@ def late_clock(sheet: Sheet) -> None:
 
 def late_angle(sheet: Sheet) -> None:
     """A fill, then the arm swings on the shut-in air."""
-    time = clock(4.0, 0.002)
-    runs = sheet.run(
-        valve_command=hold(time, (0.0, 5.0), (0.2, 8.0), (0.3, 5.0)), sample_time=0.002
-    )
+    runs = _swinging(sheet)
     axes = sheet.axes("px;ax", width_ratios=[1.1, 1])
     sheet.both(axes["p"], runs, pressure, part=slice(500, None))
     label(axes["p"], "valve shut: the same pressure", y="muscle [bar]", legend="upper right")
     sheet.both(axes["a"], runs, angle, part=slice(500, None))
     label(axes["a"], "the angle is recorded later", y="angle [deg]")
-    sheet.both(axes["x"], runs, pressure, angle, part=slice(500, None))
-    label(
-        axes["x"],
-        "valve shut: pressure against angle, a loop",
-        "angle [deg]",
-        "muscle [bar]",
-        "upper right",
-    )
+    _loop(sheet, axes["x"], runs)

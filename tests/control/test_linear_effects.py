@@ -35,6 +35,15 @@ MOVING = {
     ),
     "closure_flow": ({"pressure_memory": -2e-4, "memory_time": 0.1}, ["closure_flow.pressure"]),
 }
+#: effects that have no linear model
+KINKED = (
+    "valve_dead_zone",
+    "valve_hysteresis",
+    "mullins_softening",
+    "parameter_drift",
+    "clock_skew",
+    "sensor_lag",
+)
 
 
 @pytest.fixture(scope="module")
@@ -115,17 +124,7 @@ def test_behind_a_lag_a_valve_still_has_sides(rig, side):
     )
 
 
-@pytest.mark.parametrize(
-    "effect",
-    [
-        "valve_dead_zone",
-        "valve_hysteresis",
-        "mullins_softening",
-        "parameter_drift",
-        "clock_skew",
-        "sensor_lag",
-    ],
-)
+@pytest.mark.parametrize("effect", KINKED)
 def test_what_has_no_linear_model_is_refused_by_name(rig, effect):
     with pytest.raises(ParameterError, match=f"{effect}.*no linear model"):
         linearise(rig.with_effect(effect), ANGLE)
@@ -157,17 +156,9 @@ def test_play_and_dead_zone_of_no_width_and_lags_of_no_time_are_none(rig):
 
 
 def test_every_effect_is_known_and_all_together_too(rig):
-    kinks = {
-        "valve_dead_zone",
-        "valve_hysteresis",
-        "mullins_softening",
-        "parameter_drift",
-        "clock_skew",
-        "sensor_lag",
-    }
     every = rig
     for effect in reversed(EFFECTS):
-        if effect not in kinks and effect != "supply_regulator_deadband":
+        if effect not in KINKED and effect != "supply_regulator_deadband":
             every = every.with_effect(effect)
     model = linearise(every, ANGLE)
     assert np.linalg.eigvals(model.a).real.max() < 1.0
