@@ -506,7 +506,7 @@ def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
         ([*SIZES, "--model", "hill"], ["model = 'hill' is not allowed"]),
         ([*SIZES, "--order", "40"], ["order = 40"]),
         ([*SIZES, "--levels", "350kPa"], ["no measurement at 350 kPa"]),
-        ([*SIZES, "--levels", "350"], ["--levels = '350' is not allowed", "'Pa'"]),
+        ([*SIZES, "--levels", "350"], ["--levels = '350' is not allowed", "'bar'"]),
         ([*SIZES, "--levels", "350 mm"], ["--levels", "wrong dimension"]),
         ([*SIZES, "--free", "colour"], ["'colour' is not allowed"]),
         ([*SIZES, "--where", "muscle"], ["COLUMN=VALUE"]),

@@ -105,7 +105,9 @@ def test_effect_moves_its_channel(name, cycle):
 
 
 def test_names_are_those_of_the_catalogue():
-    assert set(LISTED) == set(CATALOGUE) - {"supply_regulator_deadband"}  # a tank feeds the rig
+    # a tank feeds the rig; the others are newer than the plans, whose cases stay the same
+    lacking = {"supply_regulator_deadband", "com_offset", "sensor_lag", "parameter_drift"}
+    assert set(LISTED) == set(CATALOGUE) - lacking
     assert len(UNLISTED) >= 6
     assert not set(LISTED) & set(UNLISTED)
     assert all(

@@ -111,6 +111,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         same_data=_same_data(told["same_data"], words),
         terms=terms,
         label=words.get("label", ""),
+        stated_by=tuple(words.get("stated_by", ())),
         acts_in=tuple(told["acts_in"]),
         experiment=words.get("experiment", ""),
         excitation=tuple(

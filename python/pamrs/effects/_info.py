@@ -240,6 +240,9 @@ class EffectInfo:
         memories.
     label : str
         Short name for tables and figures; the id in words by default.
+    stated_by : tuple of str
+        Parameters of the rig that say the same: where the file gives one of them a tolerance, it is
+        fitted, and the effect is not looked for.
     acts_in : tuple of str
         Kinds of block of the cut chain in which it acts (``supply``, ``chamber``, ``arm``), where
         these are others than those of its block.
@@ -281,6 +284,7 @@ class EffectInfo:
     same_data: SameData | None = None
     terms: tuple[Term, ...] = ()
     label: str = ""
+    stated_by: tuple[str, ...] = ()
     acts_in: tuple[str, ...] = ()
     experiment: str = ""
     excitation: tuple[tuple[str, str | int | float | tuple[float, ...]], ...] = ()

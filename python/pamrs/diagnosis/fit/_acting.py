@@ -116,8 +116,10 @@ def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
 
 
 def fits(rig: Rig, effect: str) -> bool:
-    """Whether a rig has what an effect acts on."""
+    """Whether a rig has what an effect acts on, and no uncertain parameter that says the same."""
     info = EFFECTS[effect]
+    if any(p in rig.parameters and rig.parameters[p].tol > 0.0 for p in info.stated_by):
+        return False
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
         kind in ("", kind_of(block, table))

@@ -312,7 +312,7 @@ def _hypotheses(
     that are wrong.
     """
     trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
-    singles = _singles(trial, screened, start, tell)
+    singles = _singles(trial, screened, start.fit, tell)
     singles = _with_same_data(trial, start, singles, seconds)
     least = trial.settings.search.transient_from
     if transient and all(
@@ -493,15 +493,14 @@ def _together(trial: Attempts, start: Candidate) -> Candidate | None:
     return Candidate((), found, held, fitted, 0.0)
 
 
-def _singles(trial: Attempts, screened: Screen, start: Candidate, tell: Say) -> list[Candidate]:
-    """The effects that the screen finds worth it, fitted; the most telling first.
-
-    Of a strong effect a signature ranks, and rules nothing out: where none of the most telling ones
-    explains the mismatch, the others are fitted as well.
-    """
+def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> list[Candidate]:
+    """The effects that the screen finds worth it, fitted; the most telling first."""
     settings = trial.settings.search
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
+    most = max(gains.values(), default=0.0)
+    least = max(settings.least_gain, settings.least_gain_share * most)
+    worth = _by_family([e for e, gain in gains.items() if gain > least])
     tell(
         "screened: "
         + (
@@ -509,25 +508,6 @@ def _singles(trial: Attempts, screened: Screen, start: Candidate, tell: Say) -> 
             or "no effect acts here"
         )
     )
-    least = max(settings.least_gain, settings.least_gain_share * max(gains.values(), default=0.0))
-    telling = {e: gain for e, gain in gains.items() if gain > least}
-    found = _fitted_singles(trial, screened, ranked, telling, start.fit)
-    if screened.strong and not any(settles(c, trial, start) for c in found):
-        others = {e: g for e, g in gains.items() if settings.least_gain < g <= least}
-        found += _fitted_singles(trial, screened, ranked, others, start.fit)
-    return found
-
-
-def _fitted_singles(
-    trial: Attempts,
-    screened: Screen,
-    ranked: dict[str, list[Score]],
-    gains: dict[str, float],
-    baseline: Fit,
-) -> list[Candidate]:
-    """Some effects, with the gains that the screen gives them, fitted; the most telling first."""
-    settings = trial.settings.search
-    worth = _by_family(list(gains))
     near = {
         effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
         if screened.strong or rank < settings.effects_with_starts
