@@ -16,12 +16,12 @@ from pamrs.effects._catalogue import (
     MEMORY_OF,
     TERMS,
     WORDS,
-    find_parameter,
     ports_of,
 )
 from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
 from pamrs.effects._terms import (
     exclude,
+    find_parameter,
     id_of,
     info_of,
     is_effect,

@@ -18,7 +18,6 @@ __all__ = [
     "MEMORY_OF",
     "TERMS",
     "WORDS",
-    "find_parameter",
     "ports_of",
 ]
 
@@ -162,12 +161,3 @@ MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_a
 def ports_of(entry: Mapping[str, Any]) -> tuple[str, ...]:
     """The ports at which an effect of a rig acts, as :attr:`pamrs.Rig.effects` lists it."""
     return EFFECTS[entry["id"]].form(entry.get("form", "")).ports
-
-
-def find_parameter(name: str) -> EffectParameter:
-    """The parameter of a dotted name such as ``leak_muscle.conductance``, or of the same effect at
-    one place, ``leak_muscle@flexor.conductance``; KeyError if there is none.
-    """
-    term, _, short = name.partition(".")
-    effect = term.partition("@")[0]
-    return {p.name: p for form in reversed(EFFECTS[effect].forms) for p in form.parameters}[short]

@@ -11,9 +11,18 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from pamrs.effects._catalogue import EFFECTS
-from pamrs.effects._info import EffectInfo
+from pamrs.effects._info import EffectInfo, EffectParameter
 
-__all__ = ["exclude", "id_of", "info_of", "is_effect", "place_of", "term_in", "term_of"]
+__all__ = [
+    "exclude",
+    "find_parameter",
+    "id_of",
+    "info_of",
+    "is_effect",
+    "place_of",
+    "term_in",
+    "term_of",
+]
 
 
 def term_of(effect: str, at: str = "") -> str:
@@ -45,6 +54,15 @@ def is_effect(term: str) -> bool:
 def info_of(term: str) -> EffectInfo:
     """What is known of an effect at a place."""
     return EFFECTS[id_of(term)]
+
+
+def find_parameter(name: str) -> EffectParameter:
+    """The parameter of a dotted name such as ``leak_muscle.conductance``, or of the same effect at
+    one place, ``leak_muscle@flexor.conductance``; KeyError if there is none.
+    """
+    term, _, short = name.partition(".")
+    forms = reversed(info_of(term).forms)
+    return {p.name: p for form in forms for p in form.parameters}[short]
 
 
 def term_in(entry: Mapping[str, Any]) -> str:

@@ -4,9 +4,8 @@
 //! the joint by `sqrt(a^2 + b^2)` of its radius. `first_and_second` adds `a_2 sin 2q + b_2 cos 2q`: a
 //! disc that is tilted, a magnet that is oval, or two tracks with other gains. The error is none at
 //! the angle `q_0`, where the encoder was set. Without amplitudes it has no constant: that is the
-//! zero of its sensor. The angle behind a
-//! reading is found by Newton steps (`plant/encoder.rs`), and the rate that is read is that of the
-//! reading. A stroke that is a small part of a turn has little more of it than a zero and a factor.
+//! zero of its sensor. The angle behind a reading is found by Newton steps (`plant/encoder.rs`), and
+//! the rate that is read is that of the reading. A stroke that is a small part of a turn has little more of it than a zero and a factor.
 //! E. O. Doebelin, *Measurement Systems*, ch. 4; H. C. Hoyt, "Error analysis for optical encoders",
 //! and for magnets ams AG, application note AN5000, "Magnet selection and misalignment" (first and
 //! second harmonic by displacement and tilt).
@@ -103,8 +102,8 @@ impl<S: Scalar> Effect<S> for Harmonics<S> {
     fn misread(&self, angle: S) -> (S, S) {
         let none = (constant(0.0), constant(0.0));
         let (error, slope) = harmonic(self.first, 1.0, angle, self.set);
-        let second = self.second.map(|second| harmonic(second, 2.0, angle, self.set));
-        let (more, steeper) = second.unwrap_or(none);
+        let second = |own| harmonic(own, 2.0, angle, self.set);
+        let (more, steeper) = self.second.map_or(none, second);
         (error + more, slope + steeper)
     }
 }

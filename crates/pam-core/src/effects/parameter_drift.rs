@@ -3,10 +3,10 @@
 //! `F_b -> F_b (1 + D (1 - exp(-t/tau)))` of the bladder's part of the force, `t` the time since
 //! the recording began: rubber that warms up while it works softens towards another value. This is
 //! the form `exponential`. `straight`: `F_b -> F_b (1 + D t/60 s)`, while that is above zero, for a
-//! change that has no end in sight, `D` in a minute. Mullins' softening goes with the largest stretch and creep with
-//! what was done before, this one with time alone. L. R. G. Treloar, *The Physics of Rubber
-//! Elasticity* (1975), ch. 2 and 13 (moduli and temperature);
-//! B. Tondu & P. Lopez, IEEE Control Systems 20, 2000 (muscles that warm up).
+//! change that has no end in sight, `D` in a minute. Mullins' softening goes with the largest stretch
+//! and creep with what was done before, this one with time alone. L. R. G. Treloar, *The Physics of
+//! Rubber Elasticity* (1975), ch. 2 and 13 (moduli and temperature); B. Tondu & P. Lopez, IEEE
+//! Control Systems 20, 2000 (muscles that warm up).
 
 use super::{At, Effect, EffectInfo, EffectParameter, EffectState, Form, Kink, Port, Role};
 use crate::blocks::gas::Gas;

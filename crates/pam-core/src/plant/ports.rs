@@ -102,8 +102,8 @@ impl Ports {
 
     /// Some effect acts on joints, arm or load.
     pub fn on_motion(&self) -> bool {
-        let on_joints = self.torque.iter().chain(&self.push).chain(&self.weight);
-        let joints = on_joints.into_iter().any(|acting| !acting.is_empty());
+        let mut on_joints = self.torque.iter().chain(&self.push).chain(&self.weight);
+        let joints = on_joints.any(|acting| !acting.is_empty());
         joints || !self.payload.is_empty() || self.hanging.is_some() || self.mounting.is_some()
     }
 

@@ -53,10 +53,10 @@ LOGARITHMIC = frozenset(
 """Shapes that are positive: fitted by their logarithm."""
 
 
-def _unplaced(name: str) -> str:
-    """A dotted name without the place of the effect."""
+def _logarithmic(name: str) -> bool:
+    """Whether a parameter is one of them, wherever its effect acts."""
     term, dot, short = name.partition(".")
-    return id_of(term) + dot + short
+    return id_of(term) + dot + short in LOGARITHMIC
 
 
 class Stopped(Exception):
@@ -318,7 +318,7 @@ class Scaling:
         ]
         for name, start in starts.items():
             info = find_parameter(name)
-            if _unplaced(name) in LOGARITHMIC:
+            if _logarithmic(name):
                 lower.append(math.log(max(info.lower, start * 1e-3) / start))
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
@@ -330,7 +330,7 @@ class Scaling:
         self.bounds = (np.array(lower), np.array(upper))
         self.start = np.array(
             [0.0] * len(self.baseline)
-            + [0.0 if _unplaced(n) in LOGARITHMIC else s / self.scale[n] for n, s in starts.items()]
+            + [0.0 if _logarithmic(n) else s / self.scale[n] for n, s in starts.items()]
         )
 
     def value(self, name: str, x: float) -> float:
@@ -339,16 +339,12 @@ class Scaling:
             known = self.known[name]
             return min(max(self.centre[name] + x * self.scale[name], known.lower), known.upper)
         info = find_parameter(name)
-        found = (
-            self.starts[name] * math.exp(x)
-            if _unplaced(name) in LOGARITHMIC
-            else x * self.scale[name]
-        )
+        found = self.starts[name] * math.exp(x) if _logarithmic(name) else x * self.scale[name]
         return min(max(found, info.lower), info.upper)
 
     def slope(self, name: str, x: float) -> float:
         """Change of a parameter [SI] with its scaled number."""
-        return self.value(name, x) if _unplaced(name) in LOGARITHMIC else self.scale[name]
+        return self.value(name, x) if _logarithmic(name) else self.scale[name]
 
     def rig(self, x: Array, fixed: dict[str, float]) -> Rig:
         """The model of scaled numbers, with effect parameters that are held."""
