@@ -210,7 +210,7 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             "a slow triangle of the pressure (no Coulomb friction)",
             "a torque that is largest where the link hangs, at any pressure",
             motion.offset,
-            {"moment": 4.0},
+            {"angle": 0.06},
         ),
         Experiment(
             "external_torque",

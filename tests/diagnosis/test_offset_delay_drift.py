@@ -19,7 +19,7 @@ def run(rig: pamrs.Rig) -> pamrs.Simulation:
 @pytest.mark.parametrize(
     ("effect", "form", "make"),
     [
-        ("com_offset", "", {"moment": 4.0}),
+        ("com_offset", "", {"angle": 0.06}),
         ("sensor_lag", "", {"delay": 0.03}),
         ("parameter_drift", "exponential", {"change": -0.25, "time_constant": 8.0}),
     ],
@@ -36,18 +36,16 @@ def test_it_is_named_with_its_size(effect: str, form: str, make: dict[str, float
 
 
 def test_an_offset_is_what_a_turned_centre_of_mass_weighs() -> None:
-    """To first order `centre_angle` times the weight at the first moment, at any base angle."""
-    values = {name: RIG.parameters[name].value for name in ("arm.first_moment", "arm.gravity")}
-    turned = 1e-4
+    """To first order `centre_angle` where the link has no payload, at any base angle."""
+    turned, bare = 1e-4, RIG.with_parameters({"arm.payload": 0.0})
     for base in (0.0, 0.5):
-        rig = RIG.with_parameters({"arm.base_angle": base})
-        moment = turned * values["arm.first_moment"] * values["arm.gravity"]
+        rig = bare.with_parameters({"arm.base_angle": base})
         plain, centre, offset = (
             run(other)["joint_angle"]
             for other in (
                 rig,
                 rig.with_parameters({"arm.centre_angle": turned}),
-                rig.with_effect("com_offset", {"moment": moment}),
+                rig.with_effect("com_offset", {"angle": turned}),
             )
         )
         moved = np.abs(centre - plain).max()

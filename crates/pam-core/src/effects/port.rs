@@ -338,8 +338,9 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     }
 
     /// [`Port::Weight`]: torque [N m] on the joint of a link, and on all before it, where the link
-    /// stands at an angle from the direction of gravity [rad].
-    fn weight(&self, _direction: S) -> S {
+    /// stands at an angle from the direction of gravity [rad] and weighs `level` where it is level
+    /// [N m].
+    fn weight(&self, _direction: S, _level: S) -> S {
         constant(0.0)
     }
 

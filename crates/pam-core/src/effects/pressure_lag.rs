@@ -20,8 +20,9 @@ pub const INFO: EffectInfo = EffectInfo {
     source: "Doebelin, Measurement Systems, ch. 6",
     forms: &[Form {
         name: "first_order",
-        parameters: &[EffectParameter::new("time_constant", "s", 0.0, 100.0, 0.005)
+        parameters: &[EffectParameter::new("time_constant", "s", 0.0, 2.0, 0.005)
             .starts(&[0.003, 0.02])
+            .usually(1e-4, 0.3)
             .off(0.0)],
         states: &[EffectState { name: "", role: Role::Moves }],
         integrates: false,

@@ -133,6 +133,19 @@ impl<S: Scalar> Body<S> {
         }
     }
 
+    /// Torque of gravity on the joint of a link [N m] where the link is level: its own weight, its
+    /// payload's and that of the links behind it.
+    pub fn level_weight(&self, link: usize) -> S {
+        match self {
+            Self::Fixed | Self::Mass(..) => constant(0.0),
+            Self::OneLink(arm, _) => arm.level_weight(),
+            Self::Planar1(arm) => arm.level_weight(link),
+            Self::Planar2(arm) => arm.level_weight(link),
+            Self::Planar3(arm) => arm.level_weight(link),
+            Self::Planar4(arm) => arm.level_weight(link),
+        }
+    }
+
     /// Gravity [m/s2].
     pub fn gravity(&self) -> f64 {
         match self {

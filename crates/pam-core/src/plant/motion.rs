@@ -57,7 +57,7 @@ impl<S: Scalar> Plant<'_, S> {
         for (k, weight) in ports.weight.iter().enumerate() {
             direction += pose[k];
             for acting in weight {
-                let torque = self.effect(acting).weight(direction);
+                let torque = self.effect(acting).weight(direction, self.body.level_weight(k));
                 load[..=k].iter_mut().for_each(|load| *load += torque);
             }
         }

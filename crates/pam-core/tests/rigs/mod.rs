@@ -222,7 +222,7 @@ pub const TYPICAL: &[Typical] = &[
         &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.03)],
         &[("compliance", 0.0)],
     ),
-    typical("com_offset", &[("moment", 8.0)], &[("moment", 0.0)]),
+    typical("com_offset", &[("angle", 0.1)], &[("angle", 0.0)]),
     typical("sensor_lag", &[("delay", 0.0123)], &[("delay", 0.0)]),
     typical("parameter_drift", &[("change", -0.3), ("time_constant", 0.4)], &[("change", 0.0)]),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),

@@ -150,6 +150,11 @@ impl<S: Scalar> OneLink<S> {
         [0, 1].map(|k| (self.first_moment * own[k] + hanging * payload[k]) * self.gravity)
     }
 
+    /// Torque of gravity where the link is level, its payload included [N m].
+    pub fn level_weight(&self) -> S {
+        (self.first_moment + self.payload * self.length) * self.gravity
+    }
+
     /// Torque that holds the arm against gravity [N m].
     #[inline]
     pub fn weight(&self, angle: S) -> S {

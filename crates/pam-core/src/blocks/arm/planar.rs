@@ -307,6 +307,11 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
         })
     }
 
+    /// Torque of gravity on the joint of a link [N m] where the link is level.
+    pub fn level_weight(&self, link: usize) -> S {
+        self.moment[link] * self.gravity
+    }
+
     /// Torques of gravity on the links.
     #[inline]
     fn weight_on_links(&self, pose: &Pose<S, N>) -> SVector<S, N> {
