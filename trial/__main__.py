@@ -1,5 +1,5 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``report``, ``blocks``
-and ``selfcheck``.
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``insert``,
+``report``, ``blocks`` and ``selfcheck``.
 """
 
 from __future__ import annotations
@@ -22,6 +22,8 @@ from .second.cases import complete as second_complete
 from .second.cases import make as second_make
 from .second.design import ROUND
 from .second.design import specs as second_specs
+from .second.inserted import all_inserted
+from .second.inserted import table as insertion_table
 from .second.marks import is_second, marks
 from .second.tables import markdown as second_markdown
 from .second.tables import scores as second_scores
@@ -47,7 +49,15 @@ def _parser() -> argparse.ArgumentParser:
         prog="python -m trial", description="Blinded trial of the diagnosis on concealed data."
     )
     commands = parser.add_subparsers(dest="command", required=True)
-    for add in (_add_write, _add_make, _add_score, _add_report, _add_blocks, _add_selfcheck):
+    for add in (
+        _add_write,
+        _add_make,
+        _add_score,
+        _add_insert,
+        _add_report,
+        _add_blocks,
+        _add_selfcheck,
+    ):
         add(commands.add_parser)
     return parser
 
@@ -248,6 +258,33 @@ def _score(args: argparse.Namespace) -> None:
         write(args.markdown, markdown(scores, catalogue))
     if args.figure is not None:
         figure(scores, args.figure)
+
+
+def _add_insert(add: Add) -> None:
+    again = add(
+        "insert",
+        help=f"of plan {SECOND}: diagnose each missed case again with its truth inserted, and say "
+        "whether the search or the weighing failed",
+    )
+    again.add_argument("folder", type=Path, help="the trial: cases/ and keys/")
+    again.add_argument(
+        "--results", type=Path, help="results of `pamrs prove` (default: FOLDER/results)"
+    )
+    again.add_argument("--markdown", type=Path, help="write the table here")
+    again.set_defaults(run=_insert)
+
+
+def _insert(args: argparse.Namespace) -> None:
+    def told(line: str) -> None:
+        print(line, file=sys.stderr, flush=True)
+
+    if not is_second(args.folder / "keys"):
+        raise ValueError(f"{args.folder}: no keys of plan {SECOND} in its folder keys")
+    results = args.results or args.folder / "results"
+    text = insertion_table(all_inserted(args.folder, results, told))
+    print(text)
+    if args.markdown is not None:
+        write(args.markdown, text)
 
 
 def _add_report(add: Add) -> None:

@@ -5,6 +5,7 @@ missing beside them is named.
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import jsonschema
@@ -112,7 +113,7 @@ def test_the_command_takes_another_rig(tmp_path, capsys, monkeypatch) -> None:
 
     seen = []
 
-    def noted(case: pamrs.Case) -> pamrs.Diagnosis:
+    def noted(case: pamrs.Case, consider: Sequence[str]) -> pamrs.Diagnosis:
         seen.append(case)
         raise pamrs.DiagnosisError("enough")
 

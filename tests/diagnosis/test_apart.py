@@ -48,6 +48,7 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
         0.0,
         {},
         dict.fromkeys(wrong, 8.0),
+        scales={name: 0.1 * values[name] for name in wrong},
         freed=wrong,
     )
     left = {

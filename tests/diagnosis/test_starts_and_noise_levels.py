@@ -256,7 +256,9 @@ def test_what_relaxes_at_once_is_another_stiffness() -> None:
     start = named((), 400.0, {})
     value = replace(named((), 1.02, {}), wrong=("muscle.modulus_scale",))
     moved = {"muscle.modulus_scale": -10.0}
-    value = replace(value, fit=replace(value.fit, moved=moved, freed=tuple(moved)))
+    at, scales = {"muscle.modulus_scale": 0.7}, {"muscle.modulus_scale": 0.03}
+    freed = replace(value.fit, values=at, scales=scales, moved=moved, freed=tuple(moved))
+    value = replace(value, fit=freed)
     creep = named(("muscle_creep",), 1.0, {"muscle_creep.time_constant": 2.0})
 
     def odds(std: float) -> dict[str, float]:

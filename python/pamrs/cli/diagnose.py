@@ -58,6 +58,15 @@ def diagnose_command(
             help="Write the commands of the proposed next experiment (CSV: time and commands)."
         ),
     ] = None,
+    consider: Annotated[
+        list[str] | None,
+        typer.Option(
+            help=(
+                "A suspicion to be judged beside what is found: the id of an effect or the dotted "
+                "name of a parameter that may be wrong, several joined by +. May be given again."
+            )
+        ),
+    ] = None,
     allow_outside: Annotated[
         bool,
         typer.Option(
@@ -94,7 +103,7 @@ def diagnose_command(
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
-        if any(path is not None for path in (report, png, model, experiment)):
+        if consider or any(path is not None for path in (report, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return
@@ -118,7 +127,7 @@ def diagnose_command(
     from pamrs.diagnosis import diagnose
 
     with progress(f"diagnosing {loaded.name}"):
-        result = diagnose(loaded)
+        result = diagnose(loaded, consider=consider or ())
     failed = tell(result.summary())
     files: dict[Path | None, Callable[[Path], object]] = {
         json: result.to_json,

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -28,7 +28,7 @@ from threadpoolctl import threadpool_limits
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group, calibrated
 from pamrs.diagnosis.explain import assemble, data_used
-from pamrs.diagnosis.fit import Problem, holdable, without_passing
+from pamrs.diagnosis.fit import Problem, fits, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -47,8 +47,8 @@ from pamrs.diagnosis.prepare import (
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS
-from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect
+from pamrs.errors import DiagnosisError, SimulationError, meant
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
@@ -149,6 +149,7 @@ def diagnose(
     rig: Rig | str | os.PathLike[str] | None = None,
     allow_outside: bool = False,
     settings: DiagnosisSettings | None = None,
+    consider: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> Diagnosis:
     """Find the physics that a rig's model leaves out.
@@ -166,6 +167,12 @@ def diagnose(
         Whether rig file and recordings of a case folder may lie outside of it.
     settings : DiagnosisSettings, optional
         The numbers that the verdict rests on; those of the published trials by default.
+    consider : sequence of str, optional
+        Suspicions to be judged beside what the search finds by itself: each the id of an effect or
+        the dotted name of a parameter that may be wrong, or several joined by ``+``
+        (``"base_flexibility+muscle.modulus_scale"``). What of each acts where a mismatch is gets
+        fitted from every start; ``considered`` of the result says what it leaves. A block that
+        keeps no more than noise has nothing for it to explain.
     progress : callable, optional
         Called with a line of text now and then.
 
@@ -185,6 +192,9 @@ def diagnose(
         If the folder is not a case.
     RigError
         If the rig file is wrong.
+    ValueError
+        If ``consider`` has a name that is neither an effect that the rig can have nor a parameter
+        with a tolerance.
 
     Examples
     --------
@@ -215,7 +225,7 @@ def diagnose(
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
-    inner, outer, left_out = _problems(case, chosen)
+    inner, outer, left_out = _problems(case, chosen, _asked(case.rig, consider))
     blocks = inner.blocks
     gas = [b for b in blocks if not b.mechanical]
     motion = [b for b in blocks if b.mechanical]
@@ -307,7 +317,33 @@ def _said_of_held(rig: Rig) -> list[str]:
     return said
 
 
-def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem, list[str]]:
+def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
+    """Sets of names that the caller asks for, checked."""
+    if isinstance(consider, str):
+        raise ValueError(
+            f"consider = {consider!r} is not allowed: a list of such texts, [{consider!r}]"
+        )
+    free = [name for name, parameter in rig.parameters.items() if parameter.tol > 0.0]
+    there = [e for e in CATALOGUE if fits(rig, e)]
+    held = {entry["id"] for entry in rig.effects}
+    sets = [tuple(name.strip() for name in text.split("+")) for text in consider]
+    for name in (name for names in sets for name in names):
+        if is_effect(name) and id_of(name) in held:
+            raise ValueError(
+                f"consider: {name!r} is not allowed: the model holds it already, and it is refitted"
+            )
+        known = free if "." in name else there
+        if (name if "." in name else id_of(name)) not in known:
+            raise ValueError(
+                f"consider: {name!r} is neither an effect that this rig can have nor one of its "
+                f"parameters with a tolerance; {meant(name, known)}"
+            )
+    return tuple(sets)
+
+
+def _problems(
+    case: Case, settings: DiagnosisSettings, asked: tuple[tuple[str, ...], ...]
+) -> tuple[Problem, Problem, list[str]]:
     """Recordings to fit and held-out ones (the same where there are no others) by block, and which
     blocks were left out, and why.
     """
@@ -336,7 +372,7 @@ def _problems(case: Case, settings: DiagnosisSettings) -> tuple[Problem, Problem
             f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block "
             f"of the rig ({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
-    inner = Problem(blocks, fitted, core, settings)
+    inner = Problem(blocks, fitted, core, settings, considered=asked)
     with _in_range(case.name):
         drowned = _drowned(inner, rig)
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])

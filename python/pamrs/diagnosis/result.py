@@ -138,6 +138,9 @@ class Diagnosis(Findings):
         Every set of effects that was fitted: ``blocks``, ``effects``, what it leaves of each
         block's variance in units of the noise's (``fitted``, ``held_out``), ``gap_closed``, its
         ``values``.
+    considered : list of Considered
+        What ``consider`` asked for: ``names``, ``blocks``, ``probability``, and ``left``, the share
+        of the mismatch that it leaves (None where a parameter of it stays inside its tolerances).
     tested : list of Tested
         Every persistent effect that acts where the mismatch is: ``id``, ``blocks``,
         ``predicted_gain``, the share of the mismatch that its signature could take before any fit,
@@ -220,6 +223,8 @@ class Diagnosis(Findings):
             lines += textwrap.wrap(
                 f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
             )
+        for asked in self.considered:
+            lines += textwrap.wrap(words.considered_sentence(asked), 96, subsequent_indent="  ")
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]

@@ -14,6 +14,7 @@ from __future__ import annotations
 from pamrs.findings._details import (
     BlockResidual,
     ConditionMap,
+    Considered,
     Curves,
     NextExperiment,
     PairExperiment,
@@ -60,6 +61,7 @@ __all__ = [
     "ChannelError",
     "Condition",
     "ConditionMap",
+    "Considered",
     "Curves",
     "EffectFound",
     "EffectParameterFound",

@@ -16,6 +16,7 @@ from pamrs.findings._entry import Entry, told
 __all__ = [
     "BlockResidual",
     "ConditionMap",
+    "Considered",
     "Curves",
     "NextExperiment",
     "PairExperiment",
@@ -298,6 +299,34 @@ class RecordingUsed(Entry):
     unused: dict[str, str]
     masked: dict[str, float]
     parameters: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Considered(Entry):
+    """A set of names that the caller asked for.
+
+    Attributes
+    ----------
+    names : list of str
+        What of it acts where the mismatch is: effects, and parameters that may be wrong.
+    blocks : list of str
+        Where.
+    probability : float
+        Probability that this is what is missing there.
+    left : float or None
+        Share of the mismatch that it leaves; None where a parameter of it stays inside its
+        tolerances, or where the model cannot be run with it.
+    """
+
+    names: list[str] = field(metadata=told("effects, and parameters that may be wrong"))
+    blocks: list[str] = field(metadata=told("where they act"))
+    probability: float = field(metadata=told("that this is what is missing there"))
+    left: float | None = field(
+        metadata=told(
+            "share of the mismatch that it leaves; null where a parameter of it stays inside its "
+            "tolerances, or where the model cannot be run with it"
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)

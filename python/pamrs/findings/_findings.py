@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pamrs.findings._details import (
     BlockResidual,
     ConditionMap,
+    Considered,
     NextExperiment,
     RecordingUsed,
     Tested,
@@ -92,6 +93,8 @@ class Findings:
         Seconds of each stage, optional.
     tried : list of Tried
         Every set of effects that was fitted.
+    considered : list of Considered
+        What the caller asked to be judged beside the rest.
     tested : list of Tested
         Every persistent effect that acts where the mismatch is.
 
@@ -151,6 +154,10 @@ class Findings:
         metadata=told(
             "what of each recording the answer rests on, and which channels were not used"
         ),
+    )
+    considered: list[Considered] = field(
+        default_factory=list,
+        metadata=told("what the caller asked to be judged beside the rest", required=False),
     )
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0

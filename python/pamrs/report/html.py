@@ -483,7 +483,10 @@ def render(diagnosis: Findings) -> str:
             for block, own in words.budgets(diagnosis).items()
         ],
         wrong=_wrong(diagnosis),
-        kept=[words.kept_details(u) for u in diagnosis.unexplained],
+        kept=[
+            *(words.kept_details(u) for u in diagnosis.unexplained),
+            *(words.considered_sentence(asked) for asked in diagnosis.considered),
+        ],
         ambiguity=_sets(diagnosis),
         tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,

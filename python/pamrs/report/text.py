@@ -13,6 +13,7 @@ from pamrs.findings import (
     HEALTHY,
     BlockVerdict,
     BudgetTerm,
+    Considered,
     EffectFound,
     EffectParameterFound,
     Findings,
@@ -29,6 +30,7 @@ __all__ = [
     "budgets",
     "chance_of",
     "claim",
+    "considered_sentence",
     "data_sentence",
     "display_unit",
     "effect_heading",
@@ -258,6 +260,23 @@ def sentence_of(wrong: WrongParameter) -> str:
     stated = format_uncertain(values["nominal"], values["tolerance"], unicode=False)
     shown = with_unit(found, unit.replace("°", "deg"))
     return f"{spoken_name(wrong.name)} is {shown}, not {stated}"
+
+
+def considered_sentence(own: Considered) -> str:
+    """What a set that was asked for leaves: ``Asked for: base flexibility: probability 92 %; it
+    leaves 0.1 % of the mismatch of the arm``.
+    """
+    names = set_label(own.names)
+    blocks = " and ".join(map(spoken_name, own.blocks))
+    if own.left is None:
+        return (
+            f"Asked for: {names}: it does not explain the mismatch of the {blocks}: a parameter of "
+            "it stays inside its tolerances, or the model cannot be run with it"
+        )
+    return (
+        f"Asked for: {names}: probability {format_probability(own.probability)}; it leaves "
+        f"{format_number(100.0 * own.left, 2, unicode=False)} % of the mismatch of the {blocks}"
+    )
 
 
 def kept_sentence(kept: Unexplained) -> str:

@@ -2,8 +2,8 @@
 
 Public: `Candidate`, `Group`, `Attempts`, `significant`, `doubted`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
-`share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`, `stands`,
-`unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
+`log_weight`, `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`,
+`stands`, `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
 `calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
@@ -34,6 +34,7 @@ from pamrs.diagnosis.evidence._weighing import (
     Ranges,
     capped,
     explains,
+    log_weight,
     penalty,
     price,
     probability_cap,
@@ -65,6 +66,7 @@ __all__ = [
     "penalty",
     "price",
     "probability_cap",
+    "log_weight",
     "same_recordings",
     "share_left",
     "significant",

@@ -33,6 +33,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, find_parameter, id_of, info_of, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 
 __all__ = [
     "Attempts",
@@ -97,7 +98,19 @@ class Candidate:
         """How far outside its tolerances what is wrong is: the logarithm of how many times the
         walls, of each parameter.
         """
-        return sum(math.log(max(1.0, abs(self.fit.moved[name]) / walls)) for name in self.wrong)
+        return sum(math.log(max(1.0, self._distance(name) / walls)) for name in self.wrong)
+
+    def _distance(self, name: str) -> float:
+        """How far a parameter is from its nominal value in tolerances; of one that is a multiple of
+        it, by the logarithm of the two, since a hundredth is further away than nothing is.
+        """
+        moved, tolerance = self.fit.moved[name], self.fit.scales[name]
+        value = self.fit.values[name]
+        nominal = value - moved * tolerance
+        if nominal <= 0.0 or value < 0.0:
+            return abs(moved)
+        ratio = max(value / nominal, 1e-9)
+        return max(abs(moved), abs(math.log(ratio)) * nominal / tolerance)
 
     def is_wrong(self, walls: float) -> bool:
         """Whether everything that it calls wrong lies outside its tolerances, so many of them."""
@@ -246,6 +259,9 @@ class Attempts:
         """
         if effect in {id_of(e) for e in beside.effects}:
             return None  # it would replace what it is to happen beside
+        stiffest = self.settings.transients.least_step_share * self.inner.core.stable_step
+        if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
+            return None  # it would take too long
         try:
             return self._transient(effect, beside)
         except SimulationError:
@@ -410,26 +426,30 @@ class Attempts:
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
-    def fitted_shortly(self, start: Start, warm: Fit) -> Candidate | None:
-        """An effect fitted in a few steps: enough to see which of many are worth a whole fit; None
-        where it cannot be run.
+    def fitted_shortly(
+        self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
+    ) -> Candidate | None:
+        """A set of effects fitted in a few steps, beside other values of some parameters: enough to
+        see which of many are worth a whole fit; None where it cannot be run.
         """
-        if id_of(start.effect) in self.held:
+        effects = tuple(start.effect for start in starts)
+        if not self.held.isdisjoint(id_of(e) for e in effects):
             return None
-        free, held, forms = parts_of([start])
+        free, held, forms = parts_of(starts)
         try:
             found = fit(
                 self.inner,
                 self.nominal,
-                (start.effect,),
+                effects,
                 free,
                 self.white,
                 fixed=held,
                 warm=warm,
+                freed=wrong,
                 evaluations=self.settings.search.first_evaluations,
                 forms=forms,
             )
-            return self.judged((start.effect,), found)
+            return replace(self.judged(effects, found), wrong=wrong)
         except SimulationError:
             return None  # it leaves the range in which the model holds
 
@@ -513,16 +533,20 @@ class Attempts:
                 break
         return best
 
-    def beside_wrong(
-        self, starts: list[Start], warm: Fit, names: tuple[str, ...]
+    def together(
+        self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
     ) -> Candidate | None:
-        """Effects beside other values of some parameters, which are freed from their tolerance;
-        None where that cannot be run.
+        """A set of effects, each from a start, beside other values of some parameters, which are
+        freed from their tolerance; None where it cannot be run, or where these stay inside their
+        tolerances.
         """
+        if not wrong:
+            return self.fitted(starts, warm, self.white)
         try:
-            return self._gone_on(starts, warm, names, self.settings.fit.effect_evaluations)
+            found = self._gone_on(starts, warm, wrong, self.settings.fit.effect_evaluations)
         except SimulationError:
             return None  # it leaves the range in which the model holds
+        return found if found.is_wrong(self.settings.fit.most_tolerances) else None
 
     def without(self, larger: Candidate, needless: str) -> Candidate | None:
         """A set of persistent effects and wrong parameters without one of its terms, fitted to its

@@ -21,6 +21,7 @@ __all__ = [
     "penalty",
     "price",
     "probability_cap",
+    "log_weight",
     "same_recordings",
     "share_left",
     "stands",
@@ -151,12 +152,7 @@ def weigh(
         c: _trusted(c, start, suspects if own is None else own[c], most, seconds, odd[c], evidence)
         for c in named
     }
-    against = {
-        c: evidence.standing_price * stands(c, seconds)
-        + evidence.unseen_price * _unseen(c, seconds, evidence)
-        + odd[c]
-        for c in named
-    }
+    against = {c: _against(c, seconds, odd[c], evidence) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
         scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
@@ -178,6 +174,32 @@ def weigh(
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def log_weight(
+    candidate: Candidate,
+    baseline: Candidate,
+    suspects: list[Block],
+    seconds: float,
+    ranging: Ranges,
+    settings: DiagnosisSettings,
+) -> float:
+    """Logarithm of what a hypothesis weighs beside others, up to a constant: by what it leaves, by
+    its price and by its values.
+    """
+    evidence = settings.evidence
+    own = _score(candidate, baseline, suspects, evidence.form_share_alike, settings)
+    return own - _against(candidate, seconds, unlikely(candidate, ranging, evidence), evidence)
+
+
+def _against(
+    candidate: Candidate, seconds: float, unlikely: float, settings: EvidenceSettings
+) -> float:
+    """What a set loses against others by a clock that does not drift, by times that were not seen,
+    and by its values (``unlikely``).
+    """
+    standing = settings.standing_price * stands(candidate, seconds)
+    return standing + settings.unseen_price * _unseen(candidate, seconds, settings) + unlikely
 
 
 def _between_places(
@@ -301,13 +323,24 @@ def _trusted(
 ) -> float:
     """Probability of a set against ``unlisted``; ``unlikely`` is what it loses by its values."""
     left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
-    even = (
-        settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
-    )
+    even = settings.log_odds_explained_pliable
+    if not _pliable(candidate):
+        usual = settings.log_odds_explained
+        even = usual + _strength(baseline, suspects, settings) * (even - usual)
     odds = (math.log((1.0 - left) / left) - even) / settings.softness
     if explains(candidate, baseline, suspects, settings):
         odds = max(odds, settings.log_odds_noise_left)
     return capped(odds - unlikely - penalty(candidate, seconds, settings), most)
+
+
+def _strength(baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> float:
+    """How strong the mismatch is that the refit leaves, from 0 for a faint one to 1, by the
+    logarithm of its size in noise levels.
+    """
+    stages = (baseline.fitted, baseline.held_out)
+    size = max(stage[b.name].systematic for stage in stages for b in suspects)
+    low, high = (math.log(noises) for noises in settings.strong_noises)
+    return min(max(math.log(max(size, 1e-9)) - low, 0.0) / (high - low), 1.0)
 
 
 def _pliable(candidate: Candidate) -> bool:
@@ -315,7 +348,7 @@ def _pliable(candidate: Candidate) -> bool:
     differently in every recording.
     """
     events = candidate.fit.events
-    return bool(candidate.wrong and not candidate.effects) or (
+    return bool(candidate.wrong) or (
         events is not None and not EFFECTS[events.effect].leading.same_everywhere
     )
 
@@ -368,15 +401,16 @@ def stands(candidate: Candidate, seconds: float) -> bool:
 def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) -> float:
     """What a set loses by values that its physics hardly has.
 
-    A parameter with a prior loses by its distance from it; a contact is met near an end of the
-    motion, and what acts over most of the range is none; other parameters lose by how many times
-    they are outside the range of usual values, for certain.
+    A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
+    ten deviations is rare, but it does not rule out what explains a mismatch to its noise. A
+    contact is met near an end of the motion, and what acts over most of the range is none; other
+    parameters lose by how many times they are outside the range of usual values, for certain.
     """
     lost = 0.0
     for name, value in _effect_values(candidate):
         prior = find_parameter(name).prior
         if prior is not None:
-            lost += 0.5 * ((value - prior[0]) / prior[1]) ** 2
+            lost += math.log1p(((value - prior[0]) / prior[1]) ** 2)
     for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
     for name, value in _effect_values(candidate):

@@ -37,6 +37,7 @@ from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
+    acts_in,
     depends,
     entry_of,
     events_of,
@@ -49,7 +50,7 @@ from pamrs.diagnosis.fit import (
     with_known,
 )
 from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, info_of, is_effect, place_of, term_in
@@ -58,6 +59,7 @@ from pamrs.findings import (
     HEALTHY,
     BlockResidual,
     ChannelError,
+    Considered,
     EffectFound,
     EffectParameterFound,
     FitErrors,
@@ -143,6 +145,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
+        considered=_considered(judged, settings.evidence, fitted),
         tested=_tested(groups, settings.evidence),
         free_run=runs,
         free_run_note=runs_note,
@@ -300,6 +303,35 @@ def _tried(groups: list[Group]) -> list[Tried]:
         for group in groups
         for candidate in group.candidates
     ]
+
+
+def _considered(
+    judged: list[Judged], settings: EvidenceSettings, fitted: Problem
+) -> list[Considered]:
+    """What of each set that the caller asked for acts where a mismatch is, by group of blocks, and
+    what it leaves.
+    """
+    found = []
+    for asked in fitted.considered:
+        for own in judged:
+            group, blocks = own.group, own.group.suspects
+            acting = [n for n in asked if any(_acts(n, b) for b in blocks)]
+            if group.mismatch is None or group.below_noise or not acting:
+                continue
+            there = next((c for c in group.candidates if set(c.names) == set(acting)), None)
+            left = None
+            if there is not None:
+                left = share_left(there, group.candidates[0], blocks, settings)
+            probability = sum(
+                p for key, p in own.probabilities.items() if set(key.split("+")) == set(acting)
+            )
+            found.append(Considered(acting, [b.name for b in blocks], probability, left))
+    return found
+
+
+def _acts(name: str, block: Block) -> bool:
+    """Whether an effect acts in a block, or a parameter counts in it."""
+    return acts_in(name, block) if is_effect(name) else depends(block, name)
 
 
 def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:

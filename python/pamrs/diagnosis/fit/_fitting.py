@@ -79,6 +79,8 @@ class Problem:
         What it is solved by.
     stopped : Event, optional
         Set by whoever wants no more of it: the next evaluation raises `Stopped`.
+    considered : tuple of tuple of str, optional
+        Sets of names (effects, parameters that may be wrong) that the caller asks for.
     """
 
     blocks: list[Block]
@@ -86,6 +88,7 @@ class Problem:
     core: _core.Rig
     settings: DiagnosisSettings
     stopped: Event = field(default_factory=Event)
+    considered: tuple[tuple[str, ...], ...] = ()
 
 
 @dataclass(frozen=True)

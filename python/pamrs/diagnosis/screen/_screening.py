@@ -291,6 +291,7 @@ class _Looking:
         if any(p.scan for p in parameters):
             for start in _nearest(first, lambda start: self.try_(start, 1), self.signatures):
                 self.try_(start)
+                self.try_(_as_usual(start, first))
         elif any(p.role == "threshold" for p in parameters):
             before = len(self.signatures)
             best = _switched(first, self.problem, lambda start: self.try_(start, 1))
@@ -440,6 +441,15 @@ def _nearest(
     # the best and the best that is no neighbour of it
     far = [k for k in order[1:] if abs(k - order[0]) > 1]
     return [tried[k] for k in (order[0], *far[:1])]
+
+
+def _as_usual(start: Start, first: Start) -> Start:
+    """A start whose resonance is as broad as it usually is: from a broader one a fit may end beside
+    it.
+    """
+    parameters = info_of(start.effect).form(start.form).parameters
+    names = [f"{start.effect}.{p.name}" for p in parameters if p.tried is not None]
+    return replace(start, free=start.free | {name: first.free[name] for name in names})
 
 
 #: Of a valve by ISO 6358.

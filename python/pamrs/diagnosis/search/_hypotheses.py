@@ -15,6 +15,7 @@ from pamrs.diagnosis.evidence import (
     Ranges,
     doubted,
     explains,
+    log_weight,
     probability_cap,
     same_recordings,
     share_left,
@@ -41,7 +42,9 @@ from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
+from pamrs.diagnosis.search._considered import considered
 from pamrs.diagnosis.search._sets import (
+    Weight,
     beside_wrong,
     left_everywhere,
     settles,
@@ -245,7 +248,7 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
         max(p.n * p.dt for p in trial.inner.recordings),
         visited(trial.inner),
     )
-    candidates = _hypotheses(refit, screened, mistaken, transient, terms.seconds, tell)
+    candidates = _hypotheses(refit, screened, mistaken, transient, terms, tell)
     candidates, weighed = _weighed(trial, candidates, terms, tell)
     if marginal:
         none = settings.search.marginal_probability
@@ -294,10 +297,10 @@ def _marginal(refit: _Refit) -> bool:
 
 def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
     """Of hypotheses of one name, one that lasts and one of events, the one that leaves least."""
-    best: dict[str, Candidate] = {}
+    best: dict[frozenset[str], Candidate] = {}
     for candidate in sorted(candidates, key=left_everywhere):
-        best.setdefault(candidate.key, candidate)
-    return [c for c in candidates if c is best[c.key]]
+        best.setdefault(frozenset(candidate.names), candidate)
+    return [c for c in candidates if c is best[frozenset(c.names)]]
 
 
 def _hypotheses(
@@ -305,15 +308,21 @@ def _hypotheses(
     screened: Screen,
     mistaken: list[Candidate],
     transient: list[str],
-    seconds: float,
+    terms: _Terms,
     tell: Say,
 ) -> list[Candidate]:
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
     that are wrong.
     """
     trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
-    singles = _singles(trial, screened, start.fit, tell)
-    singles = _with_same_data(trial, start, singles, seconds)
+
+    def weight(candidate: Candidate) -> float:
+        return log_weight(
+            candidate, start, trial.compared, terms.seconds, terms.ranging, trial.settings
+        )
+
+    singles = _singles(trial, screened, start.fit, weight, tell)
+    singles = _with_same_data(trial, start, singles, terms.seconds)
     least = trial.settings.search.transient_from
     if transient and all(
         share_left(c, start, trial.compared, evidence) > least for c in (*singles, *mistaken)
@@ -322,9 +331,14 @@ def _hypotheses(
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
-        return [start, *singles, *beside_wrong(trial, singles, tell), *mistaken]
-    sets = [*singles, *several(trial, screened, start, singles, mistaken, transient, tell)]
-    return [start, *sets, *beside_wrong(trial, sets, tell), *mistaken]
+        lasting = [c for c in singles if c.fit.events is None]
+        best = min(lasting, key=left_everywhere, default=None)
+        sets = [] if best is None else beside_wrong(trial, best, tell)
+    else:
+        sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
+    asked = considered(trial, start, weight, tell)
+    named = [*singles, *sets, *mistaken]
+    return [start, *(_one_of_each([*named, *asked]) if asked else named)]
 
 
 def _weighed(
@@ -337,7 +351,13 @@ def _weighed(
         return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
 
     found = weights(candidates)
-    likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
+    # what leaves only noise may have stopped short of where its parameters were expected
+    likely = [
+        c
+        for c in candidates[1:]
+        if _odds(found, c) > settings.search.polish_from
+        or explains(c, start, trial.compared, settings.evidence)
+    ]
     close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
     if len(close) > 1 or (
         close and not explains(close[0], start, trial.compared, settings.evidence)
@@ -493,14 +513,17 @@ def _together(trial: Attempts, start: Candidate) -> Candidate | None:
     return Candidate((), found, held, fitted, 0.0)
 
 
-def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> list[Candidate]:
+def _singles(
+    trial: Attempts, screened: Screen, baseline: Fit, weight: Weight, tell: Say
+) -> list[Candidate]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
     settings = trial.settings.search
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
+    # signatures of strong effects rule none out
     least = max(settings.least_gain, settings.least_gain_share * most)
-    worth = _by_family([e for e, gain in gains.items() if gain > least])
+    worth = _by_family([e for e, gain in gains.items() if screened.strong or gain > least])
     tell(
         "screened: "
         + (
@@ -510,13 +533,14 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
     )
     near = {
         effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
-        if screened.strong or rank < settings.effects_with_starts
+        if rank < settings.effects_with_starts
         else [s.start.scaled(s.size) for s in ranked[effect][:1]]
         for rank, places in enumerate(worth)
         for effect in places
     }
     if screened.strong:
-        chosen, near = _shortlisted(trial, worth, near, baseline)
+        every = {e: [s.start.scaled(s.size) for s in ranked[e]] for e in near}
+        chosen, near = _shortlisted(trial, worth, every, baseline, weight)
     else:
         chosen = []
         for rank, places in enumerate(worth[: settings.most_singles]):
@@ -534,7 +558,11 @@ def _singles(trial: Attempts, screened: Screen, baseline: Fit, tell: Say) -> lis
 
 
 def _shortlisted(
-    trial: Attempts, worth: list[list[str]], near: dict[str, list[Start]], baseline: Fit
+    trial: Attempts,
+    worth: list[list[str]],
+    near: dict[str, list[Start]],
+    baseline: Fit,
+    weight: Weight,
 ) -> tuple[list[str], dict[str, list[Start]]]:
     """Of many effects (each a list of its places) those that leave least after a few steps from
     each of their starts, and where the best of these steps led.
@@ -545,23 +573,23 @@ def _shortlisted(
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
 
-    def least(effect: str) -> float:
+    def most(effect: str) -> float:
         if effect not in short:
-            tried = [trial.fitted_shortly(start, baseline) for start in near[effect]]
-            short[effect] = sorted((c for c in tried if c is not None), key=lambda c: c.misfit)
-        return short[effect][0].misfit if short[effect] else math.inf
+            tried = [trial.fitted_shortly([start], baseline) for start in near[effect]]
+            short[effect] = sorted((c for c in tried if c is not None), key=weight, reverse=True)
+        return weight(short[effect][0]) if short[effect] else -math.inf
 
-    first = sorted(worth[: settings.most_strong_singles], key=lambda places: least(places[0]))
+    first = sorted(worth[: settings.most_strong_singles], key=lambda places: -most(places[0]))
     best: list[str] = []
     starts = {}
     for rank, places in enumerate(first[: settings.most_singles]):
         leads = rank < settings.effects_with_starts
-        tried = [e for e in places[: None if leads else 1] if least(e) < math.inf]
-        most = min(map(least, tried), default=math.inf) / settings.near_place
-        for effect in sorted((e for e in tried if least(e) <= most), key=least):
+        tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
+        least = min((short[e][0].misfit for e in tried), default=math.inf) / settings.near_place
+        for effect in sorted((e for e in tried if short[e][0].misfit <= least), key=most)[::-1]:
             # of the leading effects every form may yet be the one that leaves least
             forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
-            kept = sorted(forms.values(), key=lambda c: c.misfit)
+            kept = sorted(forms.values(), key=weight, reverse=True)
             count = settings.most_forms if leads else 1
             starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
             best.append(effect)

@@ -5,21 +5,23 @@ together.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from pamrs.diagnosis.evidence import Attempts, Candidate, explains, share_left, significant
-from pamrs.diagnosis.fit import acts_in
+from pamrs.diagnosis.fit import Start, acts_in
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
 from pamrs.effects import exclude, id_of
 
-__all__ = ["beside_wrong", "left_everywhere", "settles", "several", "without_needless"]
+__all__ = ["Weight", "beside_wrong", "left_everywhere", "settles", "several", "without_needless"]
 
 Say = Callable[[str], None]
+Weight = Callable[[Candidate], float]
+"""Logarithm of what a hypothesis weighs beside others."""
 
 
 def several(
@@ -29,9 +31,14 @@ def several(
     singles: list[Candidate],
     mistaken: list[Candidate],
     transient: list[str],
+    weight: Weight,
     tell: Say,
 ) -> list[Candidate]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
+
+    The best of the single ones get a partner: another effect, or a value that is wrong. The best of
+    these sets grows, one term after the other, as long as held-out recordings are clearly predicted
+    better.
 
     Parameters
     ----------
@@ -45,6 +52,8 @@ def several(
         Single effects and values that are wrong, fitted by themselves.
     transient : list of str
         Effects that happen at times of their own.
+    weight : callable
+        What a hypothesis weighs.
     tell : callable
         Receives progress.
 
@@ -52,134 +61,199 @@ def several(
     -------
     list of Candidate
     """
-    pairs = _pairs(trial, screened, start, singles, tell)
-    pairs += _telling_together(trial, start, singles, mistaken, pairs, tell)
-    for effect, beside in _beside(trial, screened, start, singles, transient):
+    roots = [c for c in (*singles, *mistaken) if c.fit.events is None]
+    growing = _Growing(trial, screened, start, roots, weight, tell)
+    most = trial.settings.search.most_paired
+    sets = [s for root in growing.best(roots)[:most] for s in growing.widened(root)]
+    happening = []
+    for effect, beside in _beside(trial, screened, start, singles, transient, weight):
         tell(f"looking for {effect} beside {beside.effects[0]}")
         found = trial.transient(effect, beside)
-        pairs += [] if found is None else [found]
-    return [*pairs, *_grown(trial, screened, pairs, tell)]
+        happening += [] if found is None else [found]
+    return [*sets, *happening, *growing.grown(sets)]
 
 
-def beside_wrong(trial: Attempts, sets: list[Candidate], tell: Say) -> list[Candidate]:
-    """The single effect and the set that leave least, each beside a file that is wrong: parameters
-    that they move far, freed one at a time.
-    """
-    lasting = [c for c in sets if c.fit.events is None]
-    singles = [c for c in lasting if len(c.effects) == 1]
-    best = [min(part, key=left_everywhere) for part in (singles, lasting) if part]
-    walls = trial.settings.fit.most_tolerances
+def beside_wrong(trial: Attempts, single: Candidate, tell: Say) -> list[Candidate]:
+    """An effect beside a file that is wrong: parameters that it moves far, freed one at a time."""
+    (effect,) = single.effects
+    begun = [trial.start_of(single.fit, effect)]
     found = []
-    for candidate in dict.fromkeys(best):
-        starts = [trial.start_of(candidate.fit, e) for e in candidate.effects]
-        for name in strained_parameters(trial, candidate.fit):
-            tell(f"trying {' + '.join(candidate.effects)} beside another {name}")
-            beside = trial.beside_wrong(starts, candidate.fit, (name,))
-            if beside is not None and beside.is_wrong(walls):
-                found.append(beside)
+    for name in strained_parameters(trial, single.fit):
+        tell(f"trying {effect} beside another {name}")
+        beside = trial.together(begun, single.fit, (name,))
+        found += [] if beside is None else [beside]
     return found
 
 
-def _pairs(
-    trial: Attempts, screened: Screen, start: Candidate, singles: list[Candidate], tell: Say
-) -> list[Candidate]:
-    """For the best singles that leave something: the effects that would take most of it, fitted
-    together with them.
+@dataclass(frozen=True, eq=False)
+class _Partner:
+    """What a set may get as its next term.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Its name, an effect or a parameter that is wrong; two where one mistake makes two wrong.
+    starts : list of Start
+        Where its effect begins.
+    wrong : tuple of str
+        Those of the names that are parameters.
+    values : dict of str to float
+        Where these begin, SI.
     """
-    settings = trial.settings.search
-    persistent = [c for c in singles if c.fit.events is None]
-    ranked = sorted(
-        persistent, key=lambda c: sum(c.held_out[b.name].ratio for b in trial.suspects)
-    )[: settings.most_paired]
-    white = trial.white
-    mismatch = float(screened.stand.rows @ screened.stand.rows)
-    tried: set[frozenset[str]] = set()
-    found = []
-    for single in ranked:
-        stand = stand_of(single.fit, trial.inner, white)
-        partners = [
-            scores[0]
-            for scores in by_effect(screened.scores(stand, without=single.effects)).values()
+
+    names: tuple[str, ...]
+    starts: list[Start]
+    wrong: tuple[str, ...] = ()
+    values: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class _Growing:
+    """Sets of hypotheses that get one term after the other.
+
+    Attributes
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels.
+    screened : Screen
+        Signatures of the effects.
+    start : Candidate
+        The refitted baseline.
+    roots : list of Candidate
+        Single effects and values that are wrong, fitted by themselves.
+    weight : callable
+        What a hypothesis weighs.
+    tell : callable
+        Receives progress.
+    done : set
+        Names of the sets that were fitted.
+    """
+
+    trial: Attempts
+    screened: Screen
+    start: Candidate
+    roots: list[Candidate]
+    weight: Weight
+    tell: Say
+    done: set[frozenset[str]] = field(default_factory=set)
+
+    def best(self, sets: list[Candidate]) -> list[Candidate]:
+        """Sets in the order of what they weigh."""
+        return sorted(sets, key=self.weight, reverse=True)
+
+    def grown(self, sets: list[Candidate]) -> list[Candidate]:
+        """The best set with one term after the other."""
+        best = max(sets, key=self.weight, default=None)
+        found: list[Candidate] = []
+        while best is not None and len(best.names) < self.trial.settings.search.most_terms:
+            tried = self.widened(best)
+            further = max(tried, key=self.weight, default=None)
+            if further is None or not _predicts_better(further, best, self.trial):
+                break
+            found += tried
+            best = further
+        return found
+
+    def widened(self, base: Candidate) -> list[Candidate]:
+        """A set with each of its likely partners, fitted from where both stand."""
+        begun = [self.trial.start_of(base.fit, effect) for effect in base.effects]
+        found = []
+        for partner in self._partners(base, begun):
+            if self._was_tried(base, partner.names):
+                continue
+            self.done.add(frozenset({*base.names, *partner.names}))
+            self.tell(f"trying {' + '.join([*base.names, *partner.names])}")
+            warm = replace(base.fit, values=base.fit.values | partner.values)
+            wrong = (*base.wrong, *partner.wrong)
+            larger = self.trial.together([*begun, *partner.starts], warm, wrong)
+            found += [] if larger is None else [larger]
+        return found
+
+    def _was_tried(self, base: Candidate, names: tuple[str, ...]) -> bool:
+        """Whether a set was fitted with some more names."""
+        return frozenset({*base.names, *names}) in self.done
+
+    def _partners(self, base: Candidate, begun: list[Start]) -> Iterator[_Partner]:
+        """What may be missing beside a set: effects whose signature is in what it leaves, what
+        tells by itself, and parameters that it moves far.
+        """
+        for scores in self._signatures(base):
+            if not self._was_tried(base, (scores[0].effect,)):
+                yield self._begun_best(base, begun, scores)
+        yield from self._telling(base)
+        strained = strained_parameters(self.trial, base.fit) if base.effects else []
+        yield from (_Partner((name,), [], (name,)) for name in strained if name not in base.wrong)
+
+    def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
+        """An effect beside a set, from the start that leaves least after a few steps."""
+        most = self.trial.settings.search.most_starts
+        starts = [s.start.scaled(s.size) for s in scores[:most]]
+        short = [
+            (c, start)
+            for start in (starts if len(starts) > 1 else [])
+            if (c := self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)) is not None
         ]
+        best = max(short, key=lambda one: self.weight(one[0]), default=(base, starts[0]))
+        return _Partner((scores[0].effect,), [best[1]])
+
+    def _signatures(self, base: Candidate) -> list[list[Score]]:
+        """The effects that would take most of what a set leaves, each from all its starts."""
+        trial, settings = self.trial, self.trial.settings.search
+        stand = stand_of(base.fit, trial.inner, trial.white)
+        ranked = by_effect(self.screened.scores(stand, without=base.effects))
+        own = self.screened.stand.rows
+        mismatch = float(own @ own) if len(base.names) == 1 else stand.power_left
         least = max(settings.least_gain, settings.partner_share * mismatch)
-        likely = [score for score in partners if score.gain > least]
+        likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[: settings.most_partners]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
-        for block in _untouched(single, start, trial):
+        for block in _untouched(base, self.start, trial) if len(base.names) == 1 else []:
             there = [
-                s
-                for s in partners
-                if [b for b in trial.suspects if acts_in(s.effect, b)] == [block]
+                effect
+                for effect, scores in ranked.items()
+                if [b for b in trial.suspects if acts_in(effect, b)] == [block]
+                and scores[0].gain > settings.least_gain
             ]
-            own = [s for s in there if s.gain > settings.least_gain]
-            best += [score for score in own[:1] if score not in best]
-        for score in best:
-            both = frozenset({*single.effects, score.effect})
-            if both in tried:
-                continue
-            tried.add(both)
-            tell(f"trying {' + '.join(sorted(both))}")
-            candidate = _with_partner(trial, single, score)
-            if candidate is not None:
-                found.append(candidate)
-    return found
+            best += [effect for effect in there[:1] if effect not in best]
+        return [ranked[effect] for effect in best]
+
+    def _telling(self, base: Candidate) -> list[_Partner]:
+        """What takes a telling share of the mismatch by itself.
+
+        The signature of a strong effect beside another one is linear in what is not; where both
+        were fitted, both are known.
+        """
+        trial, settings = self.trial, self.trial.settings.search
+        left = {
+            c: share_left(c, self.start, trial.compared, trial.settings.evidence)
+            for c in self.roots
+        }
+        telling = [
+            c
+            for c in self.best(self.roots)
+            if left[c] < settings.telling_left
+            and not set(c.names) & set(base.names)
+            and (c.effects or base.effects)
+            and not any(exclude(e, base.effects) for e in c.effects)
+        ]
+        return [
+            _Partner(
+                c.names,
+                [trial.start_of(c.fit, effect) for effect in c.effects],
+                c.wrong,
+                {name: c.fit.values[name] for name in c.wrong},
+            )
+            for c in telling[: settings.most_partners]
+        ]
 
 
-def _telling_together(
-    trial: Attempts,
-    start: Candidate,
-    singles: list[Candidate],
-    mistaken: list[Candidate],
-    pairs: list[Candidate],
-    tell: Say,
-) -> list[Candidate]:
-    """The single effects that leave least, each with what takes a telling share of the mismatch by
-    itself: another effect, or a value that is wrong.
-
-    The signature of a strong effect beside another one is linear in what is not; where both were
-    fitted, both are known.
-    """
-    settings, evidence = trial.settings.search, trial.settings.evidence
-    left = {
-        c: share_left(c, start, trial.compared, evidence)
-        for c in (*singles, *mistaken)
-        if c.fit.events is None
-    }
-    telling = sorted((c for c in left if left[c] < settings.telling_left), key=left.__getitem__)
-    leading = [c for c in telling if c.effects][: settings.most_paired]
-    done = {frozenset(c.names) for c in pairs}
-    found = []
-    for one in leading:
-        for other in [c for c in telling if c is not one][: settings.most_partners]:
-            names = frozenset({*one.names, *other.names})
-            if names in done or any(exclude(e, one.effects) for e in other.effects):
-                continue
-            done.add(names)
-            tell(f"trying {' + '.join(sorted(names))}")
-            both = _joined(trial, one, other)
-            found += [] if both is None else [both]
-    return found
-
-
-def _one_place_each(scores: list[Score]) -> list[Score]:
-    """Of scores in the order of their gain the first of each effect, wherever it acts."""
-    best: dict[str, Score] = {}
-    for score in scores:
-        best.setdefault(id_of(score.effect), score)
+def _one_place_each(terms: list[str]) -> list[str]:
+    """The first place of each effect, wherever it acts."""
+    best: dict[str, str] = {}
+    for term in terms:
+        best.setdefault(id_of(term), term)
     return list(best.values())
-
-
-def _joined(trial: Attempts, one: Candidate, other: Candidate) -> Candidate | None:
-    """Two hypotheses, the first one of them an effect, fitted together from where each stood."""
-    starts = [trial.start_of(c.fit, effect) for c in (one, other) for effect in c.effects]
-    if not other.wrong:
-        return trial.fitted(starts, one.fit, trial.white)
-    values = {name: other.fit.values[name] for name in other.wrong}
-    warm = replace(one.fit, values=one.fit.values | values)
-    both = trial.beside_wrong(starts, warm, other.wrong)
-    walls = trial.settings.fit.most_tolerances
-    return both if both is not None and both.is_wrong(walls) else None
 
 
 def _beside(
@@ -188,10 +262,11 @@ def _beside(
     start: Candidate,
     singles: list[Candidate],
     happening: list[str],
+    weight: Weight,
 ) -> list[tuple[str, Candidate]]:
     """Effects with times of their own, each with a persistent one that it may have happened beside.
 
-    That is the persistent effect that leaves least, if it leaves much; and, of those that were
+    That is the persistent effect that weighs most, if it leaves much; and, of those that were
     fitted, the one whose signature is in what the events leave.
     """
     settings, evidence = trial.settings.search, trial.settings.evidence
@@ -200,7 +275,7 @@ def _beside(
         return share_left(candidate, start, trial.compared, evidence)
 
     steady = [c for c in singles if c.fit.events is None]
-    best = min(steady, key=left_by, default=start)
+    best = max(steady, key=weight, default=start)
     found = (
         [(e, best) for e in happening]
         if settings.transient_beside < left_by(best) < settings.much_left
@@ -284,38 +359,6 @@ def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[
     ]
 
 
-def _grown(trial: Attempts, screened: Screen, pairs: list[Candidate], tell: Say) -> list[Candidate]:
-    """Sets of three effects and more: the pair that leaves least with one effect after the other,
-    as long as held-out recordings are clearly predicted better.
-    """
-    settings = trial.settings.search
-    lasting = [c for c in pairs if c.fit.events is None]
-    best = min(lasting, key=left_everywhere, default=None)
-    found: list[Candidate] = []
-    while best is not None and len(best.effects) < settings.most_terms:
-        stand = stand_of(best.fit, trial.inner, trial.white)
-        ranked = by_effect(screened.scores(stand, without=best.effects)).values()
-        least = max(settings.least_gain, settings.partner_share * stand.power_left)
-        likely = _one_place_each([s[0] for s in ranked if s[0].gain > least])
-        tried = []
-        for score in likely[: settings.most_partners]:
-            tell(f"trying {' + '.join([*best.effects, score.effect])}")
-            candidate = _with_partner(trial, best, score)
-            tried += [] if candidate is None else [candidate]
-        further = min(tried, key=left_everywhere, default=None)
-        if further is None or not _predicts_better(further, best, trial):
-            break
-        found.append(further)
-        best = further
-    return found
-
-
-def _with_partner(trial: Attempts, candidate: Candidate, score: Score) -> Candidate | None:
-    """The effects of a candidate fitted together with a further one, from where both stand."""
-    begun = [trial.start_of(candidate.fit, effect) for effect in candidate.effects]
-    return trial.fitted([*begun, score.start.scaled(score.size)], candidate.fit, trial.white)
-
-
 def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bool:
     """Whether a larger set takes a telling share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
@@ -337,11 +380,13 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     """Whether a hypothesis leaves so little that no pair can be called for.
 
     What a single effect leaves may be no more than the difference between its equation and the
-    truth.
+    truth; a value of the rig file that was wrong leaves noise.
     """
     evidence = trial.settings.evidence
     if explains(candidate, start, trial.compared, evidence):
         return True
+    if not candidate.effects:
+        return False  # another value leaves nothing to the form of an equation
     little = share_left(candidate, start, trial.compared, evidence) < evidence.form_share
     return little and not _untouched(candidate, start, trial)
 

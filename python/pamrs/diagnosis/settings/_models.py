@@ -210,6 +210,16 @@ class TransientSettings(SettingsGroup):
         reason="time before the end of the recording from which none is tried",
         origin="judgement",
     )
+    least_step_share: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="longest stable step of a model with persistent effects, as a share of the nominal "
+        "one's, from which events are looked for beside these: the many runs that it takes would "
+        "each be five times as long",
+        origin="judgement; docs/decisions/0103",
+    )
     early: float = setting(
         0.1,
         unit="s",

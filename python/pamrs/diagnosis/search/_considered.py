@@ -1,0 +1,96 @@
+"""Sets of names that the caller asks for: fitted from every start, and judged with the others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from pamrs.diagnosis.evidence import Attempts, Candidate
+from pamrs.diagnosis.fit import Fit, acts_in, depends, starts_of
+from pamrs.effects import id_of, info_of, is_effect
+
+__all__ = ["considered"]
+
+Weight = Callable[[Candidate], float]
+
+
+def considered(
+    trial: Attempts, start: Candidate, weight: Weight, tell: Callable[[str], None]
+) -> list[Candidate]:
+    """What of the sets of names that the caller asks for acts in the blocks of a mismatch, each set
+    fitted together.
+
+    Parameters
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels; the names are those of its problem.
+    start : Candidate
+        The refitted baseline.
+    weight : callable
+        What a hypothesis weighs.
+    tell : callable
+        Receives progress.
+    """
+    found = []
+    for names in trial.inner.considered:
+        effects = [n for n in names if is_effect(n) and any(acts_in(n, b) for b in trial.suspects)]
+        wrong = tuple(
+            n for n in names if n in start.fit.moved and any(depends(b, n) for b in trial.suspects)
+        )
+        if not effects and not wrong:
+            continue
+        tell(f"trying {' + '.join([*effects, *wrong])}, which was asked for")
+        own = _together(trial, start, effects, wrong, weight)
+        found += [] if own is None else [own]
+    return found
+
+
+def _together(
+    trial: Attempts, start: Candidate, effects: list[str], wrong: tuple[str, ...], weight: Weight
+) -> Candidate | None:
+    """Effects and wrong values fitted together, the effects one after the other from the best of
+    all their starts.
+    """
+    best = start if not wrong else trial.freed(wrong, start.fit)
+    for effect in effects:
+        if best is None:
+            return None
+        best = _added(trial, start, best, effect, weight)
+    return best
+
+
+def _added(
+    trial: Attempts, start: Candidate, beside: Candidate, effect: str, weight: Weight
+) -> Candidate | None:
+    """An effect beside a set, from the start of each of its forms that leaves least after a few
+    steps.
+    """
+    info = info_of(effect)
+    if not info.lasting:
+        return trial.transient(id_of(effect), beside)
+    begun = [trial.start_of(beside.fit, e) for e in beside.effects]
+    sizes = trial.settings.screen.strong_sizes
+    short: dict[str, list[Candidate]] = {}
+    for one in starts_of(effect, sealed=trial.nominal.model["valve"] is None):
+        for size in (1.0, *sizes) if one.scalable else (1.0,):
+            tried = trial.fitted_shortly([*begun, one.scaled(size)], beside.fit, beside.wrong)
+            if tried is not None:
+                short.setdefault(one.form, []).append(tried)
+    near = {form: max(tried, key=weight) for form, tried in short.items()}
+    ended = [
+        whole
+        for tried in near.values()
+        if (whole := _ended(trial, tried, beside.wrong)) is not None
+    ]
+    if info.transient and not beside.wrong:
+        happened = trial.transient(id_of(effect), beside)
+        ended += [] if happened is None else [happened]
+    return max(ended, key=weight, default=None)
+
+
+def _ended(trial: Attempts, tried: Candidate, wrong: tuple[str, ...]) -> Candidate | None:
+    """A set fitted to its end."""
+    warm: Fit = tried.fit
+    starts = [trial.start_of(warm, e) for e in tried.effects]
+    found = trial.together(starts, warm, wrong)
+    return None if found is None else replace(found, gain=tried.gain)

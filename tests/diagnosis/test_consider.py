@@ -1,0 +1,83 @@
+"""Names that the caller suspects are judged with what the search finds."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import jsonschema
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs.diagnosis.result import schema
+from tests.diagnosis import again
+
+RIG = pamrs.rigs.shoulder()
+LEAK = {"conductance": 2e-10}
+
+
+@pytest.fixture(scope="module")
+def asked() -> pamrs.Diagnosis:
+    """A leak, with two suspicions."""
+    given = again.case(RIG.with_effect("leak_muscle", LEAK), RIG)
+    return pamrs.diagnose(given, consider=["chamber.dead_volume", "leak_muscle + heat_transfer"])
+
+
+def test_each_suspicion_has_its_share_and_its_probability(asked: pamrs.Diagnosis) -> None:
+    volume, both = asked.considered
+    assert (volume.names, set(both.names)) == (
+        ["chamber.dead_volume"],
+        {"leak_muscle", "heat_transfer"},
+    )
+    assert all(own.blocks == both.blocks and "chamber" in own.blocks for own in asked.considered)
+    # another volume does not leak; heat adds nothing to what a leak explains
+    assert volume.left is None or volume.left > 0.5
+    assert volume.probability < 0.05
+    assert both.left is not None
+    assert both.left < 0.05
+    assert asked.effects[0].id == "leak_muscle"
+
+
+def test_it_is_told_in_text_and_json(asked: pamrs.Diagnosis) -> None:
+    data = json.loads(asked.to_json())
+    jsonschema.validate(data, schema())
+    assert [entry["names"] for entry in data["considered"]] == [
+        list(own.names) for own in asked.considered
+    ]
+    assert "Asked for: wrong chamber dead volume: " in asked.summary()
+
+
+def test_without_a_mismatch_there_is_nothing_to_explain() -> None:
+    found = pamrs.diagnose(again.case(RIG, RIG), consider=["base_flexibility"])
+    assert found.considered == json.loads(found.to_json())["considered"] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("leak_muscel", "did you mean 'leak_muscle'"),
+        ("chamber.dead_volum", "did you mean 'chamber.dead_volume'"),
+        ("chamber.gamma", "nor one of its parameters with a tolerance"),
+        ("supply_regulator_deadband", "neither an effect that this rig can have"),
+        ("base_flexibility", "holds it already"),
+        ("", "neither an effect"),
+    ],
+)
+def test_a_name_that_is_none_is_refused(name: str, said: str) -> None:
+    rig = RIG.with_effect("base_flexibility")
+    with pytest.raises(ValueError, match=said):
+        pamrs.diagnose(again.case(rig, rig), consider=[name])
+
+
+def test_a_single_text_is_refused() -> None:
+    with pytest.raises(ValueError, match="a list of such texts"):
+        pamrs.diagnose(again.case(RIG, RIG), consider="leak_muscle")
+
+
+def test_the_command_line_refuses_it_too(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = again.written(again.case(RIG, RIG), tmp_path / "case")
+    assert cli.main(["diagnose", str(folder), "--consider", "leak_muscel"]) == 2
+    assert "did you mean 'leak_muscle'" in capsys.readouterr().err
