@@ -1,0 +1,89 @@
+"""Missed cases diagnosed again with their truth inserted: did the search fail, or the weighing?"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+import pamrs
+from tests.trial.test_second import CREEP, HOSE, LEAK, key_of, result_of
+from trial.__main__ import main
+from trial.second.inserted import FORM, QUIET, SEARCH, WEIGHT, all_inserted, truth_of
+
+
+@dataclass
+class Told:
+    """What a diagnosis with the truth inserted says."""
+
+    result: dict[str, Any]
+    considered: list[SimpleNamespace]
+
+    def to_json(self) -> str:
+        return json.dumps(self.result)
+
+
+def asked(left: float | None, probability: float = 0.1) -> SimpleNamespace:
+    return SimpleNamespace(left=left, probability=probability)
+
+
+#: truth, what was said, what is said with the truth inserted, and what failed
+CASES = {
+    "right": ([LEAK], ["leak_muscle"], None, ""),
+    "lost": ([LEAK], [], Told(result_of("effects", ["leak_muscle"]), [asked(0.01, 0.9)]), SEARCH),
+    "light": ([CREEP], ["heat"], Told(result_of("effects", ["heat"]), [asked(0.2)]), WEIGHT),
+    "odd": ([CREEP], [], Told(result_of("unlisted"), [asked(0.1), asked(0.8)]), FORM),
+    "inside": ([CREEP], [], Told(result_of("unlisted"), [asked(None)]), FORM),
+    "quiet": ([LEAK], [], Told(result_of("none"), []), QUIET),
+    "listed nowhere": ([HOSE], ["muscle_creep"], None, ""),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A trial with a case of each kind, and a diagnosis that says what it is to say."""
+    (tmp_path / "keys").mkdir()
+    for name, (truth, named, _, _) in CASES.items():
+        said = result_of("effects" if named else "unlisted", named)
+        (tmp_path / "keys" / f"{name}.json").write_text(json.dumps(key_of(name, truth)))
+        (tmp_path / "results" / name).mkdir(parents=True)
+        (tmp_path / "results" / name / "out.json").write_text(json.dumps(said))
+
+    def diagnose(case: Path, *, consider: list[str]) -> Told:
+        truth, _, told, _ = CASES[case.name]
+        assert consider == ["+".join(name for name, _, _ in truth)]
+        assert told is not None
+        return told
+
+    monkeypatch.setattr(pamrs, "diagnose", diagnose)
+    return tmp_path
+
+
+def test_each_missed_case_failed_by_one_thing(folder: Path) -> None:
+    found = {own.case: own.failed for own in all_inserted(folder, folder / "results")}
+    assert found == {name: failed for name, (*_, failed) in CASES.items() if failed}
+
+
+def test_the_truth_is_what_a_diagnosis_may_name() -> None:
+    key = key_of("a", [LEAK, HOSE, CREEP], wrong=["arm.payload"])
+    assert truth_of(key) == "leak_muscle+muscle_creep+arm.payload"
+
+
+def test_the_command_writes_the_table(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = folder / "inserted.md"
+    assert main(["insert", str(folder), "--markdown", str(page)]) == 0
+    text = page.read_text()
+    assert text in capsys.readouterr().out
+    assert "| lost | leak_muscle | unlisted | leak_muscle | 1 % | 0.90 | search |" in text
+    assert "| search | 1 |" in text
+
+
+def test_keys_of_another_plan_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["insert", str(tmp_path)]) == 2
+    assert "no keys of plan second" in capsys.readouterr().err
