@@ -159,7 +159,8 @@ def made_up(term: str, left: float, places: int) -> Candidate:
     rig = PAIR.with_effect(id_of(term), at=place_of(term)) if term else PAIR
     names = [f"{term}.{info_of(term).leading.name}"] if term else []
     values = dict.fromkeys(names, 1e-11)
-    found = Fit((term,), rig, values, values, np.zeros((0, 0)), 0.0, {})
+    spread = {name: 0.1 * value for name, value in values.items()}
+    found = Fit((term,), rig, values, spread, np.zeros((0, 0)), 0.0, {})
     kept = {
         b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
         for b in blocks_of(PAIR)

@@ -9,7 +9,7 @@ import numpy as np
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
-from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.fit import Problem, form_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
@@ -133,7 +133,8 @@ def weigh(
     further effect has its price, and so have a clock that does not drift and values that an effect
     hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set
     explains in recordings that it was not fitted to (a name has to carry half of it; the rest may
-    be what no model has, and stands beside the name), its values, and whether its size is the same
+    be what no model has, and stands beside the name), its values (a set with an effect whose size
+    is not told from none names nothing), and whether its size is the same
     in all recordings; improbable sets themselves say nothing against one that is. The constants are
     those under which the stated probabilities came true in a trial with other seeds than the
     published one (docs/decisions/0014, 0032).
@@ -142,7 +143,7 @@ def weigh(
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
     not all the suspects.
     """
-    named = [c for c in candidates if c.names]
+    named = [c for c in candidates if c.names and not _absent(c, settings.evidence)]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
@@ -174,6 +175,28 @@ def weigh(
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
+    """Whether all sizes of an effect of a set are not told from none: a fit that goes on beside
+    such an effect may end lower, which is not the effect's doing.
+    """
+    if candidate.fit.events is not None:
+        return False
+    rig, values, std = candidate.fit.rig, candidate.fit.values, candidate.fit.std
+    for effect in candidate.effects:
+        own = info_of(effect).form(form_in(rig, effect)).parameters
+        sizes = [
+            f"{effect}.{p.name}"
+            for p in own
+            if p.role_in(sealed=False) == "size" and p.neutral == 0.0
+        ]
+        known = [name for name in sizes if name in values]
+        if known and all(
+            abs(values[name]) <= settings.same_stds * std.get(name, 0.0) for name in known
+        ):
+            return True
+    return False
 
 
 def log_weight(
@@ -323,24 +346,13 @@ def _trusted(
 ) -> float:
     """Probability of a set against ``unlisted``; ``unlikely`` is what it loses by its values."""
     left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
-    even = settings.log_odds_explained_pliable
-    if not _pliable(candidate):
-        usual = settings.log_odds_explained
-        even = usual + _strength(baseline, suspects, settings) * (even - usual)
+    even = (
+        settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
+    )
     odds = (math.log((1.0 - left) / left) - even) / settings.softness
     if explains(candidate, baseline, suspects, settings):
         odds = max(odds, settings.log_odds_noise_left)
     return capped(odds - unlikely - penalty(candidate, seconds, settings), most)
-
-
-def _strength(baseline: Candidate, suspects: list[Block], settings: EvidenceSettings) -> float:
-    """How strong the mismatch is that the refit leaves, from 0 for a faint one to 1, by the
-    logarithm of its size in noise levels.
-    """
-    stages = (baseline.fitted, baseline.held_out)
-    size = max(stage[b.name].systematic for stage in stages for b in suspects)
-    low, high = (math.log(noises) for noises in settings.strong_noises)
-    return min(max(math.log(max(size, 1e-9)) - low, 0.0) / (high - low), 1.0)
 
 
 def _pliable(candidate: Candidate) -> bool:

@@ -351,13 +351,7 @@ def _weighed(
         return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
 
     found = weights(candidates)
-    # what leaves only noise may have stopped short of where its parameters were expected
-    likely = [
-        c
-        for c in candidates[1:]
-        if _odds(found, c) > settings.search.polish_from
-        or explains(c, start, trial.compared, settings.evidence)
-    ]
+    likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
     close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
     if len(close) > 1 or (
         close and not explains(close[0], start, trial.compared, settings.evidence)

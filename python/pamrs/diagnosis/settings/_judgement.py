@@ -29,16 +29,6 @@ class EvidenceSettings(SettingsGroup):
         "another in every recording, and parameters of the baseline (7 % left)",
         origin="docs/decisions/0014 and 0025",
     )
-    strong_noises: tuple[float, ...] = setting(
-        (10.0, 100.0),
-        unit="noise levels",
-        above=0.0,
-        reason="size of a mismatch from which a set of persistent effects has to explain more than "
-        "half, and from which it has to explain what log_odds_explained_pliable says: an equation "
-        "that is like the truth leaves as small a share of a strong mismatch as of a faint one, "
-        "what takes only most of it stands for something else",
-        origin="docs/decisions/0103, seeds 10501, 10701 and 10901",
-    )
     softness: float = setting(
         0.4,
         unit="log odds",
