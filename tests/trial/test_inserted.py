@@ -3,42 +3,39 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-import pamrs
 from tests.trial.test_second import CREEP, HOSE, LEAK, key_of, result_of
 from trial.__main__ import main
-from trial.second.inserted import FORM, QUIET, SEARCH, WEIGHT, all_inserted, truth_of
+from trial.second.inserted import (
+    FORM,
+    QUIET,
+    SEARCH,
+    WEIGHT,
+    all_inserted,
+    diagnosed,
+    truth_of,
+)
 
 
-@dataclass
-class Told:
-    """What a diagnosis with the truth inserted says."""
-
-    result: dict[str, Any]
-    considered: list[SimpleNamespace]
-
-    def to_json(self) -> str:
-        return json.dumps(self.result)
-
-
-def asked(left: float | None, probability: float = 0.1) -> SimpleNamespace:
-    return SimpleNamespace(left=left, probability=probability)
+def told(result: dict[str, Any], *considered: tuple[float | None, float]) -> dict[str, Any]:
+    """What a diagnosis with the truth inserted says: beside its result the share that the truth
+    leaves, and its probability.
+    """
+    return result | {"considered": [{"left": a, "probability": b} for a, b in considered]}
 
 
 #: truth, what was said, what is said with the truth inserted, and what failed
 CASES = {
     "right": ([LEAK], ["leak_muscle"], None, ""),
-    "lost": ([LEAK], [], Told(result_of("effects", ["leak_muscle"]), [asked(0.01, 0.9)]), SEARCH),
-    "light": ([CREEP], ["heat"], Told(result_of("effects", ["heat"]), [asked(0.2)]), WEIGHT),
-    "odd": ([CREEP], [], Told(result_of("unlisted"), [asked(0.1), asked(0.8)]), FORM),
-    "inside": ([CREEP], [], Told(result_of("unlisted"), [asked(None)]), FORM),
-    "quiet": ([LEAK], [], Told(result_of("none"), []), QUIET),
+    "lost": ([LEAK], [], told(result_of("effects", ["leak_muscle"]), (0.01, 0.9)), SEARCH),
+    "light": ([CREEP], ["heat"], told(result_of("effects", ["heat"]), (0.2, 0.1)), WEIGHT),
+    "odd": ([CREEP], [], told(result_of("unlisted"), (0.1, 0.1), (0.8, 0.1)), FORM),
+    "inside": ([CREEP], [], told(result_of("unlisted"), (None, 0.0)), FORM),
+    "quiet": ([LEAK], [], told(result_of("none")), QUIET),
     "listed nowhere": ([HOSE], ["muscle_creep"], None, ""),
 }
 
@@ -53,13 +50,13 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / "results" / name).mkdir(parents=True)
         (tmp_path / "results" / name / "out.json").write_text(json.dumps(said))
 
-    def diagnose(case: Path, *, consider: list[str]) -> Told:
-        truth, _, told, _ = CASES[case.name]
-        assert consider == ["+".join(name for name, _, _ in truth)]
-        assert told is not None
-        return told
+    def diagnosed(case: Path, suspicion: str) -> dict[str, Any]:
+        truth, _, again, _ = CASES[case.name]
+        assert suspicion == "+".join(name for name, _, _ in truth)
+        assert again is not None
+        return again
 
-    monkeypatch.setattr(pamrs, "diagnose", diagnose)
+    monkeypatch.setattr("trial.second.inserted.diagnosed", diagnosed)
     return tmp_path
 
 
@@ -87,3 +84,8 @@ def test_keys_of_another_plan_are_refused(
 ) -> None:
     assert main(["insert", str(tmp_path)]) == 2
     assert "no keys of plan second" in capsys.readouterr().err
+
+
+def test_a_case_that_is_none_says_why(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="nowhere: no such case folder"):
+        diagnosed(tmp_path / "nowhere", "leak_muscle")

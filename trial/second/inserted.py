@@ -3,13 +3,16 @@ said.
 
 A diagnosis that names something else, or nothing, has either not found the true hypothesis (the
 search failed), or found it and weighed it too little, or has no equation that is like the truth.
-``pamrs.diagnose(consider=...)`` fits the true names from every start and judges them with what the
-search found by itself.
+``pamrs diagnose --consider`` fits the true names from every start and judges them with what the
+search found by itself; like `pamrs prove` it runs in a process of its own.
 """
 
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -82,6 +85,29 @@ def _named(result: dict[str, Any]) -> str:
     return ", ".join([*names, *wrong]) or str(result["verdict"])
 
 
+def diagnosed(case: Path, suspicion: str) -> dict[str, Any]:
+    """What a diagnosis says that judges a suspicion as well.
+
+    Raises
+    ------
+    ValueError
+        If the case cannot be diagnosed; says why.
+    """
+    with tempfile.TemporaryDirectory() as home:
+        out = Path(home) / "out.json"
+        words = [str(case), "--consider", suspicion, "--json", str(out)]
+        done = subprocess.run(
+            [sys.executable, "-m", "pamrs", "diagnose", *words],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode != 0:
+            raise ValueError(f"{case}: {done.stderr.strip() or done.returncode}")
+        found: dict[str, Any] = json.loads(out.read_text(encoding="utf-8"))
+        return found
+
+
 def inserted(key: dict[str, Any], result: dict[str, Any], case: Path) -> Inserted:
     """Diagnose a missed case again with its truth inserted.
 
@@ -92,15 +118,12 @@ def inserted(key: dict[str, Any], result: dict[str, Any], case: Path) -> Inserte
     case : path
         Folder of the case.
     """
-    import pamrs
-
     truth = truth_of(key)
-    told = pamrs.diagnose(case, consider=[truth])
-    again = json.loads(told.to_json())
-    now = mark(key, again)
-    lefts = [1.0 if entry.left is None else entry.left for entry in told.considered]
+    again = diagnosed(case, truth)
+    now, considered = mark(key, again), again.get("considered", [])
+    lefts = [1.0 if entry["left"] is None else float(entry["left"]) for entry in considered]
     # of several groups of blocks the one in which the truth explains least
-    worst = max(zip(lefts, told.considered, strict=True), key=lambda pair: pair[0], default=None)
+    worst = max(zip(lefts, considered, strict=True), key=lambda pair: pair[0], default=None)
     if worst is None:
         failed = QUIET
     elif now.leading is not False and now.wrong is not False:
@@ -113,8 +136,8 @@ def inserted(key: dict[str, Any], result: dict[str, Any], case: Path) -> Inserte
         _named(result),
         _named(again),
         failed,
-        None if worst is None else worst[1].left,
-        None if worst is None else worst[1].probability,
+        None if worst is None else worst[1]["left"],
+        None if worst is None else worst[1]["probability"],
     )
 
 
