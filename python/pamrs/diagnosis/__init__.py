@@ -26,7 +26,7 @@ from typing import Any
 from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
-from pamrs.diagnosis.evidence import Group, calibrated
+from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
 from pamrs.diagnosis.explain import assemble, data_used
 from pamrs.diagnosis.fit import Problem, fits, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
@@ -332,8 +332,8 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
             raise ValueError(
                 f"consider: {name!r} is not allowed: the model holds it already, and it is refitted"
             )
-        known = free if "." in name else there
-        if (name if "." in name else id_of(name)) not in known:
+        own, known = (name, free) if is_parameter(name) else (id_of(name), there)
+        if own not in known:
             raise ValueError(
                 f"consider: {name!r} is neither an effect that this rig can have nor one of its "
                 f"parameters with a tolerance; {meant(name, known)}"

@@ -5,9 +5,9 @@
 //! `a` is the angle, seen from the joint, by which the centre of mass lies off the line: of an offset
 //! across it, that offset over the distance of the centre; of a base that is not level, its tilt.
 //! What an offset along the line does is `arm.first_moment`. A link of a chain loads the joints
-//! before its own as well. M. W. Spong, S. Hutchinson & M. Vidyasagar, *Robot Modeling and Control* (2006),
-//! ch. 7; J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans. Robotics
-//! Autom. 13, 1997 (both first moments of a link).
+//! before its own as well. M. W. Spong, S. Hutchinson & M. Vidyasagar, *Robot Modeling and Control*
+//! (2006), ch. 7; J. Swevers et al., "Optimal robot excitation and identification", IEEE Trans.
+//! Robotics Autom. 13, 1997 (both first moments of a link).
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Port};
 use crate::blocks::gas::Gas;

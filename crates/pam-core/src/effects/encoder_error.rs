@@ -5,7 +5,8 @@
 //! disc that is tilted, a magnet that is oval, or two tracks with other gains. The error is none at
 //! the angle `q_0`, where the encoder was set. Without amplitudes it has no constant: that is the
 //! zero of its sensor. The angle behind a reading is found by Newton steps (`plant/encoder.rs`), and
-//! the rate that is read is that of the reading. A stroke that is a small part of a turn has little more of it than a zero and a factor.
+//! the rate that is read is that of the reading. A stroke that is a small part of a turn has little
+//! more of it than a zero and a factor.
 //! E. O. Doebelin, *Measurement Systems*, ch. 4; H. C. Hoyt, "Error analysis for optical encoders",
 //! and for magnets ams AG, application note AN5000, "Magnet selection and misalignment" (first and
 //! second harmonic by displacement and tilt).

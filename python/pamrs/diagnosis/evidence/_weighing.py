@@ -18,10 +18,10 @@ from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, ter
 __all__ = [
     "capped",
     "explains",
+    "log_weight",
     "penalty",
     "price",
     "probability_cap",
-    "log_weight",
     "same_recordings",
     "share_left",
     "stands",
@@ -134,10 +134,10 @@ def weigh(
     hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set
     explains in recordings that it was not fitted to (a name has to carry half of it; the rest may
     be what no model has, and stands beside the name), its values (a set with an effect whose size
-    is not told from none names nothing), and whether its size is the same
-    in all recordings; improbable sets themselves say nothing against one that is. The constants are
-    those under which the stated probabilities came true in a trial with other seeds than the
-    published one (docs/decisions/0014, 0032).
+    is not told from none names nothing), and whether its size is the same in all recordings;
+    improbable sets themselves say nothing against one that is. The constants are those under which
+    the stated probabilities came true in a trial with other seeds than the published one
+    (docs/decisions/0014, 0032).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are

@@ -37,7 +37,6 @@ from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
-    acts_in,
     depends,
     entry_of,
     events_of,
@@ -50,7 +49,7 @@ from pamrs.diagnosis.fit import (
     with_known,
 )
 from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, info_of, is_effect, place_of, term_in
@@ -315,7 +314,7 @@ def _considered(
     for asked in fitted.considered:
         for own in judged:
             group, blocks = own.group, own.group.suspects
-            acting = [n for n in asked if any(_acts(n, b) for b in blocks)]
+            acting = [n for n in asked if any(depends(b, n) for b in blocks)]
             if group.mismatch is None or group.below_noise or not acting:
                 continue
             there = next((c for c in group.candidates if set(c.names) == set(acting)), None)
@@ -327,11 +326,6 @@ def _considered(
             )
             found.append(Considered(acting, [b.name for b in blocks], probability, left))
     return found
-
-
-def _acts(name: str, block: Block) -> bool:
-    """Whether an effect acts in a block, or a parameter counts in it."""
-    return acts_in(name, block) if is_effect(name) else depends(block, name)
 
 
 def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:

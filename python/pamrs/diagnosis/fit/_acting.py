@@ -37,7 +37,7 @@ _CHANNELS = {
 
 
 def depends(block: Block, name: str) -> bool:
-    """Whether a block's output depends on a parameter."""
+    """Whether a block's output depends on a parameter or an effect, by its name."""
     effect = name.partition(".")[0]
     if is_effect(effect):
         return acts_in(effect, block)

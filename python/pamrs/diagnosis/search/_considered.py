@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
 from pamrs.diagnosis.evidence import Attempts, Candidate
-from pamrs.diagnosis.fit import Fit, acts_in, depends, starts_of
+from pamrs.diagnosis.fit import depends, starts_of
+from pamrs.diagnosis.search._sets import Say, Weight
 from pamrs.effects import id_of, info_of, is_effect
 
 __all__ = ["considered"]
 
-Weight = Callable[[Candidate], float]
 
-
-def considered(
-    trial: Attempts, start: Candidate, weight: Weight, tell: Callable[[str], None]
-) -> list[Candidate]:
+def considered(trial: Attempts, start: Candidate, weight: Weight, tell: Say) -> list[Candidate]:
     """What of the sets of names that the caller asks for acts in the blocks of a mismatch, each set
     fitted together.
 
@@ -33,10 +27,9 @@ def considered(
     """
     found = []
     for names in trial.inner.considered:
-        effects = [n for n in names if is_effect(n) and any(acts_in(n, b) for b in trial.suspects)]
-        wrong = tuple(
-            n for n in names if n in start.fit.moved and any(depends(b, n) for b in trial.suspects)
-        )
+        acting = [n for n in names if any(depends(b, n) for b in trial.suspects)]
+        effects = [n for n in acting if is_effect(n)]
+        wrong = tuple(n for n in acting if n in start.fit.moved)
         if not effects and not wrong:
             continue
         tell(f"trying {' + '.join([*effects, *wrong])}, which was asked for")
@@ -55,13 +48,11 @@ def _together(
     for effect in effects:
         if best is None:
             return None
-        best = _added(trial, start, best, effect, weight)
+        best = _added(trial, best, effect, weight)
     return best
 
 
-def _added(
-    trial: Attempts, start: Candidate, beside: Candidate, effect: str, weight: Weight
-) -> Candidate | None:
+def _added(trial: Attempts, beside: Candidate, effect: str, weight: Weight) -> Candidate | None:
     """An effect beside a set, from the start of each of its forms that leaves least after a few
     steps.
     """
@@ -77,20 +68,14 @@ def _added(
             if tried is not None:
                 short.setdefault(one.form, []).append(tried)
     near = {form: max(tried, key=weight) for form, tried in short.items()}
-    ended = [
-        whole
-        for tried in near.values()
-        if (whole := _ended(trial, tried, beside.wrong)) is not None
-    ]
+    ended = [whole for best in near.values() if (whole := _ended(trial, best)) is not None]
     if info.transient and not beside.wrong:
         happened = trial.transient(id_of(effect), beside)
         ended += [] if happened is None else [happened]
     return max(ended, key=weight, default=None)
 
 
-def _ended(trial: Attempts, tried: Candidate, wrong: tuple[str, ...]) -> Candidate | None:
+def _ended(trial: Attempts, tried: Candidate) -> Candidate | None:
     """A set fitted to its end."""
-    warm: Fit = tried.fit
-    starts = [trial.start_of(warm, e) for e in tried.effects]
-    found = trial.together(starts, warm, wrong)
-    return None if found is None else replace(found, gain=tried.gain)
+    starts = [trial.start_of(tried.fit, e) for e in tried.effects]
+    return trial.together(starts, tried.fit, tried.wrong)

@@ -417,7 +417,11 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
     """
     start = group.candidates[0]
     settings = trial.settings
-    acting = {c: [b for b in group.suspects if _acts(c, b)] for c in group.candidates if c.names}
+    acting = {
+        c: [b for b in group.suspects if any(depends(b, name) for name in c.names)]
+        for c in group.candidates
+        if c.names
+    }
 
     def weighed(blocks: list[Block]) -> dict[str, float]:
         there = [c for c in acting if any(b in blocks for b in acting[c])]
@@ -476,13 +480,6 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
     return [replace(parts[0], blocks=[*named[:1], *others]), *parts[1:]]
 
 
-def _acts(candidate: Candidate, block: Block) -> bool:
-    """Whether what a hypothesis names acts in a block."""
-    return any(acts_in(e, block) for e in candidate.effects) or any(
-        depends(block, name) for name in candidate.wrong
-    )
-
-
 def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
     """Probability of a hypothesis."""
     return weighed.get(candidate.key, 0.0)
@@ -525,22 +522,24 @@ def _singles(
             or "no effect acts here"
         )
     )
-    near = {
-        effect: [s.start.scaled(s.size) for s in _near(ranked[effect], settings)]
-        if rank < settings.effects_with_starts
-        else [s.start.scaled(s.size) for s in ranked[effect][:1]]
-        for rank, places in enumerate(worth)
-        for effect in places
-    }
+
+    def begun(scores: list[Score]) -> list[Start]:
+        return [s.start.scaled(s.size) for s in scores]
+
     if screened.strong:
-        every = {e: [s.start.scaled(s.size) for s in ranked[e]] for e in near}
+        every = {e: begun(ranked[e]) for places in worth for e in places}
         chosen, near = _shortlisted(trial, worth, every, baseline, weight)
     else:
-        chosen = []
+        chosen, near = [], {}
         for rank, places in enumerate(worth[: settings.most_singles]):
+            leads = rank < settings.effects_with_starts
             close = [e for e in places if gains[e] >= settings.near_place * gains[places[0]]]
             # of the leading effects another place may yet be the one that leaves least
-            chosen += close if rank < settings.effects_with_starts else places[:1]
+            for effect in close if leads else places[:1]:
+                chosen.append(effect)
+                near[effect] = begun(
+                    _near(ranked[effect], settings) if leads else ranked[effect][:1]
+                )
     alike = trial.settings.evidence.form_share_alike
     found = []
     for effect in chosen:

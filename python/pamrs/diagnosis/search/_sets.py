@@ -17,7 +17,15 @@ from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
 from pamrs.effects import exclude, id_of
 
-__all__ = ["Weight", "beside_wrong", "left_everywhere", "settles", "several", "without_needless"]
+__all__ = [
+    "Say",
+    "Weight",
+    "beside_wrong",
+    "left_everywhere",
+    "settles",
+    "several",
+    "without_needless",
+]
 
 Say = Callable[[str], None]
 Weight = Callable[[Candidate], float]
@@ -61,10 +69,12 @@ def several(
     -------
     list of Candidate
     """
-    roots = [c for c in (*singles, *mistaken) if c.fit.events is None]
+    roots = sorted(
+        (c for c in (*singles, *mistaken) if c.fit.events is None), key=weight, reverse=True
+    )
     growing = _Growing(trial, screened, start, roots, weight, tell)
     most = trial.settings.search.most_paired
-    sets = [s for root in growing.best(roots)[:most] for s in growing.widened(root)]
+    sets = [s for root in roots[:most] for s in growing.widened(root)]
     happening = []
     for effect, beside in _beside(trial, screened, start, singles, transient, weight):
         tell(f"looking for {effect} beside {beside.effects[0]}")
@@ -120,7 +130,7 @@ class _Growing:
     start : Candidate
         The refitted baseline.
     roots : list of Candidate
-        Single effects and values that are wrong, fitted by themselves.
+        Single effects and values that are wrong, fitted by themselves, those that weigh most first.
     weight : callable
         What a hypothesis weighs.
     tell : callable
@@ -136,10 +146,6 @@ class _Growing:
     weight: Weight
     tell: Say
     done: set[frozenset[str]] = field(default_factory=set)
-
-    def best(self, sets: list[Candidate]) -> list[Candidate]:
-        """Sets in the order of what they weigh."""
-        return sorted(sets, key=self.weight, reverse=True)
 
     def grown(self, sets: list[Candidate]) -> list[Candidate]:
         """The best set with one term after the other."""
@@ -202,13 +208,14 @@ class _Growing:
         stand = stand_of(base.fit, trial.inner, trial.white)
         ranked = by_effect(self.screened.scores(stand, without=base.effects))
         own = self.screened.stand.rows
-        mismatch = float(own @ own) if len(base.names) == 1 else stand.power_left
+        alone = len(base.names) == 1
+        mismatch = float(own @ own) if alone else stand.power_left
         least = max(settings.least_gain, settings.partner_share * mismatch)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[: settings.most_partners]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
-        for block in _untouched(base, self.start, trial) if len(base.names) == 1 else []:
+        for block in _untouched(base, self.start, trial) if alone else []:
             there = [
                 effect
                 for effect, scores in ranked.items()
@@ -225,14 +232,11 @@ class _Growing:
         were fitted, both are known.
         """
         trial, settings = self.trial, self.trial.settings.search
-        left = {
-            c: share_left(c, self.start, trial.compared, trial.settings.evidence)
-            for c in self.roots
-        }
+        evidence = trial.settings.evidence
         telling = [
             c
-            for c in self.best(self.roots)
-            if left[c] < settings.telling_left
+            for c in self.roots
+            if share_left(c, self.start, trial.compared, evidence) < settings.telling_left
             and not set(c.names) & set(base.names)
             and (c.effects or base.effects)
             and not any(exclude(e, base.effects) for e in c.effects)

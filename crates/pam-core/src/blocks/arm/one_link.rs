@@ -143,14 +143,15 @@ impl<S: Scalar> OneLink<S> {
     #[inline]
     pub fn weights(&self) -> [S; 2] {
         let Mounting { own, payload, plumb, .. } = self.mounting;
-        let hanging = self.payload * self.length;
         if plumb {
-            return [(self.first_moment + hanging) * self.gravity, constant(0.0)];
+            return [self.level_weight(), constant(0.0)];
         }
+        let hanging = self.payload * self.length;
         [0, 1].map(|k| (self.first_moment * own[k] + hanging * payload[k]) * self.gravity)
     }
 
     /// Torque of gravity where the link is level, its payload included [N m].
+    #[inline]
     pub fn level_weight(&self) -> S {
         (self.first_moment + self.payload * self.length) * self.gravity
     }
