@@ -67,3 +67,15 @@ def test_drift_ends_at_the_moduli_that_it_names() -> None:
     gap = np.abs(drifted["joint_angle"] - softer["joint_angle"])
     moved = np.abs(run(RIG)["joint_angle"] - softer["joint_angle"]).max()
     assert gap[-400:].max() < 0.02 * moved
+
+
+def test_an_offset_weighs_a_payload_as_it_is_at_the_time() -> None:
+    """Four kilograms that were hung on before the start, and four that the file has."""
+    rig = pamrs.rigs.shoulder().with_effect("com_offset", {"angle": 0.2})
+    more = rig.with_parameters({"arm.payload": rig.parameters["arm.payload"].value + 4.0})
+    hung = rig.with_effect("payload_change", {"mass_change": 4.0, "time": -1.0})
+    command = 5.0 + 0.5 * np.sin(np.arange(0.0, 4.0, 0.005))
+    known, changed = (
+        pamrs.simulate(r, valve_command=command, sample_time=0.005) for r in (more, hung)
+    )
+    np.testing.assert_allclose(changed["joint_angle"], known["joint_angle"], atol=1e-6)

@@ -160,7 +160,9 @@ def made_up(term: str, left: float, places: int) -> Candidate:
     names = [f"{term}.{info_of(term).leading.name}"] if term else []
     values = dict.fromkeys(names, 1e-11)
     spread = {name: 0.1 * value for name, value in values.items()}
-    found = Fit((term,), rig, values, spread, np.zeros((0, 0)), 0.0, {})
+    covariance = np.diag([std**2 for std in spread.values()])
+    scales = dict.fromkeys(names, 1.0)
+    found = Fit((term,), rig, values, spread, covariance, 0.0, {}, scales=scales)
     kept = {
         b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
         for b in blocks_of(PAIR)

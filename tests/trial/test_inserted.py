@@ -11,9 +11,11 @@ import pytest
 from tests.trial.test_second import CREEP, HOSE, LEAK, key_of, result_of
 from trial.__main__ import main
 from trial.second.inserted import (
+    FAILED,
     FORM,
     QUIET,
     SEARCH,
+    UNFIT,
     WEIGHT,
     all_inserted,
     diagnosed,
@@ -25,7 +27,8 @@ def told(result: dict[str, Any], *considered: tuple[float | None, float]) -> dic
     """What a diagnosis with the truth inserted says: beside its result the share that the truth
     leaves, and its probability.
     """
-    return result | {"considered": [{"left": a, "probability": b} for a, b in considered]}
+    found = [{"left": a, "probability": b, "blocks": ["arm"]} for a, b in considered]
+    return result | {"considered": found}
 
 
 #: truth, what was said, what is said with the truth inserted, and what failed
@@ -34,8 +37,14 @@ CASES = {
     "lost": ([LEAK], [], told(result_of("effects", ["leak_muscle"]), (0.01, 0.9)), SEARCH),
     "light": ([CREEP], ["heat"], told(result_of("effects", ["heat"]), (0.2, 0.1)), WEIGHT),
     "odd": ([CREEP], [], told(result_of("unlisted"), (0.1, 0.1), (0.8, 0.1)), FORM),
-    "inside": ([CREEP], [], told(result_of("unlisted"), (None, 0.0)), FORM),
-    "quiet": ([LEAK], [], told(result_of("none")), QUIET),
+    "inside": ([CREEP], [], told(result_of("unlisted"), (None, 0.0)), UNFIT),
+    "quiet": (
+        [LEAK],
+        [],
+        result_of("none") | {"considered": [{"left": None, "probability": 0.0, "blocks": []}]},
+        QUIET,
+    ),
+    "broken": ([LEAK], [], None, FAILED),
     "listed nowhere": ([HOSE], ["muscle_creep"], None, ""),
 }
 
@@ -53,7 +62,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     def diagnosed(case: Path, suspicion: str) -> dict[str, Any]:
         truth, _, again, _ = CASES[case.name]
         assert suspicion == "+".join(name for name, _, _ in truth)
-        assert again is not None
+        if again is None:
+            raise ValueError(f"{case}: the model leaves its range")
         return again
 
     monkeypatch.setattr("trial.second.inserted.diagnosed", diagnosed)

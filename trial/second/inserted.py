@@ -20,15 +20,19 @@ from pathlib import Path
 from typing import Any
 
 from .families import UNLISTED
-from .marks import mark
+from .marks import mark, result_of
 
 #: what a missed case failed by
 SEARCH, WEIGHT, FORM, QUIET = "search", "weight", "form", "quiet"
+UNFIT, FAILED = "unfit", "failed"
 WORDS = {
     SEARCH: "the truth was not found: inserted, it leads",
     WEIGHT: "the truth explains half or more, and something else leads",
     FORM: "the truth, as the catalogue has it, leaves more than half",
     QUIET: "no mismatch is left where the truth acts",
+    UNFIT: "the truth was not fitted: a parameter of it stays inside its tolerances, or it would "
+    "happen beside another event",
+    FAILED: "the diagnosis with the truth inserted ended with an error",
 }
 
 
@@ -45,7 +49,7 @@ class Inserted:
     said, then : str
         What the diagnosis names without and with it.
     failed : str
-        ``search``, ``weight``, ``form`` or ``quiet``.
+        ``search``, ``weight``, ``form``, ``quiet``, ``unfit`` or ``failed``.
     left, probability : float or None
         Share of the mismatch that the truth leaves, and its probability, where it was fitted.
     """
@@ -63,10 +67,9 @@ def missed(keys: Path, results: Path) -> Iterator[tuple[dict[str, Any], dict[str
     """Keys and results of the cases whose leading name, or whose wrong parameter, was missed."""
     for file in sorted(keys.glob("*.json")):
         key = json.loads(file.read_text(encoding="utf-8"))
-        out = results / str(key["case"]) / "out.json"
-        if not out.is_file():
+        result = result_of(results, str(key["case"]))
+        if result is None:
             continue
-        result = json.loads(out.read_text(encoding="utf-8"))
         told = mark(key, result)
         if told.leading is False or told.wrong is False:
             yield key, result
@@ -118,26 +121,32 @@ def inserted(key: dict[str, Any], result: dict[str, Any], case: Path) -> Inserte
     case : path
         Folder of the case.
     """
-    truth = truth_of(key)
-    again = diagnosed(case, truth)
-    now, considered = mark(key, again), again.get("considered", [])
-    lefts = [1.0 if entry["left"] is None else float(entry["left"]) for entry in considered]
+    truth, said = truth_of(key), _named(result)
+    try:
+        again = diagnosed(case, truth)
+    except ValueError as error:
+        return Inserted(str(key["case"]), truth, said, str(error), FAILED, None, None)
+    now = mark(key, again)
+    considered = [entry for entry in again.get("considered", []) if entry["blocks"]]
+    fitted = [entry for entry in considered if entry["left"] is not None]
     # of several groups of blocks the one in which the truth explains least
-    worst = max(zip(lefts, considered, strict=True), key=lambda pair: pair[0], default=None)
-    if worst is None:
+    worst = max(fitted, key=lambda entry: float(entry["left"]), default=None)
+    if not considered:
         failed = QUIET
     elif now.leading is not False and now.wrong is not False:
         failed = SEARCH
+    elif worst is None:
+        failed = UNFIT
     else:
-        failed = WEIGHT if worst[0] < 0.5 else FORM
+        failed = WEIGHT if float(worst["left"]) < 0.5 else FORM
     return Inserted(
         str(key["case"]),
         truth,
-        _named(result),
+        said,
         _named(again),
         failed,
-        None if worst is None else worst[1]["left"],
-        None if worst is None else worst[1]["probability"],
+        None if worst is None else worst["left"],
+        None if worst is None else worst["probability"],
     )
 
 

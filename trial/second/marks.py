@@ -402,11 +402,18 @@ def marks(keys: Path, results: Path, first: int | None = None) -> list[Mark]:
         key = json.loads(file.read_text(encoding="utf-8"))
         if key.get("schema") != SCHEMA:
             raise ValueError(f"{file}: schema must be {SCHEMA!r}")
-        found.append(mark(key, _result(Path(results), str(key["case"]))))
+        found.append(mark(key, result_of(Path(results), str(key["case"]))))
     return found
 
 
-def _result(folder: Path, case: str) -> dict[str, Any] | None:
+def result_of(folder: Path, case: str) -> dict[str, Any] | None:
+    """What was said of a case; None where there is no result.
+
+    Raises
+    ------
+    ValueError
+        A result of another schema.
+    """
     for path in (folder / case / "out.json", folder / f"{case}.json"):
         if path.is_file():
             data: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))

@@ -103,7 +103,9 @@ def diagnose_command(
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
-        if consider or any(path is not None for path in (report, png, model, experiment)):
+        if consider:
+            raise typer.BadParameter("--consider needs a case: --plan has no recordings to judge")
+        if any(path is not None for path in (report, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, json)
         return

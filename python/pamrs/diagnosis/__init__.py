@@ -47,8 +47,8 @@ from pamrs.diagnosis.prepare import (
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect
-from pamrs.errors import DiagnosisError, SimulationError, meant
+from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError, meant
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig, regulators_of
@@ -171,8 +171,9 @@ def diagnose(
         Suspicions to be judged beside what the search finds by itself: each the id of an effect or
         the dotted name of a parameter that may be wrong, or several joined by ``+``
         (``"base_flexibility+muscle.modulus_scale"``). What of each acts where a mismatch is gets
-        fitted from every start; ``considered`` of the result says what it leaves. A block that
-        keeps no more than noise has nothing for it to explain.
+        fitted from every start that the search knows, and competes with what it finds by itself;
+        ``considered`` of the result says what it leaves. A block that keeps no more than noise has
+        nothing for it to explain.
     progress : callable, optional
         Called with a line of text now and then.
 
@@ -327,6 +328,9 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     there = [e for e in CATALOGUE if fits(rig, e)]
     held = {entry["id"] for entry in rig.effects}
     sets = [tuple(name.strip() for name in text.split("+")) for text in consider]
+    for text, names in zip(consider, sets, strict=True):
+        if len(set(names)) < len(names):
+            raise ValueError(f"consider: {text!r} is not allowed: a name stands in it twice")
     for name in (name for names in sets for name in names):
         if is_effect(name) and id_of(name) in held:
             raise ValueError(
@@ -338,7 +342,15 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
                 f"consider: {name!r} is neither an effect that this rig can have nor one of its "
                 f"parameters with a tolerance; {meant(name, known)}"
             )
-    return tuple(sets)
+        if is_effect(name) and place_of(name):
+            try:
+                rig.with_effect(own, at=place_of(name))
+            except ParameterError as error:
+                raise ValueError(f"consider: {name!r} is not allowed: {error}") from error
+    once: dict[frozenset[str], tuple[str, ...]] = {}
+    for names in sets:
+        once.setdefault(frozenset(names), names)
+    return tuple(once.values())
 
 
 def _problems(

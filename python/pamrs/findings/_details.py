@@ -310,21 +310,25 @@ class Considered(Entry):
     names : list of str
         What of it acts where the mismatch is: effects, and parameters that may be wrong.
     blocks : list of str
-        Where.
+        Where; none where no block in which it acts keeps more than noise.
     probability : float
         Probability that this is what is missing there.
     left : float or None
-        Share of the mismatch that it leaves; None where a parameter of it stays inside its
-        tolerances, or where the model cannot be run with it.
+        Share of the mismatch that it leaves; None where nothing is missing, where a parameter of it
+        stays inside its tolerances, where it would happen beside another event or a wrong value,
+        or where the model cannot be run with it.
     """
 
     names: list[str] = field(metadata=told("effects, and parameters that may be wrong"))
-    blocks: list[str] = field(metadata=told("where they act"))
+    blocks: list[str] = field(
+        metadata=told("where they act; none where no such block keeps more than noise")
+    )
     probability: float = field(metadata=told("that this is what is missing there"))
     left: float | None = field(
         metadata=told(
-            "share of the mismatch that it leaves; null where a parameter of it stays inside its "
-            "tolerances, or where the model cannot be run with it"
+            "share of the mismatch that it leaves; null where nothing is missing, where a "
+            "parameter of it stays inside its tolerances, where it would happen beside another "
+            "event or a wrong value, or where the model cannot be run with it"
         )
     )
 

@@ -483,9 +483,10 @@ def render(diagnosis: Findings) -> str:
             for block, own in words.budgets(diagnosis).items()
         ],
         wrong=_wrong(diagnosis),
-        kept=[
-            *(words.kept_details(u) for u in diagnosis.unexplained),
-            *(words.considered_sentence(asked) for asked in diagnosis.considered),
+        kept=[words.kept_details(u) for u in diagnosis.unexplained],
+        considered=[
+            words.considered_sentence(asked).removeprefix("Asked for: ")
+            for asked in diagnosis.considered
         ],
         ambiguity=_sets(diagnosis),
         tested=_tested(diagnosis),

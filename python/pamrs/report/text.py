@@ -267,11 +267,14 @@ def considered_sentence(own: Considered) -> str:
     leaves 0.1 % of the mismatch of the arm``.
     """
     names = set_label(own.names)
+    if not own.blocks:
+        return f"Asked for: {names}: where it acts, no block keeps more than noise"
     blocks = " and ".join(map(spoken_name, own.blocks))
     if own.left is None:
         return (
-            f"Asked for: {names}: it does not explain the mismatch of the {blocks}: a parameter of "
-            "it stays inside its tolerances, or the model cannot be run with it"
+            f"Asked for: {names}: it was not judged in the {blocks}: a parameter of it stays "
+            "inside its tolerances, it happens beside another event or a wrong value, or the model "
+            "cannot be run with it"
         )
     return (
         f"Asked for: {names}: probability {format_probability(own.probability)}; it leaves "

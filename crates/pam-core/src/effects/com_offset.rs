@@ -1,7 +1,8 @@
 //! `com_offset`: a centre of mass that is off the line of its link, or a base that is not level.
 //!
 //! `tau = -a W cos(phi)`, `phi` the angle of the link from the direction of gravity, `W` what the
-//! link weighs on its joint where it is level, its payload and the links behind it included [N m].
+//! link weighs on its joint where it is level, its payload and the links behind it included [N m];
+//! a payload that changes counts as it is at the time, what hangs on a cord does not.
 //! `a` is the angle, seen from the joint, by which the centre of mass lies off the line: of an offset
 //! across it, that offset over the distance of the centre; of a base that is not level, its tilt.
 //! What an offset along the line does is `arm.first_moment`. A link of a chain loads the joints

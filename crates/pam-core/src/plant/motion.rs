@@ -53,15 +53,15 @@ impl<S: Scalar> Plant<'_, S> {
                 *load += self.effect(acting).push(time);
             }
         }
-        let mut direction = self.body.base_angle();
+        let body = self.carrying(time);
+        let mut direction = body.base_angle();
         for (k, weight) in ports.weight.iter().enumerate() {
             direction += pose[k];
             for acting in weight {
-                let torque = self.effect(acting).weight(direction, self.body.level_weight(k));
+                let torque = self.effect(acting).weight(direction, body.level_weight(k));
                 load[..=k].iter_mut().for_each(|load| *load += torque);
             }
         }
-        let body = self.carrying(time);
         let accelerations = layout.rate(0)..layout.effect(0);
         body.accelerations(pose, turn, load, &mut out[accelerations.clone()]);
         if let Some((link, acting)) = &ports.hanging {

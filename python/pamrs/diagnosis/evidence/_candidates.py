@@ -101,13 +101,15 @@ class Candidate:
         return sum(math.log(max(1.0, self._distance(name) / walls)) for name in self.wrong)
 
     def _distance(self, name: str) -> float:
-        """How far a parameter is from its nominal value in tolerances; of one that is a multiple of
-        it, by the logarithm of the two, since a hundredth is further away than nothing is.
+        """How far a parameter is from its nominal value in tolerances; of one that cannot be
+        negative by the logarithm of their ratio, where that is further: a hundredth of an area is
+        rarer than the plain difference says.
         """
         moved, tolerance = self.fit.moved[name], self.fit.scales[name]
         value = self.fit.values[name]
         nominal = value - moved * tolerance
-        if nominal <= 0.0 or value < 0.0:
+        known = self.fit.rig.parameters.get(name)
+        if nominal <= 0.0 or known is None or known.lower < 0.0:
             return abs(moved)
         ratio = max(value / nominal, 1e-9)
         return max(abs(moved), abs(math.log(ratio)) * nominal / tolerance)
@@ -259,6 +261,8 @@ class Attempts:
         """
         if effect in {id_of(e) for e in beside.effects}:
             return None  # it would replace what it is to happen beside
+        if beside.fit.events is not None or beside.wrong:
+            return None  # what happens beside other events, or wrong values, is not fitted
         stiffest = self.settings.transients.least_step_share * self.inner.core.stable_step
         if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
             return None  # it would take too long
@@ -716,7 +720,8 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     info, settings = info_of(effects[0]), problem.settings
     leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
     # of a transient effect one size was fitted to all recordings
-    if info.transient or leading is None or best.values.get(leading, 0.0) <= 0:
+    size = 0.0 if leading is None else abs(best.values.get(leading, 0.0))
+    if info.transient or leading is None or size == 0.0:
         return 0.0
     found = residuals(problem, best.rig, [leading])
     steps, errors = [], []
@@ -731,8 +736,8 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             num += float(slope @ (r.value / r.noise)) / unit
             den += float(slope @ slope) / unit
         if den > 0:
-            steps.append(num / den / best.values[leading])
-            errors.append(1.0 / math.sqrt(den) / best.values[leading])
+            steps.append(num / den / size)
+            errors.append(1.0 / math.sqrt(den) / size)
     if len(steps) < 2:
         return 0.0
     beyond = [

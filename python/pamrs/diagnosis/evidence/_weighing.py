@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.stats import chi2
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
@@ -135,7 +136,9 @@ def weigh(
     explains in recordings that it was not fitted to (a name has to carry half of it; the rest may
     be what no model has, and stands beside the name), its values (a set with an effect whose size
     is not told from none names nothing), and whether its size is the same in all recordings;
-    improbable sets themselves say nothing against one that is. The constants are those under which
+    improbable sets themselves say nothing against one that is. What a set is not trusted with falls
+    to the part of it that is trusted most: an event that may be anything takes nothing from the
+    effect beside it. The constants are those under which
     the stated probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014, 0032).
 
@@ -170,31 +173,48 @@ def weigh(
     weights = _between_places(weights, suspects, evidence)
     total = sum(weights.values())
     out: dict[str, float] = {}
+
+    def add(c: Candidate, probability: float) -> None:
+        out[c.key] = out.get(c.key, 0.0) + probability
+
     for c, weight in weights.items():
-        out[c.key] = out.get(c.key, 0.0) + weight / total * trusted[c]
+        add(c, weight / total * trusted[c])
+        parts = [p for p in named if set(p.names) < set(c.names)]
+        if parts:
+            best = max(parts, key=lambda p: trusted[p])
+            add(best, weight / total * (1.0 - trusted[c]) * trusted[best])
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
 def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
-    """Whether all sizes of an effect of a set are not told from none: a fit that goes on beside
-    such an effect may end lower, which is not the effect's doing.
+    """Whether the sizes of an effect of a set, taken together, are not told from none: a fit that
+    goes on beside such an effect may end lower, which is not the effect's doing.
+
+    Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
+    well.
     """
-    if candidate.fit.events is not None:
+    found = candidate.fit
+    if found.events is not None:
         return False
-    rig, values, std = candidate.fit.rig, candidate.fit.values, candidate.fit.std
+    names, sealed = list(found.values), found.rig.model["valve"] is None
     for effect in candidate.effects:
-        own = info_of(effect).form(form_in(rig, effect)).parameters
+        own = info_of(effect).form(form_in(found.rig, effect)).parameters
         sizes = [
             f"{effect}.{p.name}"
             for p in own
-            if p.role_in(sealed=False) == "size" and p.neutral == 0.0
+            if p.role_in(sealed=sealed) == "size" and not p.neutral
         ]
-        known = [name for name in sizes if name in values]
-        if known and all(
-            abs(values[name]) <= settings.same_stds * std.get(name, 0.0) for name in known
-        ):
+        known = [names.index(name) for name in sizes if name in found.values]
+        if not known:
+            continue
+        scaled = np.array([found.values[names[k]] / found.scales[names[k]] for k in known])
+        spread = found.covariance[np.ix_(known, known)]
+        certain = np.any((scaled != 0.0) & (np.diag(spread) == 0.0))
+        distance = scaled @ np.linalg.pinv(spread, hermitian=True) @ scaled
+        # of a single size: whether it is within so many standard deviations of none
+        if not certain and chi2.sf(distance, len(known)) >= chi2.sf(settings.same_stds**2, 1):
             return True
     return False
 

@@ -308,10 +308,11 @@ def _considered(
     judged: list[Judged], settings: EvidenceSettings, fitted: Problem
 ) -> list[Considered]:
     """What of each set that the caller asked for acts where a mismatch is, by group of blocks, and
-    what it leaves.
+    what it leaves; without blocks where nothing is missing in any.
     """
-    found = []
+    found: list[Considered] = []
     for asked in fitted.considered:
+        before = len(found)
         for own in judged:
             group, blocks = own.group, own.group.suspects
             acting = [n for n in asked if any(depends(b, n) for b in blocks)]
@@ -325,6 +326,11 @@ def _considered(
                 p for key, p in own.probabilities.items() if set(key.split("+")) == set(acting)
             )
             found.append(Considered(acting, [b.name for b in blocks], probability, left))
+        if len(found) == before:
+            chance = max(sum(own.probability(n) for own in judged) for n in asked)
+            found.append(
+                Considered(list(asked), [], min(1.0, chance) if len(asked) == 1 else 0.0, None)
+            )
     return found
 
 

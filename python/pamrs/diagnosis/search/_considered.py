@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pamrs.diagnosis.evidence import Attempts, Candidate
-from pamrs.diagnosis.fit import depends, starts_of
+from pamrs.diagnosis.fit import Start, depends, starts_of
+from pamrs.diagnosis.screen import Screen, by_effect, stand_of
 from pamrs.diagnosis.search._sets import Say, Weight
 from pamrs.effects import id_of, info_of, is_effect
 
 __all__ = ["considered"]
 
 
-def considered(trial: Attempts, start: Candidate, weight: Weight, tell: Say) -> list[Candidate]:
+def considered(
+    trial: Attempts, screened: Screen, start: Candidate, weight: Weight, tell: Say
+) -> list[Candidate]:
     """What of the sets of names that the caller asks for acts in the blocks of a mismatch, each set
     fitted together.
 
@@ -18,6 +21,8 @@ def considered(trial: Attempts, start: Candidate, weight: Weight, tell: Say) -> 
     ----------
     trial : Attempts
         Recordings, model, noise levels; the names are those of its problem.
+    screened : Screen
+        Signatures of the effects.
     start : Candidate
         The refitted baseline.
     weight : callable
@@ -28,18 +33,24 @@ def considered(trial: Attempts, start: Candidate, weight: Weight, tell: Say) -> 
     found = []
     for names in trial.inner.considered:
         acting = [n for n in names if any(depends(b, n) for b in trial.suspects)]
-        effects = [n for n in acting if is_effect(n)]
+        # what happens at times of its own is looked for beside what lasts
+        effects = sorted((n for n in acting if is_effect(n)), key=lambda n: not info_of(n).lasting)
         wrong = tuple(n for n in acting if n in start.fit.moved)
         if not effects and not wrong:
             continue
         tell(f"trying {' + '.join([*effects, *wrong])}, which was asked for")
-        own = _together(trial, start, effects, wrong, weight)
+        own = _together(trial, screened, start, effects, wrong, weight)
         found += [] if own is None else [own]
     return found
 
 
 def _together(
-    trial: Attempts, start: Candidate, effects: list[str], wrong: tuple[str, ...], weight: Weight
+    trial: Attempts,
+    screened: Screen,
+    start: Candidate,
+    effects: list[str],
+    wrong: tuple[str, ...],
+    weight: Weight,
 ) -> Candidate | None:
     """Effects and wrong values fitted together, the effects one after the other from the best of
     all their starts.
@@ -48,11 +59,13 @@ def _together(
     for effect in effects:
         if best is None:
             return None
-        best = _added(trial, best, effect, weight)
+        best = _added(trial, screened, best, effect, weight)
     return best
 
 
-def _added(trial: Attempts, beside: Candidate, effect: str, weight: Weight) -> Candidate | None:
+def _added(
+    trial: Attempts, screened: Screen, beside: Candidate, effect: str, weight: Weight
+) -> Candidate | None:
     """An effect beside a set, from the start of each of its forms that leaves least after a few
     steps.
     """
@@ -60,19 +73,31 @@ def _added(trial: Attempts, beside: Candidate, effect: str, weight: Weight) -> C
     if not info.lasting:
         return trial.transient(id_of(effect), beside)
     begun = [trial.start_of(beside.fit, e) for e in beside.effects]
-    sizes = trial.settings.screen.strong_sizes
     short: dict[str, list[Candidate]] = {}
-    for one in starts_of(effect, sealed=trial.nominal.model["valve"] is None):
-        for size in (1.0, *sizes) if one.scalable else (1.0,):
-            tried = trial.fitted_shortly([*begun, one.scaled(size)], beside.fit, beside.wrong)
-            if tried is not None:
-                short.setdefault(one.form, []).append(tried)
+    for one in _starts(trial, screened, beside, effect):
+        tried = trial.fitted_shortly([*begun, one], beside.fit, beside.wrong)
+        if tried is not None:
+            short.setdefault(one.form, []).append(tried)
     near = {form: max(tried, key=weight) for form, tried in short.items()}
     ended = [whole for best in near.values() if (whole := _ended(trial, best)) is not None]
     if info.transient and not beside.wrong:
         happened = trial.transient(id_of(effect), beside)
         ended += [] if happened is None else [happened]
     return max(ended, key=weight, default=None)
+
+
+def _starts(trial: Attempts, screened: Screen, beside: Candidate, effect: str) -> list[Start]:
+    """Where an effect may begin beside a set: those of the screen, which knows what resounds and
+    where contacts are met, and those of the catalogue in several sizes.
+    """
+    stand = stand_of(beside.fit, trial.inner, trial.white)
+    scores = by_effect(screened.scores(stand, without=beside.effects)).get(effect, [])
+    usual = starts_of(effect, sealed=trial.nominal.model["valve"] is None)
+    sizes = trial.settings.screen.strong_sizes
+    return [
+        *(score.start.scaled(score.size) for score in scores),
+        *(one.scaled(s) for one in usual for s in ((1.0, *sizes) if one.scalable else (1.0,))),
+    ]
 
 
 def _ended(trial: Attempts, tried: Candidate) -> Candidate | None:

@@ -296,7 +296,9 @@ def _marginal(refit: _Refit) -> bool:
 
 
 def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
-    """Of hypotheses of one name, one that lasts and one of events, the one that leaves least."""
+    """Of hypotheses of the same names, in whatever order, lasting or of events, the one that leaves
+    least.
+    """
     best: dict[frozenset[str], Candidate] = {}
     for candidate in sorted(candidates, key=left_everywhere):
         best.setdefault(frozenset(candidate.names), candidate)
@@ -336,9 +338,8 @@ def _hypotheses(
         sets = [] if best is None else beside_wrong(trial, best, tell)
     else:
         sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
-    asked = considered(trial, start, weight, tell)
-    named = [*singles, *sets, *mistaken]
-    return [start, *(_one_of_each([*named, *asked]) if asked else named)]
+    asked = considered(trial, screened, start, weight, tell)
+    return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
 
 
 def _weighed(

@@ -1,0 +1,138 @@
+"""What counts of a hypothesis beside what it leaves: its sizes, its values and its parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
+from pamrs.diagnosis.evidence._weighing import unlikely
+from pamrs.diagnosis.fit import Events, Fit, Problem, fits
+from pamrs.diagnosis.noise import Excess
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.simulation import core_rig
+from tests.diagnosis import again
+
+SETTINGS = DiagnosisSettings()
+RIG = pamrs.rigs.shoulder()
+BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE), SETTINGS.prepare)
+ARM = [b for b in BLOCKS if b.name == "arm"]
+BEFORE = 101.0
+
+
+def hypothesis(
+    effects: dict[str, dict[str, tuple[float, float]]],
+    left: float,
+    correlation: float = 0.0,
+    events: Events | None = None,
+) -> Candidate:
+    """Effects with values and standard deviations that leave a share of the arm's mismatch."""
+    known = {f"{e}.{n}": pair for e, values in effects.items() for n, pair in values.items()}
+    values = {name: value for name, (value, _) in known.items()}
+    std = {name: spread for name, (_, spread) in known.items()}
+    spreads = np.array(list(std.values()))
+    covariance = np.outer(spreads, spreads) * (
+        correlation + (1.0 - correlation) * np.eye(len(spreads))
+    )
+    scales = dict.fromkeys(values, 1.0)
+    fit = Fit(tuple(effects), RIG, values, std, covariance, 0.0, {}, scales=scales, events=events)
+    kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
+    return Candidate(tuple(effects), fit, kept, kept, 0.0)
+
+
+def weighed(*found: Candidate) -> dict[str, float]:
+    return weigh([hypothesis({}, 1.0), *found], ARM, 0.985, 30.0, SETTINGS)
+
+
+def test_an_effect_that_is_not_told_from_none_names_nothing() -> None:
+    clock = {"offset": (5e-4, 7e-4), "rate": (0.0, 1e-5)}
+    assert weighed(hypothesis({"clock_skew": clock}, 0.0)) == {"unlisted": 1.0}
+    clock["offset"] = (5e-3, 7e-4)
+    assert weighed(hypothesis({"clock_skew": clock}, 0.0))["clock_skew"] > 0.9
+
+
+def test_two_sizes_that_do_the_same_are_told_from_none_together() -> None:
+    """A lag and a dead time of 4 ms each, of which the recordings tell the sum."""
+    path = {"input_path_lag": {"time_constant": (2e-3, 0.25), "delay": (6e-3, 0.25)}}
+    assert weighed(hypothesis(path, 0.0)) == {"unlisted": 1.0}
+    assert weighed(hypothesis(path, 0.0, correlation=-1.0 + 1e-7))["input_path_lag"] > 0.9
+
+
+def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
+    prior = 0.035
+    for times in (0.0, 1.0, 10.0):
+        found = hypothesis({"com_offset": {"angle": (times * prior, 1e-4)}}, 0.0)
+        assert unlikely(found, {}, SETTINGS.evidence) == pytest.approx(math.log1p(times**2))
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "distance"),
+    [
+        # an area cannot be negative: a hundredth of it is rarer than the difference says
+        ("valve.discharge_area_max", 0.01, math.log(100.0) / 0.1),
+        ("valve.discharge_area_max", 1.2, 2.0),
+        ("sensors.pressure_zero", 0.01, None),
+    ],
+)
+def test_how_far_a_value_is(name: str, value: float, distance: float | None) -> None:
+    nominal, tolerance = 1.0, 0.1
+    moved = (value - nominal) / tolerance
+    fit = Fit(
+        (),
+        RIG,
+        {name: value},
+        {},
+        np.zeros((1, 1)),
+        0.0,
+        {},
+        {name: moved},
+        scales={name: tolerance},
+    )
+    found = replace(hypothesis({}, 0.0), fit=fit, wrong=(name,))
+    expected = abs(moved) if distance is None else max(distance, abs(moved))
+    assert found.outside(1.0) == pytest.approx(math.log(expected))
+
+
+def test_what_a_set_is_not_trusted_with_falls_to_its_part() -> None:
+    """A push beside a damping may be anything: it is not trusted, and takes nothing from the
+    damping, which by itself explains more than half.
+    """
+    damping = {"muscle_rate_damping": {"damping_constant": (200.0, 5.0)}}
+    pushes = Events("external_torque", {}, {})
+    alone = hypothesis(damping, 0.4)
+    beside = hypothesis({**damping, "external_torque": {}}, 0.2, events=pushes)
+    other = hypothesis(
+        {"muscle_creep": {"share": (0.3, 0.01)}, "external_torque": {}}, 0.2, events=pushes
+    )
+    assert weighed(other)["unlisted"] > 0.9
+    found = weighed(alone, beside)
+    assert found["muscle_rate_damping"] > 0.6
+    assert found["muscle_rate_damping"] + found[
+        "muscle_rate_damping+external_torque"
+    ] == pytest.approx(1.0 - found["unlisted"])
+
+
+def test_an_effect_that_the_file_states_as_uncertain_is_a_parameter(tmp_path: Path) -> None:
+    """A base angle with a tolerance is refitted: an offset of the centre of mass says the same."""
+    assert fits(RIG, "com_offset")
+    text = RIG.to_toml_text().replace(
+        "[arm]\n", '[arm]\nbase_angle = { value = 0.0, unit = "deg", tol = 1.0 }\n'
+    )
+    (tmp_path / "rig.toml").write_text(text, encoding="utf-8")
+    assert not fits(pamrs.load_rig(tmp_path / "rig.toml"), "com_offset")
+
+
+def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
+    """Other events and wrong values beside them are not fitted."""
+    problem = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
+    trial = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
+    pushed = hypothesis({"external_torque": {}}, 0.2, events=Events("external_torque", {}, {}))
+    wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
+    assert trial.transient("payload_change", pushed) is None
+    assert trial.transient("payload_change", wrong) is None
