@@ -23,7 +23,7 @@ SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE), SETTINGS.prepare)
 ARM = [b for b in BLOCKS if b.name == "arm"]
-BEFORE = 101.0
+BEFORE = 1e4
 
 
 def hypothesis(
@@ -136,3 +136,30 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
     assert trial.transient("payload_change", pushed) is None
     assert trial.transient("payload_change", wrong) is None
+
+
+def test_what_a_wrong_value_leaves_is_no_forms_error() -> None:
+    """A value that leaves 0.2 % of a strong mismatch, 20 times the noise, and the same value
+    beside an effect that leaves noise; an effect that leaves as much by itself asks for nothing.
+    """
+    name, creep = "muscle.modulus_scale", {"muscle_creep": {"share": (0.3, 0.01)}}
+    size = {"moved": {name: -7.0}, "scales": {name: 0.04}}
+
+    def wrong(found: Candidate) -> Candidate:
+        values = found.fit.values | {name: 0.72}
+        fit = replace(
+            found.fit,
+            values=values,
+            moved=size["moved"],
+            scales=dict.fromkeys(found.fit.values, 1.0) | size["scales"],
+            covariance=np.diag([*(np.diag(found.fit.covariance)), 1e-4]),
+        )
+        return replace(found, fit=fit, wrong=(name,))
+
+    alone, beside = wrong(hypothesis({}, 0.002)), wrong(hypothesis(creep, 0.0))
+    found = weighed(alone, beside)
+    assert found[f"muscle_creep+{name}"] > 0.9
+    damping = {"muscle_rate_damping": {"damping_constant": (200.0, 5.0)}}
+    one, two = hypothesis(creep, 0.002), hypothesis({**creep, **damping}, 0.0)
+    found = weighed(one, two)
+    assert found["muscle_creep"] > found["muscle_creep+muscle_rate_damping"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -138,9 +139,10 @@ def weigh(
     is not told from none names nothing), and whether its size is the same in all recordings;
     improbable sets themselves say nothing against one that is. What a set is not trusted with falls
     to the part of it that is trusted most: an event that may be anything takes nothing from the
-    effect beside it. The constants are those under which
-    the stated probabilities came true in a trial with other seeds than the published one
-    (docs/decisions/0014, 0032).
+    effect beside it. What a wrong value leaves is no form's error, since the equation stays the
+    same: beside it effects are judged by what it leaves (docs/decisions/0105). The constants are
+    those under which the stated probabilities came true in a trial with other seeds than the
+    published one (docs/decisions/0014, 0032).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
@@ -152,14 +154,32 @@ def weigh(
     start = candidates[0]
     evidence = settings.evidence
     odd = {c: unlikely(c, ranging or {}, evidence) for c in named}
-    trusted = {
-        c: _trusted(c, start, suspects if own is None else own[c], most, seconds, odd[c], evidence)
-        for c in named
-    }
+    alone = [c for c in named if not c.effects]
+
+    def trust_of(c: Candidate) -> float:
+        blocks = suspects if own is None else own[c]
+        found = _trusted(c, start, blocks, most, seconds, odd[c], evidence)
+        parts = [p for p in alone if set(p.wrong) <= set(c.wrong)] if c.effects else []
+        if parts:  # the effects have to carry half of what the value leaves
+            value = max(parts, key=lambda p: len(p.wrong))
+            beside = replace(c, wrong=())
+            found = min(found, _trusted(beside, value, blocks, most, seconds, odd[c], evidence))
+        return found
+
+    trusted = {c: trust_of(c) for c in named}
     against = {c: _against(c, seconds, odd[c], evidence) for c in named}
 
     def weights_of(granted: float) -> dict[Candidate, float]:
         scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
+        if alone:
+            value = max(alone, key=lambda c: scores[c])
+            scores |= {
+                c: scores[value]
+                + _beside(c, value, suspects, granted, settings)
+                - (against[c] - against[value])
+                for c in named
+                if c.wrong
+            }
         scores = _beside_values(scores, evidence)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
@@ -193,30 +213,42 @@ def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
     goes on beside such an effect may end lower, which is not the effect's doing.
 
     Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
-    well.
+    well. The shape is taken as it was fitted: that of what is not there is anything.
     """
     found = candidate.fit
     if found.events is not None:
         return False
     names, sealed = list(found.values), found.rig.model["valve"] is None
     for effect in candidate.effects:
-        own = info_of(effect).form(form_in(found.rig, effect)).parameters
-        sizes = [
-            f"{effect}.{p.name}"
-            for p in own
-            if p.role_in(sealed=sealed) == "size" and not p.neutral
-        ]
-        known = [names.index(name) for name in sizes if name in found.values]
-        if not known:
+        form = info_of(effect).form(form_in(found.rig, effect))
+        own = [p for p in form.parameters if f"{effect}.{p.name}" in found.values]
+        sizes = [p.role_in(sealed=sealed) == "size" and not p.neutral for p in own]
+        if not any(sizes):
             continue
-        scaled = np.array([found.values[names[k]] / found.scales[names[k]] for k in known])
-        spread = found.covariance[np.ix_(known, known)]
-        certain = np.any((scaled != 0.0) & (np.diag(spread) == 0.0))
-        distance = scaled @ np.linalg.pinv(spread, hermitian=True) @ scaled
+        at = [names.index(f"{effect}.{p.name}") for p in own]
+        values = np.array([found.values[names[k]] / found.scales[names[k]] for k in at])[sizes]
+        spread = found.covariance[np.ix_(at, at)]
+        certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
+        distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
         # of a single size: whether it is within so many standard deviations of none
-        if not certain and chi2.sf(distance, len(known)) >= chi2.sf(settings.same_stds**2, 1):
+        if not certain and chi2.sf(distance, sum(sizes)) >= chi2.sf(settings.same_stds**2, 1):
             return True
     return False
+
+
+def _beside(
+    candidate: Candidate,
+    value: Candidate,
+    suspects: list[Block],
+    share: float,
+    settings: DiagnosisSettings,
+) -> float:
+    """How much more than a wrong value alone a set with wrong values weighs; ``share`` of what that
+    value leaves is granted to the forms of equations.
+    """
+    return _score(candidate, value, suspects, share, settings) - _score(
+        value, value, suspects, share, settings
+    )
 
 
 def log_weight(
@@ -226,12 +258,19 @@ def log_weight(
     seconds: float,
     ranging: Ranges,
     settings: DiagnosisSettings,
+    value: Candidate | None = None,
 ) -> float:
     """Logarithm of what a hypothesis weighs beside others, up to a constant: by what it leaves, by
     its price and by its values.
+
+    ``value`` is the most probable wrong value alone, if there is one.
     """
-    evidence = settings.evidence
-    own = _score(candidate, baseline, suspects, evidence.form_share_alike, settings)
+    evidence, share = settings.evidence, settings.evidence.form_share_alike
+    if value is not None and candidate.wrong:
+        own = _score(value, baseline, suspects, share, settings)
+        own += _beside(candidate, value, suspects, share, settings)
+    else:
+        own = _score(candidate, baseline, suspects, share, settings)
     return own - _against(candidate, seconds, unlikely(candidate, ranging, evidence), evidence)
 
 

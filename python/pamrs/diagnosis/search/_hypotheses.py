@@ -318,10 +318,15 @@ def _hypotheses(
     """
     trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
 
-    def weight(candidate: Candidate) -> float:
+    def weight(candidate: Candidate, value: Candidate | None = None) -> float:
         return log_weight(
-            candidate, start, trial.compared, terms.seconds, terms.ranging, trial.settings
+            candidate, start, trial.compared, terms.seconds, terms.ranging, trial.settings, value
         )
+
+    value = max(mistaken, key=weight, default=None)
+
+    def weight_beside(candidate: Candidate) -> float:
+        return weight(candidate, value)
 
     singles = _singles(trial, screened, start.fit, weight, tell)
     singles = _with_same_data(trial, start, singles, terms.seconds)
@@ -337,8 +342,8 @@ def _hypotheses(
         best = min(lasting, key=left_everywhere, default=None)
         sets = [] if best is None else beside_wrong(trial, best, tell)
     else:
-        sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
-    asked = considered(trial, screened, start, weight, tell)
+        sets = several(trial, screened, start, singles, mistaken, transient, weight_beside, tell)
+    asked = considered(trial, screened, start, weight_beside, tell)
     return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
 
 

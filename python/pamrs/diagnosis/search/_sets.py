@@ -209,7 +209,8 @@ class _Growing:
         ranked = by_effect(self.screened.scores(stand, without=base.effects))
         own = self.screened.stand.rows
         alone = len(base.names) == 1
-        mismatch = float(own @ own) if alone else stand.power_left
+        # what a wrong value leaves is a mismatch of its own
+        mismatch = float(own @ own) if alone and not base.wrong else stand.power_left
         least = max(settings.least_gain, settings.partner_share * mismatch)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[: settings.most_partners]
