@@ -44,11 +44,11 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
         model,
         values,
         dict.fromkeys(values, 1e-12),
-        np.zeros((0, 0)),
+        np.zeros((len(values), len(values))),
         0.0,
         {},
         dict.fromkeys(wrong, 8.0),
-        scales={name: 0.1 * values[name] for name in wrong},
+        scales={name: 0.1 * abs(value) for name, value in values.items()},
         freed=wrong,
     )
     left = {

@@ -132,7 +132,8 @@ def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
 
 def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candidate:
     """A made-up set that leaves an excess of a block, fitted and held out."""
-    fit = Fit(effects, pamrs.rigs.shoulder(), values, {}, np.zeros((0, 0)), 0.0, {})
+    exact, scales = np.zeros((len(values), len(values))), dict.fromkeys(values, 1.0)
+    fit = Fit(effects, pamrs.rigs.shoulder(), values, {}, exact, 0.0, {}, scales=scales)
     ratio = {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, LIMIT)}
     return Candidate(effects, fit, ratio, ratio, 0.0)
 
