@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, residuals
+from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     Left,
     checked_channels,
     difference,
+    linear,
     problem_of,
     taken,
     usual_noise,
@@ -146,8 +147,12 @@ def outcome_of(
     channels: tuple[str, ...],
     settings: DiagnosisSettings,
     sensor: str = "",
+    runs: Sequence[Simulation] | None = None,
 ) -> Outcome:
     """Simulate an experiment with every hypothesis, and compare every pair.
+
+    Of more than two hypotheses each has the sensitivities that it has on its own recordings, which
+    are worked out once.
 
     Parameters
     ----------
@@ -163,6 +168,8 @@ def outcome_of(
         How they are compared.
     sensor : str
         One more.
+    runs : sequence of Simulation, optional
+        The experiment with every hypothesis, where it was simulated before.
 
     Raises
     ------
@@ -172,7 +179,8 @@ def outcome_of(
         If the channels surround no block.
     """
     rigs = [experiment.changed(rig) for _, rig, _ in hypotheses]
-    runs = [experiment.simulate(rig) for _, rig, _ in hypotheses]
+    if runs is None:
+        runs = [experiment.simulate(rig) for _, rig, _ in hypotheses]
     measured = (*channels, *((sensor,) if sensor else ()))
     heard = {c: v for c, v in noise.items() if c in measured}
     problems = [
@@ -185,9 +193,14 @@ def outcome_of(
         for rig, run in zip(rigs, runs, strict=True)
     ]
     weights = weights_of(problems[0], rigs[0])
-    own = [residuals(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
+    own = [linear(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
     left = {
-        (i, j): difference(problems[i], own[i], rigs[j], weights)
+        (i, j): difference(
+            problems[i],
+            own[i].found,
+            own[j] if len(rigs) > 2 else linear(problems[i], rigs[j]),
+            weights,
+        )
         for i, j in itertools.permutations(range(len(rigs)), 2)
     }
     distance = np.zeros((len(rigs), len(rigs)))
@@ -195,7 +208,9 @@ def outcome_of(
         distance[pair] = found.total
     bits = information([p for _, _, p in hypotheses], distance)
     effort = experiment.effort + (settings.next_experiment.sensor_effort if sensor else 0.0)
-    return Outcome(experiment, sensor, bits, runs, left, distance, problems[0], weights, effort)
+    return Outcome(
+        experiment, sensor, bits, list(runs), left, distance, problems[0], weights, effort
+    )
 
 
 def ranked(
@@ -296,13 +311,17 @@ def propose(
     if experiments is None:
         pool = experiments_of(nominal, records, own_settings)
     found: list[Outcome] = []
+    known: dict[str, list[Simulation]] = {}
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
             try:
-                found.append(outcome_of(experiment, chosen, sound, own, settings, sensor))
+                before = known.get(experiment.text)
+                outcome = outcome_of(experiment, chosen, sound, own, settings, sensor, before)
+                found.append(outcome)
+                known[experiment.text] = outcome.runs
             except (SimulationError, DiagnosisError):
                 # a hypothesis cannot be run there, or nothing is measured on both sides of a block
                 continue

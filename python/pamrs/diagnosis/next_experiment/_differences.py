@@ -181,7 +181,9 @@ def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
     """Noise level of a block's bin means over a recording, as a multiple of its white part: what
     drives' noise adds (>= 1).
     """
-    found = noise_levels(problem, core_rig(rig))
+    few = replace(problem.settings.noise, replicates=problem.settings.next_experiment.replicates)
+    fewer = replace(problem, settings=replace(problem.settings, noise=few))
+    found = noise_levels(fewer, core_rig(rig))
     out = {}
     for prepared in problem.recordings:
         for block in problem.blocks:
@@ -239,9 +241,12 @@ def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Lef
 
 
 def difference(
-    problem: Problem, truth: Mapping[Key, Residual], other: Rig, weights: Mapping[Key, float]
+    problem: Problem, truth: Mapping[Key, Residual], other: Linear, weights: Mapping[Key, float]
 ) -> Left:
     """What a model leaves of the recordings that another one makes.
+
+    Its sensitivities may be those that it has on its own recordings of the same experiment: where
+    the two differ by so much that these are others, they are told apart anyway.
 
     Parameters
     ----------
@@ -250,15 +255,19 @@ def difference(
     truth : mapping
         Residuals of the model that makes them; what it leaves itself (smoothing and the longer step
         of the cut chain) is taken off.
-    other : Rig
+    other : Linear
         The model that is to explain them.
     weights : mapping
         As :func:`weights_of`.
     """
-    model = linear(problem, other)
-    return _left(
-        problem, {key: r.value - truth[key].value for key, r in model.found.items()}, model, weights
-    )
+    there = residuals(problem, other.rig)
+    known = [other.found[key].jacobian for key in there]
+    found = {
+        key: replace(r, jacobian=slope)
+        for (key, r), slope in zip(there.items(), known, strict=True)
+    }
+    values = {key: r.value - truth[key].value for key, r in found.items()}
+    return _left(problem, values, replace(other, found=found), weights)
 
 
 def _left(

@@ -52,6 +52,13 @@ class NextExperimentSettings(SettingsGroup):
         "of a model are correlated, and thousands of samples do not know a thousandth of a noise",
         origin="judgement",
     )
+    replicates: int = setting(
+        4,
+        unit="count",
+        least=2,
+        reason="realisations of the drives' noise that give the noise level of an experiment",
+        origin="judgement: a noise level within a fifth weighs an experiment",
+    )
     known_share: float = setting(
         0.5,
         unit="1",
