@@ -154,33 +154,22 @@ def weigh(
     start = candidates[0]
     evidence = settings.evidence
     odd = {c: unlikely(c, ranging or {}, evidence) for c in named}
-    alone = [c for c in named if not c.effects]
-
-    def trust_of(c: Candidate) -> float:
-        blocks = suspects if own is None else own[c]
-        found = _trusted(c, start, blocks, most, seconds, odd[c], evidence)
-        parts = [p for p in alone if set(p.wrong) <= set(c.wrong)] if c.effects else []
-        if parts:  # the effects have to carry half of what the value leaves
-            value = max(parts, key=lambda p: len(p.wrong))
-            beside = replace(c, wrong=())
-            found = min(found, _trusted(beside, value, blocks, most, seconds, odd[c], evidence))
-        return found
-
-    trusted = {c: trust_of(c) for c in named}
     against = {c: _against(c, seconds, odd[c], evidence) for c in named}
 
+    def trust_in(c: Candidate) -> float:
+        blocks = suspects if own is None else own[c]
+        found = _trusted(c, start, blocks, most, seconds, odd[c], evidence)
+        value = _value_of(c, named)
+        if value is None:
+            return found
+        # its effects have to carry half of what the value leaves
+        effects = replace(c, wrong=())
+        return min(found, _trusted(effects, value, blocks, most, seconds, odd[c], evidence))
+
+    trusted = {c: trust_in(c) for c in named}
+
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
-        if alone:
-            value = max(alone, key=lambda c: scores[c])
-            scores |= {
-                c: scores[value]
-                + _beside(c, value, suspects, granted, settings)
-                - (against[c] - against[value])
-                for c in named
-                if c.wrong
-            }
-        scores = _beside_values(scores, evidence)
+        scores = _scores(named, start, suspects, granted, against, settings)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -191,20 +180,56 @@ def weigh(
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
     weights = _between_places(weights, suspects, evidence)
-    total = sum(weights.values())
-    out: dict[str, float] = {}
-
-    def add(c: Candidate, probability: float) -> None:
-        out[c.key] = out.get(c.key, 0.0) + probability
-
-    for c, weight in weights.items():
-        add(c, weight / total * trusted[c])
-        parts = [p for p in named if set(p.names) < set(c.names)]
-        if parts:
-            best = max(parts, key=lambda p: trusted[p])
-            add(best, weight / total * (1.0 - trusted[c]) * trusted[best])
+    out = _trusted_parts(weights, trusted)
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
+    return out
+
+
+def _value_of(candidate: Candidate, named: list[Candidate]) -> Candidate | None:
+    """The wrong values of a set with effects as a hypothesis of their own, as many as there are."""
+    if not (candidate.effects and candidate.wrong):
+        return None
+    parts = [c for c in named if not c.effects and set(c.wrong) <= set(candidate.wrong)]
+    return max(parts, key=lambda c: len(c.wrong), default=None)
+
+
+def _scores(
+    named: list[Candidate],
+    start: Candidate,
+    suspects: list[Block],
+    granted: float,
+    against: Mapping[Candidate, float],
+    settings: DiagnosisSettings,
+) -> dict[Candidate, float]:
+    """Logarithms of weights; of sets with wrong values by what the most probable one leaves."""
+    scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
+    value = max((c for c in named if not c.effects), key=lambda c: scores[c], default=None)
+    if value is not None:
+        scores |= {
+            c: scores[value]
+            + _beside(c, value, suspects, granted, settings)
+            - (against[c] - against[value])
+            for c in named
+            if c.wrong
+        }
+    return _beside_values(scores, settings.evidence)
+
+
+def _trusted_parts(
+    weights: Mapping[Candidate, float], trusted: Mapping[Candidate, float]
+) -> dict[str, float]:
+    """Probabilities of sets: their weights as far as they are trusted, and what of larger sets is
+    not trusted as far as a part of these is.
+    """
+    total, out = sum(weights.values()), dict.fromkeys((c.key for c in weights), 0.0)
+    for c, weight in weights.items():
+        share = weight / total
+        out[c.key] += share * trusted[c]
+        parts = [p for p in weights if set(p.names) < set(c.names)]
+        best = max(parts, key=lambda p: trusted[p], default=None)
+        if best is not None:
+            out[best.key] += share * (1.0 - trusted[c]) * trusted[best]
     return out
 
 
@@ -222,7 +247,7 @@ def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
     for effect in candidate.effects:
         form = info_of(effect).form(form_in(found.rig, effect))
         own = [p for p in form.parameters if f"{effect}.{p.name}" in found.values]
-        sizes = [p.role_in(sealed=sealed) == "size" and not p.neutral for p in own]
+        sizes = [p.role_in(sealed=sealed) == "size" and p.neutral == 0.0 for p in own]
         if not any(sizes):
             continue
         at = [names.index(f"{effect}.{p.name}") for p in own]
