@@ -225,7 +225,7 @@ def test_a_leak_of_one_muscle_of_a_pair_is_named_with_its_place(leaking) -> None
     assert max(leaking.probabilities, key=leaking.probabilities.__getitem__) == effect.term
     low, high = effect.parameters["conductance"].interval
     assert low < LEAK < high
-    assert high - low < 0.6 * LEAK
+    assert high - low < LEAK
     terms = [t for t in leaking.budget if t.kind == "effect"]
     assert [(t.block, t.id, t.at) for t in terms] == [("chamber.flexor", "leak_muscle", "flexor")]
     assert terms[0].share > 0.9

@@ -458,11 +458,18 @@ def _settled(
 
 
 def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of the groups with standard deviations that hold for residuals that are no noise."""
+    """The fits of the groups with standard deviations that hold for residuals that are no noise;
+    and, of what no prior holds, for equations that are not quite the rig's.
+    """
     found = []
+    factor = problem.settings.verdict.spread_factor
     for j, candidate in zip(judged, chosen, strict=True):
         own = replace(problem, blocks=j.group.blocks)
-        std = spread_over_pieces(own, candidate.fit)
+        known = candidate.fit.held_by_prior
+        std = {
+            name: spread * (1.0 if name in known else factor)
+            for name, spread in spread_over_pieces(own, candidate.fit).items()
+        }
         found.append(replace(candidate, fit=replace(candidate.fit, std=std)))
     return found
 

@@ -27,6 +27,7 @@ from pamrs.diagnosis.fit._fitting import (
     predicted_with_doubt,
     residuals,
     stacked,
+    two_at_a_time,
     with_priors,
 )
 from pamrs.diagnosis.fit._held import (
@@ -80,6 +81,7 @@ __all__ = [
     "spread_over_pieces",
     "stacked",
     "starts_of",
+    "two_at_a_time",
     "with_effects_of",
     "with_known",
     "with_priors",

@@ -5,11 +5,12 @@ several starts.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from threading import Event
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,10 +37,13 @@ __all__ = [
     "predicted_with_doubt",
     "residuals",
     "stacked",
+    "two_at_a_time",
     "with_priors",
 ]
 
 Array = NDArray[np.float64]
+Item = TypeVar("Item")
+Found = TypeVar("Found")
 Key = tuple[str, str]
 """Block and recording."""
 
@@ -224,6 +228,16 @@ def residuals(
         return replace(found, jacobian=full)
 
     return _everywhere(problem, one)
+
+
+def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
+    """What a function gives for each item, in their order, on both processors.
+
+    For work that is one simulation at a time: of several blocks and recordings :func:`residuals`
+    takes two at a time by itself.
+    """
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        return list(pool.map(function, items))
 
 
 def _everywhere(

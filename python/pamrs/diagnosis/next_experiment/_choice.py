@@ -18,10 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width
+from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     Left,
+    Linear,
     checked_channels,
     difference,
     linear,
@@ -180,29 +181,26 @@ def outcome_of(
     """
     rigs = [experiment.changed(rig) for _, rig, _ in hypotheses]
     if runs is None:
-        runs = [experiment.simulate(rig) for _, rig, _ in hypotheses]
+        runs = two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
     measured = (*channels, *((sensor,) if sensor else ()))
     heard = {c: v for c, v in noise.items() if c in measured}
-    problems = [
-        _telling(
-            problem_of(
-                rig, [taken(run, rig, experiment.name, heard, settings)], measured, settings
-            ),
-            rigs,
-        )
-        for rig, run in zip(rigs, runs, strict=True)
-    ]
+
+    def cut(one: tuple[Rig, Simulation]) -> tuple[Problem, Linear]:
+        rig, run = one
+        recording = taken(run, rig, experiment.name, heard, settings)
+        problem = _telling(problem_of(rig, [recording], measured, settings), rigs)
+        return problem, linear(problem, rig)
+
+    problems, own = zip(*two_at_a_time(cut, zip(rigs, runs, strict=True)), strict=True)
     weights = weights_of(problems[0], rigs[0])
-    own = [linear(problem, rig) for problem, rig in zip(problems, rigs, strict=True)]
-    left = {
-        (i, j): difference(
-            problems[i],
-            own[i].found,
-            own[j] if len(rigs) > 2 else linear(problems[i], rigs[j]),
-            weights,
-        )
-        for i, j in itertools.permutations(range(len(rigs)), 2)
-    }
+
+    def missed(pair: tuple[int, int]) -> Left:
+        i, j = pair
+        other = own[j] if len(rigs) > 2 else linear(problems[i], rigs[j])
+        return difference(problems[i], own[i].found, other, weights)
+
+    pairs = list(itertools.permutations(range(len(rigs)), 2))
+    left = dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total

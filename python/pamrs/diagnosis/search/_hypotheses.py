@@ -35,6 +35,7 @@ from pamrs.diagnosis.fit import (
     form_in,
     predicted_with_doubt,
     residuals,
+    two_at_a_time,
 )
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
@@ -549,7 +550,9 @@ def _singles(
     alike = trial.settings.evidence.form_share_alike
     found = []
     for effect in chosen:
-        tried = [trial.fitted([start], baseline, trial.white) for start in near[effect]]
+        tried = two_at_a_time(
+            lambda start: trial.fitted([start], baseline, trial.white), near[effect]
+        )
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
             found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
@@ -572,12 +575,19 @@ def _shortlisted(
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
 
+    def begin(effects: list[str]) -> None:
+        starts = [(e, start) for e in effects for start in near[e]]
+        tried = two_at_a_time(lambda one: trial.fitted_shortly([one[1]], baseline), starts)
+        for effect in effects:
+            own = [c for (e, _), c in zip(starts, tried, strict=True) if e == effect]
+            short[effect] = sorted((c for c in own if c is not None), key=weight, reverse=True)
+
     def most(effect: str) -> float:
         if effect not in short:
-            tried = [trial.fitted_shortly([start], baseline) for start in near[effect]]
-            short[effect] = sorted((c for c in tried if c is not None), key=weight, reverse=True)
+            begin([effect])
         return weight(short[effect][0]) if short[effect] else -math.inf
 
+    begin([places[0] for places in worth])
     first = sorted(worth[: settings.most_strong_singles], key=lambda places: -most(places[0]))
     best: list[str] = []
     starts = {}

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pamrs.diagnosis.evidence import Attempts, Candidate, explains, share_left, significant
-from pamrs.diagnosis.fit import Start, acts_in
+from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
@@ -163,17 +163,19 @@ class _Growing:
     def widened(self, base: Candidate) -> list[Candidate]:
         """A set with each of its likely partners, fitted from where both stand."""
         begun = [self.trial.start_of(base.fit, effect) for effect in base.effects]
-        found = []
+        partners = []
         for partner in self._partners(base, begun):
-            if self._was_tried(base, partner.names):
-                continue
-            self.done.add(frozenset({*base.names, *partner.names}))
-            self.tell(f"trying {' + '.join([*base.names, *partner.names])}")
+            if not self._was_tried(base, partner.names):
+                self.done.add(frozenset({*base.names, *partner.names}))
+                self.tell(f"trying {' + '.join([*base.names, *partner.names])}")
+                partners.append(partner)
+
+        def fitted(partner: _Partner) -> Candidate | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
-            larger = self.trial.together([*begun, *partner.starts], warm, wrong)
-            found += [] if larger is None else [larger]
-        return found
+            return self.trial.together([*begun, *partner.starts], warm, wrong)
+
+        return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
     def _was_tried(self, base: Candidate, names: tuple[str, ...]) -> bool:
         """Whether a set was fitted with some more names."""
@@ -194,11 +196,13 @@ class _Growing:
         """An effect beside a set, from the start that leaves least after a few steps."""
         most = self.trial.settings.search.most_starts
         starts = [s.start.scaled(s.size) for s in scores[:most]]
-        short = [
-            (c, start)
-            for start in (starts if len(starts) > 1 else [])
-            if (c := self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)) is not None
-        ]
+
+        def begin(start: Start) -> Candidate | None:
+            return self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)
+
+        many = starts if len(starts) > 1 else []
+        tried = zip(two_at_a_time(begin, many), many, strict=True)
+        short = [(c, start) for c, start in tried if c is not None]
         best = max(short, key=lambda one: self.weight(one[0]), default=(base, starts[0]))
         return _Partner((scores[0].effect,), [best[1]])
 

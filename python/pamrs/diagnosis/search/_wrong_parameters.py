@@ -23,6 +23,7 @@ from pamrs.diagnosis.fit import (
     known_parameters,
     levenberg_marquardt,
     stacked,
+    two_at_a_time,
     with_priors,
 )
 from pamrs.diagnosis.prepare import Block
@@ -176,16 +177,19 @@ def _tried(
     """
     most = trial.settings.wrong_parameters.most_finished
     if len(sets) <= most:
-        return {names: trial.freed(names, baseline, share) for names in sets}
+        ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), sets)
+        return dict(zip(sets, ended, strict=True))
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
-    short = {names: c for names in sets if (c := trial.freed_shortly(names)) is not None}
+    begun = zip(sets, two_at_a_time(trial.freed_shortly, sets), strict=True)
+    short = {names: c for names, c in begun if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:most]
     if best and not any(significant(e) for e in short[best[0]].fitted.values()):
         # what leaves much more than one that leaves noise does not get there
         near = trial.settings.wrong_parameters.near_misfit * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
-    return {n: trial.freed(n, baseline, share) if n in best else c for n, c in short.items()}
+    ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), best)
+    return {**short, **dict(zip(best, ended, strict=True))}
 
 
 def _needless(

@@ -356,6 +356,15 @@ class VerdictSettings(SettingsGroup):
         "marks unknown",
         origin="docs/decisions/0012",
     )
+    spread_factor: float = setting(
+        2.0,
+        unit="1",
+        least=1.0,
+        reason="factor of the standard deviations of what no prior holds, beyond what pieces of "
+        "the recordings tell: for equations that are not quite the rig's",
+        origin="docs/decisions/0107: 78 intervals of 95 % of six read seeds of the second plan "
+        "held in 78 %, twice as wide in 95 %",
+    )
     budget_draws: int = setting(
         400,
         unit="count",
