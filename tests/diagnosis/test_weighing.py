@@ -57,6 +57,12 @@ def test_an_effect_that_is_not_told_from_none_names_nothing() -> None:
     assert weighed(hypothesis({"clock_skew": clock}, 0.0))["clock_skew"] > 0.9
 
 
+def test_a_size_without_a_value_that_is_none_is_no_question() -> None:
+    """No share of the heat is the usual gas: how well it is known is not whether heat flows."""
+    heat = {"share": (0.2, 0.3), "heat_transfer_coefficient": (40.0, 2.0)}
+    assert weighed(hypothesis({"heat_transfer": heat}, 0.0))["heat_transfer"] > 0.9
+
+
 def test_two_sizes_that_do_the_same_are_told_from_none_together() -> None:
     """A lag and a dead time of 4 ms each, of which the recordings tell the sum."""
     path = {"input_path_lag": {"time_constant": (2e-3, 0.25), "delay": (6e-3, 0.25)}}
