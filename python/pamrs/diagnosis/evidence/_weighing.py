@@ -138,11 +138,11 @@ def weigh(
     be what no model has, and stands beside the name), its values (a set with an effect whose size
     is not told from none names nothing), and whether its size is the same in all recordings;
     improbable sets themselves say nothing against one that is. What a set is not trusted with falls
-    to the part of it that is trusted most: an event that may be anything takes nothing from the
-    effect beside it. What a wrong value leaves is no form's error, since the equation stays the
-    same: beside it effects are judged by what it leaves (docs/decisions/0105). The constants are
-    those under which the stated probabilities came true in a trial with other seeds than the
-    published one (docs/decisions/0014, 0032).
+    to the part of it that is trusted most, as far as that leads by itself: an event that may be
+    anything takes nothing from the effect beside it. What a wrong value leaves is no form's error,
+    since the equation stays the same: beside it effects are judged by what it leaves
+    (docs/decisions/0105). The constants are those under which the stated probabilities came true in
+    a trial with other seeds than the published one (docs/decisions/0014, 0032).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
@@ -219,8 +219,8 @@ def _scores(
 def _trusted_parts(
     weights: Mapping[Candidate, float], trusted: Mapping[Candidate, float]
 ) -> dict[str, float]:
-    """Probabilities of sets: their weights as far as they are trusted, and what of larger sets is
-    not trusted as far as a part of these is.
+    """Probabilities of sets: their weights as far as they are trusted; and what of larger sets is
+    not trusted, as far as a part of these is and leads among the sets of as many names.
     """
     total, out = sum(weights.values()), dict.fromkeys((c.key for c in weights), 0.0)
     for c, weight in weights.items():
@@ -229,7 +229,9 @@ def _trusted_parts(
         parts = [p for p in weights if set(p.names) < set(c.names)]
         best = max(parts, key=lambda p: trusted[p], default=None)
         if best is not None:
-            out[best.key] += share * (1.0 - trusted[c]) * trusted[best]
+            alike = sum(w for p, w in weights.items() if len(p.names) == len(best.names))
+            leads = weights[best] / alike if alike > 0.0 else 0.0
+            out[best.key] += share * (1.0 - trusted[c]) * trusted[best] * leads
     return out
 
 
