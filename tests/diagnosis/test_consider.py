@@ -78,6 +78,13 @@ def test_it_is_told_in_text_and_json(asked: pamrs.Diagnosis) -> None:
     assert "Asked for: base flexibility: where it acts, no block keeps more than noise" in said
 
 
+def test_without_a_mismatch_there_is_nothing_to_explain() -> None:
+    found = pamrs.diagnose(again.case(RIG, RIG), consider=["base_flexibility"])
+    (own,) = found.considered
+    assert (own.names, own.blocks, own.left) == (["base_flexibility"], [], None)
+    assert json.loads(found.to_json())["considered"][0]["blocks"] == []
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [

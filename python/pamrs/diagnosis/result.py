@@ -224,7 +224,9 @@ class Diagnosis(Findings):
                 f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
             )
         for asked in self.considered:
-            lines += textwrap.wrap(words.considered_sentence(asked), 96, subsequent_indent="  ")
+            lines += textwrap.wrap(
+                f"Asked for: {words.considered_sentence(asked)}", 96, subsequent_indent="  "
+            )
         if len(self.ambiguity) > 1:
             sets = "; ".join(words.set_label(s) for s in self.ambiguity)
             lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]

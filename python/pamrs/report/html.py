@@ -484,10 +484,7 @@ def render(diagnosis: Findings) -> str:
         ],
         wrong=_wrong(diagnosis),
         kept=[words.kept_details(u) for u in diagnosis.unexplained],
-        considered=[
-            words.considered_sentence(asked).removeprefix("Asked for: ")
-            for asked in diagnosis.considered
-        ],
+        considered=[words.considered_sentence(asked) for asked in diagnosis.considered],
         ambiguity=_sets(diagnosis),
         tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,

@@ -263,21 +263,21 @@ def sentence_of(wrong: WrongParameter) -> str:
 
 
 def considered_sentence(own: Considered) -> str:
-    """What a set that was asked for leaves: ``Asked for: base flexibility: probability 92 %; it
+    """What a set that was asked for leaves: ``base flexibility: probability 92 %; it
     leaves 0.1 % of the mismatch of the arm``.
     """
     names = set_label(own.names)
     if not own.blocks:
-        return f"Asked for: {names}: where it acts, no block keeps more than noise"
+        return f"{names}: where it acts, no block keeps more than noise"
     blocks = " and ".join(map(spoken_name, own.blocks))
     if own.left is None:
         return (
-            f"Asked for: {names}: it was not judged in the {blocks}: a parameter of it stays "
+            f"{names}: it was not judged in the {blocks}: a parameter of it stays "
             "inside its tolerances, it happens beside another event or a wrong value, or the model "
             "cannot be run with it"
         )
     return (
-        f"Asked for: {names}: probability {format_probability(own.probability)}; it leaves "
+        f"{names}: probability {format_probability(own.probability)}; it leaves "
         f"{format_number(100.0 * own.left, 2, unicode=False)} % of the mismatch of the {blocks}"
     )
 

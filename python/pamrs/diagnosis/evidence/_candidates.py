@@ -720,8 +720,10 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     info, settings = info_of(effects[0]), problem.settings
     leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
     # of a transient effect one size was fitted to all recordings
-    size = 0.0 if leading is None else abs(best.values.get(leading, 0.0))
-    if info.transient or leading is None or size == 0.0:
+    if info.transient or leading is None:
+        return 0.0
+    size = abs(best.values.get(leading, 0.0))
+    if size == 0.0:
         return 0.0
     found = residuals(problem, best.rig, [leading])
     steps, errors = [], []

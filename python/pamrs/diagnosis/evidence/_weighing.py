@@ -207,9 +207,7 @@ def _scores(
     value = max((c for c in named if not c.effects), key=lambda c: scores[c], default=None)
     if value is not None:
         scores |= {
-            c: scores[value]
-            + _beside(c, value, suspects, granted, settings)
-            - (against[c] - against[value])
+            c: _score_beside(c, value, start, suspects, granted, settings) - against[c]
             for c in named
             if c.wrong
         }
@@ -263,19 +261,22 @@ def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
     return False
 
 
-def _beside(
+def _score_beside(
     candidate: Candidate,
     value: Candidate,
+    baseline: Candidate,
     suspects: list[Block],
     share: float,
     settings: DiagnosisSettings,
 ) -> float:
-    """How much more than a wrong value alone a set with wrong values weighs; ``share`` of what that
-    value leaves is granted to the forms of equations.
+    """The score of the most probable wrong value, and what a set with wrong values has beyond it;
+    ``share`` of what that value leaves is granted to the forms of equations beside it.
     """
-    return _score(candidate, value, suspects, share, settings) - _score(
-        value, value, suspects, share, settings
+    alone, beside, left = (
+        _score(one, other, suspects, share, settings)
+        for one, other in ((value, baseline), (candidate, value), (value, value))
     )
+    return alone + (beside - left)
 
 
 def log_weight(
@@ -294,8 +295,7 @@ def log_weight(
     """
     evidence, share = settings.evidence, settings.evidence.form_share_alike
     if value is not None and candidate.wrong:
-        own = _score(value, baseline, suspects, share, settings)
-        own += _beside(candidate, value, suspects, share, settings)
+        own = _score_beside(candidate, value, baseline, suspects, share, settings)
     else:
         own = _score(candidate, baseline, suspects, share, settings)
     return own - _against(candidate, seconds, unlikely(candidate, ranging, evidence), evidence)

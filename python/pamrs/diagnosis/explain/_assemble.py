@@ -327,10 +327,9 @@ def _considered(
             )
             found.append(Considered(acting, [b.name for b in blocks], probability, left))
         if len(found) == before:
-            chance = max(sum(own.probability(n) for own in judged) for n in asked)
-            found.append(
-                Considered(list(asked), [], min(1.0, chance) if len(asked) == 1 else 0.0, None)
-            )
+            one = len(asked) == 1
+            chance = min(1.0, sum(own.probability(asked[0]) for own in judged)) if one else 0.0
+            found.append(Considered(list(asked), [], chance, None))
     return found
 
 

@@ -259,8 +259,8 @@ def _everywhere(
         return one(*tasks[key])
 
     longest_first = sorted(tasks, key=steps, reverse=True)
-    with _inside_range(), ThreadPoolExecutor(max_workers=2) as pool:
-        found = dict(zip(longest_first, pool.map(run, longest_first), strict=True))
+    with _inside_range():
+        found = dict(zip(longest_first, two_at_a_time(run, longest_first), strict=True))
     return {key: found[key] for key in tasks}
 
 

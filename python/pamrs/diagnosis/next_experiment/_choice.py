@@ -25,6 +25,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     Linear,
     checked_channels,
     difference,
+    elsewhere,
     linear,
     problem_of,
     taken,
@@ -196,7 +197,8 @@ def outcome_of(
 
     def missed(pair: tuple[int, int]) -> Left:
         i, j = pair
-        other = own[j] if len(rigs) > 2 else linear(problems[i], rigs[j])
+        few = len(rigs) == 2
+        other = linear(problems[i], rigs[j]) if few else elsewhere(problems[i], own[j])
         return difference(problems[i], own[i].found, other, weights)
 
     pairs = list(itertools.permutations(range(len(rigs)), 2))
@@ -309,17 +311,17 @@ def propose(
     if experiments is None:
         pool = experiments_of(nominal, records, own_settings)
     found: list[Outcome] = []
-    known: dict[str, list[Simulation]] = {}
+    known: dict[Experiment, list[Simulation]] = {}
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
             try:
-                before = known.get(experiment.text)
+                before = known.get(experiment)
                 outcome = outcome_of(experiment, chosen, sound, own, settings, sensor, before)
                 found.append(outcome)
-                known[experiment.text] = outcome.runs
+                known[experiment] = outcome.runs
             except (SimulationError, DiagnosisError):
                 # a hypothesis cannot be run there, or nothing is measured on both sides of a block
                 continue

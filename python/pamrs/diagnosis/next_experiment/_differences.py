@@ -240,13 +240,21 @@ def misfit(problem: Problem, model: Linear, weights: Mapping[Key, float]) -> Lef
     return _left(problem, {key: r.value for key, r in model.found.items()}, model, weights)
 
 
+def elsewhere(problem: Problem, model: Linear) -> Linear:
+    """A model on other recordings of the same experiment, with the sensitivities that it has on its
+    own: where the two differ by so much that these are others, they are told apart anyway.
+    """
+    found = {
+        key: replace(r, jacobian=model.found[key].jacobian)
+        for key, r in residuals(problem, model.rig).items()
+    }
+    return replace(model, found=found)
+
+
 def difference(
     problem: Problem, truth: Mapping[Key, Residual], other: Linear, weights: Mapping[Key, float]
 ) -> Left:
     """What a model leaves of the recordings that another one makes.
-
-    Its sensitivities may be those that it has on its own recordings of the same experiment: where
-    the two differ by so much that these are others, they are told apart anyway.
 
     Parameters
     ----------
@@ -256,18 +264,12 @@ def difference(
         Residuals of the model that makes them; what it leaves itself (smoothing and the longer step
         of the cut chain) is taken off.
     other : Linear
-        The model that is to explain them.
+        The model that is to explain them, on these recordings.
     weights : mapping
         As :func:`weights_of`.
     """
-    there = residuals(problem, other.rig)
-    known = [other.found[key].jacobian for key in there]
-    found = {
-        key: replace(r, jacobian=slope)
-        for (key, r), slope in zip(there.items(), known, strict=True)
-    }
-    values = {key: r.value - truth[key].value for key, r in found.items()}
-    return _left(problem, values, replace(other, found=found), weights)
+    values = {key: r.value - truth[key].value for key, r in other.found.items()}
+    return _left(problem, values, other, weights)
 
 
 def _left(

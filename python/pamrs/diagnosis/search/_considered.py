@@ -80,7 +80,7 @@ def _added(
             short.setdefault(one.form, []).append(tried)
     near = {form: max(tried, key=weight) for form, tried in short.items()}
     ended = [whole for best in near.values() if (whole := _ended(trial, best)) is not None]
-    if info.transient and not beside.wrong:
+    if info.transient:
         happened = trial.transient(id_of(effect), beside)
         ended += [] if happened is None else [happened]
     return max(ended, key=weight, default=None)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 from pamrs.diagnosis.evidence import (
     Attempts,
@@ -319,16 +320,15 @@ def _hypotheses(
     """
     trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
 
-    def weight(candidate: Candidate, value: Candidate | None = None) -> float:
-        return log_weight(
-            candidate, start, trial.compared, terms.seconds, terms.ranging, trial.settings, value
-        )
-
-    value = max(mistaken, key=weight, default=None)
-
-    def weight_beside(candidate: Candidate) -> float:
-        return weight(candidate, value)
-
+    alone = partial(
+        log_weight,
+        baseline=start,
+        suspects=trial.compared,
+        seconds=terms.seconds,
+        ranging=terms.ranging,
+        settings=trial.settings,
+    )
+    weight = partial(alone, value=max(mistaken, key=alone, default=None))
     singles = _singles(trial, screened, start.fit, weight, tell)
     singles = _with_same_data(trial, start, singles, terms.seconds)
     least = trial.settings.search.transient_from
@@ -343,8 +343,8 @@ def _hypotheses(
         best = min(lasting, key=left_everywhere, default=None)
         sets = [] if best is None else beside_wrong(trial, best, tell)
     else:
-        sets = several(trial, screened, start, singles, mistaken, transient, weight_beside, tell)
-    asked = considered(trial, screened, start, weight_beside, tell)
+        sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
+    asked = considered(trial, screened, start, weight, tell)
     return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
 
 

@@ -175,10 +175,14 @@ def _tried(
     """Each set of parameters freed: those that leave least after a few steps are fitted to their
     end, the others come as they are.
     """
+
+    def to_the_end(several: list[tuple[str, ...]]) -> dict[tuple[str, ...], Candidate | None]:
+        ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), several)
+        return dict(zip(several, ended, strict=True))
+
     most = trial.settings.wrong_parameters.most_finished
     if len(sets) <= most:
-        ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), sets)
-        return dict(zip(sets, ended, strict=True))
+        return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
     begun = zip(sets, two_at_a_time(trial.freed_shortly, sets), strict=True)
     short = {names: c for names, c in begun if c is not None}
@@ -188,8 +192,7 @@ def _tried(
         # what leaves much more than one that leaves noise does not get there
         near = trial.settings.wrong_parameters.near_misfit * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
-    ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), best)
-    return {**short, **dict(zip(best, ended, strict=True))}
+    return {**short, **to_the_end(best)}
 
 
 def _needless(
