@@ -1,4 +1,4 @@
-"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``insert``,
+"""Command line of the trial: ``python -m trial write``, ``make``, ``score``, ``pool``, ``insert``,
 ``report``, ``blocks`` and ``selfcheck``.
 """
 
@@ -25,6 +25,8 @@ from .second.design import specs as second_specs
 from .second.inserted import all_inserted
 from .second.inserted import table as insertion_table
 from .second.marks import is_second, marks
+from .second.pooled import page as pooled_page
+from .second.pooled import pooled
 from .second.tables import markdown as second_markdown
 from .second.tables import scores as second_scores
 from .second.tables import to_json
@@ -53,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
         _add_write,
         _add_make,
         _add_score,
+        _add_pool,
         _add_insert,
         _add_report,
         _add_blocks,
@@ -258,6 +261,22 @@ def _score(args: argparse.Namespace) -> None:
         write(args.markdown, markdown(scores, catalogue))
     if args.figure is not None:
         figure(scores, args.figure)
+
+
+def _add_pool(add: Add) -> None:
+    several = add("pool", help=f"tables of several scored trials of plan {SECOND} together")
+    several.add_argument(
+        "scores", type=Path, nargs="+", help="what `score --json` wrote, one file for each trial"
+    )
+    several.add_argument("--markdown", type=Path, help="write the tables here")
+    several.set_defaults(run=_pool)
+
+
+def _pool(args: argparse.Namespace) -> None:
+    text = pooled_page(pooled(args.scores))
+    print(text)
+    if args.markdown is not None:
+        write(args.markdown, text)
 
 
 def _add_insert(add: Add) -> None:

@@ -329,6 +329,16 @@ def _target_rows(told: Sequence[dict[str, Any]]) -> str:
 
 
 def markdown(told: dict[str, Any]) -> str:
+    """All tables of :func:`scores`, and every case."""
+    listing = [
+        (c["case"], ", ".join(c["tags"]["rig"]), c["truth"], c["said"], _outcome(c))
+        for c in told["cases"]
+    ]
+    cases = table(("case", "rig", "truth", "said", ""), listing)
+    return f"{tables(told)}\n## Every case\n\n{cases}\n"
+
+
+def tables(told: dict[str, Any]) -> str:
     """All tables of :func:`scores`."""
     head = ("stratum", "cases", *SHARES, "gap closed", "stated less true", "seconds, 95 %")
     parts = [
@@ -351,11 +361,6 @@ def markdown(told: dict[str, Any]) -> str:
             parts += [f"\n### By {name}\n", table((name, *head[1:]), rows)]
     parts += ["\n## By block of the rig\n", _block_rows(told["all"]["by block"])]
     parts += ["\n## Stated probabilities\n", _bins(told["all"]["reliability"]["bins"])]
-    listing = [
-        (c["case"], ", ".join(c["tags"]["rig"]), c["truth"], c["said"], _outcome(c))
-        for c in told["cases"]
-    ]
-    parts += ["\n## Every case\n", table(("case", "rig", "truth", "said", ""), listing)]
     return "\n".join(parts) + "\n"
 
 
