@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -9,9 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Fit, Problem, spread_over_pieces
 from pamrs.diagnosis.prepare import Residual
+from tests.diagnosis import again
 
 Array = NDArray[np.float64]
 
@@ -89,3 +92,21 @@ def test_what_one_piece_alone_shows_does_not_become_certain() -> None:
     problem, found, _ = fitted(coloured(np.random.default_rng(3), 0.5), shapes)
     spread = spread_over_pieces(problem, found)
     assert all(np.isfinite(s) and s >= found.std[n] for n, s in spread.items())
+
+
+def test_the_factor_for_equations_widens_what_is_stated_and_changes_no_value() -> None:
+    """Model file and result have the same standard deviation."""
+    rig = pamrs.rigs.shoulder()
+    given = again.case(rig.with_effect("base_flexibility", {"compliance": 5e-4}), rig)
+    usual = pamrs.DiagnosisSettings()
+    once = replace(usual, verdict=replace(usual.verdict, spread_factor=1.0))
+    narrow, wide = (pamrs.diagnose(given, settings=s) for s in (once, usual))
+    assert wide.effects[0].id == "base_flexibility"
+    for name, own in wide.effects[0].parameters.items():
+        before = narrow.effects[0].parameters[name]
+        assert own.value == before.value
+        if own.std is not None and before.std is not None:
+            assert own.std == pytest.approx(2.0 * before.std, rel=1e-12)
+            assert wide.rig.effect_std["base_flexibility"][name] == own.std
+    for name, parameter in wide.parameters.items():
+        assert parameter.value == narrow.parameters[name].value

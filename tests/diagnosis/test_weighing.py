@@ -12,10 +12,11 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
-from pamrs.diagnosis.evidence._weighing import unlikely
+from pamrs.diagnosis.evidence._weighing import _trusted_parts, unlikely
 from pamrs.diagnosis.fit import Events, Fit, Problem, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.effects import EFFECTS
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
 
@@ -26,6 +27,11 @@ ARM = [b for b in BLOCKS if b.name == "arm"]
 BEFORE = 1e4
 
 
+MODULUS = "muscle.modulus_scale"
+CREEP = {"muscle_creep": {"stiffness": (300.0, 10.0), "time_constant": (5.0, 0.2)}}
+DAMPING = {"muscle_rate_damping": {"damping_constant": (200.0, 5.0)}}
+
+
 def hypothesis(
     effects: dict[str, dict[str, tuple[float, float]]],
     left: float,
@@ -33,6 +39,8 @@ def hypothesis(
     events: Events | None = None,
 ) -> Candidate:
     """Effects with values and standard deviations that leave a share of the arm's mismatch."""
+    for effect, values in effects.items():
+        assert set(values) <= {p.name for form in EFFECTS[effect].forms for p in form.parameters}
     known = {f"{e}.{n}": pair for e, values in effects.items() for n, pair in values.items()}
     values = {name: value for name, (value, _) in known.items()}
     std = {name: spread for name, (_, spread) in known.items()}
@@ -109,13 +117,10 @@ def test_what_a_set_is_not_trusted_with_falls_to_its_part() -> None:
     """A push beside a damping may be anything: it is not trusted, and takes nothing from the
     damping, which by itself explains more than half.
     """
-    damping = {"muscle_rate_damping": {"damping_constant": (200.0, 5.0)}}
     pushes = Events("external_torque", {}, {})
-    alone = hypothesis(damping, 0.4)
-    beside = hypothesis({**damping, "external_torque": {}}, 0.2, events=pushes)
-    other = hypothesis(
-        {"muscle_creep": {"share": (0.3, 0.01)}, "external_torque": {}}, 0.2, events=pushes
-    )
+    alone = hypothesis(DAMPING, 0.4)
+    beside = hypothesis({**DAMPING, "external_torque": {}}, 0.2, events=pushes)
+    other = hypothesis({**CREEP, "external_torque": {}}, 0.2, events=pushes)
     assert weighed(other)["unlisted"] > 0.9
     found = weighed(alone, beside)
     assert found["muscle_rate_damping"] > 0.6
@@ -144,28 +149,64 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     assert trial.transient("payload_change", wrong) is None
 
 
+def with_wrong(found: Candidate, *names: str) -> Candidate:
+    """The same beside values that are 7 tolerances below those of the rig file."""
+    fit = replace(
+        found.fit,
+        values=found.fit.values | dict.fromkeys(names, 0.72),
+        moved=dict.fromkeys(names, -7.0),
+        scales=dict.fromkeys(found.fit.values, 1.0) | dict.fromkeys(names, 0.04),
+        covariance=np.diag([*np.diag(found.fit.covariance), *([1e-4] * len(names))]),
+    )
+    return replace(found, fit=fit, wrong=names)
+
+
 def test_what_a_wrong_value_leaves_is_no_forms_error() -> None:
     """A value that leaves 0.2 % of a strong mismatch, 20 times the noise, and the same value
     beside an effect that leaves noise; an effect that leaves as much by itself asks for nothing.
     """
-    name, creep = "muscle.modulus_scale", {"muscle_creep": {"share": (0.3, 0.01)}}
-    size = {"moved": {name: -7.0}, "scales": {name: 0.04}}
-
-    def wrong(found: Candidate) -> Candidate:
-        values = found.fit.values | {name: 0.72}
-        fit = replace(
-            found.fit,
-            values=values,
-            moved=size["moved"],
-            scales=dict.fromkeys(found.fit.values, 1.0) | size["scales"],
-            covariance=np.diag([*(np.diag(found.fit.covariance)), 1e-4]),
-        )
-        return replace(found, fit=fit, wrong=(name,))
-
-    alone, beside = wrong(hypothesis({}, 0.002)), wrong(hypothesis(creep, 0.0))
-    found = weighed(alone, beside)
-    assert found[f"muscle_creep+{name}"] > 0.9
-    damping = {"muscle_rate_damping": {"damping_constant": (200.0, 5.0)}}
-    one, two = hypothesis(creep, 0.002), hypothesis({**creep, **damping}, 0.0)
+    alone = with_wrong(hypothesis({}, 0.002), MODULUS)
+    beside = with_wrong(hypothesis(CREEP, 0.0), MODULUS)
+    for by_itself in ([], [hypothesis(CREEP, 0.05)], [hypothesis(CREEP, 0.5)]):
+        found = weighed(alone, beside, *by_itself)
+        assert found[f"muscle_creep+{MODULUS}"] > 0.9
+    one, two = hypothesis(CREEP, 0.002), hypothesis({**CREEP, **DAMPING}, 0.0)
     found = weighed(one, two)
     assert found["muscle_creep"] > found["muscle_creep+muscle_rate_damping"]
+
+
+@pytest.mark.parametrize(("effect", "value", "both"), [(1e-3, 0.1, 1e-5), (5e-3, 0.2, 0.0)])
+def test_an_effect_that_leads_needs_no_wrong_value_beside_it(
+    effect: float, value: float, both: float
+) -> None:
+    """What its equation leaves is granted to it, whatever other values were tried."""
+    alone, beside = hypothesis(CREEP, effect), with_wrong(hypothesis(CREEP, both), MODULUS)
+    assert weighed(alone, beside)["muscle_creep"] > 0.9
+    other = with_wrong(hypothesis({}, value), MODULUS)
+    assert weighed(alone, beside, other)["muscle_creep"] > 0.9
+    poor = with_wrong(hypothesis({}, 0.5), "arm.payload")
+    assert weighed(alone, beside, poor)["muscle_creep"] > 0.9
+
+
+def test_the_order_of_hypotheses_does_not_matter() -> None:
+    """Two values alone, an effect beside both: the better value is what the effect adds to."""
+    poor = with_wrong(hypothesis({}, 0.6), "arm.payload")
+    good = with_wrong(hypothesis({}, 0.01), MODULUS)
+    beside = with_wrong(hypothesis(CREEP, 0.008), "arm.payload", MODULUS)
+    one, other = weighed(poor, good, beside), weighed(good, poor, beside)
+    assert one == pytest.approx(other)
+    assert one[MODULUS] > 0.9
+
+
+@pytest.mark.parametrize("other", [0.90, 0.91])
+def test_what_is_not_trusted_goes_to_the_part_that_leads(other: float) -> None:
+    """Of two parts that are trusted as much, or nearly, the one that leads gets it."""
+    leads, follows = hypothesis(CREEP, 0.0), hypothesis(DAMPING, 0.0)
+    both = hypothesis({**CREEP, **DAMPING}, 0.0)
+    weights = {leads: 0.9, follows: 0.1, both: 50.0}
+    trusted = {leads: 0.90, follows: other, both: 0.1}
+    found = _trusted_parts(weights, trusted)
+    untrusted = (50.0 / 51.0) * 0.9
+    assert found["muscle_creep"] == pytest.approx((0.9 / 51.0 + untrusted * 0.9) * 0.9)
+    backwards = _trusted_parts(dict(reversed(weights.items())), trusted)
+    assert backwards == pytest.approx(found)

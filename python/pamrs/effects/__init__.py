@@ -28,6 +28,7 @@ from pamrs.effects._terms import (
     place_of,
     term_in,
     term_of,
+    usual_values,
 )
 
 __all__ = [
@@ -52,4 +53,5 @@ __all__ = [
     "ports_of",
     "term_in",
     "term_of",
+    "usual_values",
 ]

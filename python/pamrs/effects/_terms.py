@@ -65,6 +65,15 @@ def find_parameter(name: str) -> EffectParameter:
     return {p.name: p for form in forms for p in form.parameters}[short]
 
 
+def usual_values(name: str, forms: Mapping[str, str] | None = None) -> tuple[float, float] | None:
+    """Mean and standard deviation of the usual values of a dotted effect parameter, by the form
+    that its effect has (``forms``, the first where none is given); None where any value is usual.
+    """
+    term, _, short = name.partition(".")
+    form = info_of(term).form((forms or {}).get(term, ""))
+    return next((p.prior for p in form.parameters if p.name == short), None)
+
+
 def term_in(entry: Mapping[str, Any]) -> str:
     """The same of an effect of a rig, as :attr:`pamrs.Rig.effects` lists it."""
     return term_of(entry["id"], entry.get("at", ""))

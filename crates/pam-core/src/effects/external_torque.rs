@@ -23,6 +23,10 @@ use std::f64::consts::TAU;
 const TORQUE: EffectParameter =
     EffectParameter::new("torque", "N m", -1e9, 1e9, 5.0).starts(&[-5.0, 5.0]).off(0.0).tried(1.0);
 
+/// What cables, hoses and a spring that nobody noted pull with all the time, one standard deviation
+/// [N m]: what pulls harder is seen, or is a weight.
+const STEADY: f64 = 2.0;
+
 const COSINE: EffectParameter =
     EffectParameter::new("torque_cosine", "N m", -1e9, 1e9, 0.0).starts(&[5.0]).off(0.0);
 
@@ -73,7 +77,12 @@ pub const INFO: EffectInfo = EffectInfo {
         for the vibration",
     forms: &[
         PUSHES,
-        Form { name: "constant", parameters: &[TORQUE], make: made_by!(steady), ..PUSHES },
+        Form {
+            name: "constant",
+            parameters: &[TORQUE.prior(0.0, STEADY)],
+            make: made_by!(steady),
+            ..PUSHES
+        },
         Form {
             name: "vibration",
             parameters: &[TORQUE, COSINE, FREQUENCY],

@@ -15,7 +15,7 @@ from pamrs.diagnosis.fit import Problem, form_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
-from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in
+from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in, usual_values
 
 __all__ = [
     "capped",
@@ -140,9 +140,10 @@ def weigh(
     improbable sets themselves say nothing against one that is. What a set is not trusted with falls
     to the part of it that is trusted most, as far as that leads by itself: an event that may be
     anything takes nothing from the effect beside it. What a wrong value leaves is no form's error,
-    since the equation stays the same: beside it effects are judged by what it leaves
-    (docs/decisions/0105). The constants are those under which the stated probabilities came true in
-    a trial with other seeds than the published one (docs/decisions/0014, 0032).
+    since the equation stays the same: where a value explains more than the effects of a set do,
+    they are judged by what it leaves (docs/decisions/0105). The constants are those under which the
+    stated probabilities came true in a trial with other seeds than the published one
+    (docs/decisions/0014, 0032).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
@@ -156,20 +157,20 @@ def weigh(
     odd = {c: unlikely(c, ranging or {}, evidence) for c in named}
     against = {c: _against(c, seconds, odd[c], evidence) for c in named}
 
-    def trust_in(c: Candidate) -> float:
-        blocks = suspects if own is None else own[c]
-        found = _trusted(c, start, blocks, most, seconds, odd[c], evidence)
-        value = _value_of(c, named)
-        if value is None:
-            return found
-        # its effects have to carry half of what the value leaves
-        effects = replace(c, wrong=())
-        return min(found, _trusted(effects, value, blocks, most, seconds, odd[c], evidence))
-
-    trusted = {c: trust_in(c) for c in named}
+    plain = _plain(named, start, suspects, against, settings)
+    value = _leading_value(plain)
+    trusted = {
+        c: min(
+            _trusted(
+                one, other, suspects if own is None else own[c], most, seconds, odd[c], evidence
+            )
+            for one, other in _explained_by(c, start, plain)
+        )
+        for c in named
+    }
 
     def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = _scores(named, start, suspects, granted, against, settings)
+        scores = _scores(plain, value, start, suspects, granted, against, settings)
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
@@ -186,50 +187,92 @@ def weigh(
     return out
 
 
-def _value_of(candidate: Candidate, named: list[Candidate]) -> Candidate | None:
-    """The wrong values of a set with effects as a hypothesis of their own, as many as there are."""
-    if not (candidate.effects and candidate.wrong):
-        return None
-    parts = [c for c in named if not c.effects and set(c.wrong) <= set(candidate.wrong)]
-    return max(parts, key=lambda c: len(c.wrong), default=None)
+def _plain(
+    named: list[Candidate],
+    start: Candidate,
+    suspects: list[Block],
+    against: Mapping[Candidate, float],
+    settings: DiagnosisSettings,
+) -> dict[Candidate, float]:
+    """Logarithms of weights, the same being granted to all."""
+    share = settings.evidence.form_share_alike
+    scores = {c: _score(c, start, suspects, share, settings) - against[c] for c in named}
+    return _beside_values(scores, settings.evidence)
+
+
+def _leading_value(plain: Mapping[Candidate, float]) -> Candidate | None:
+    """The most probable wrong value, or values, alone."""
+    return max((c for c in plain if not c.effects), key=lambda c: plain[c], default=None)
+
+
+def _led_by_value(c: Candidate, plain: Mapping[Candidate, float], value: Candidate | None) -> bool:
+    """Whether a set with wrong values explains most by the value: none of its effects, alone or
+    together, weighs more than the most probable value does.
+    """
+    if value is None or not c.wrong:
+        return False
+    parts = [p for p in plain if p.effects and not p.wrong and set(p.effects) <= set(c.effects)]
+    return all(plain[p] <= plain[value] for p in parts)
+
+
+def _explained_by(
+    c: Candidate, start: Candidate, plain: Mapping[Candidate, float]
+) -> list[tuple[Candidate, Candidate]]:
+    """What has to carry half of a mismatch, beside what leaves that mismatch: a set beside the
+    baseline; and the effects of a set beside its wrong values, as far as these were fitted alone.
+    """
+    found = [(c, start)]
+    if c.effects and c.wrong:
+        values = [p for p in plain if not p.effects and set(p.wrong) <= set(c.wrong)]
+        if values:
+            most = max(values, key=lambda p: (len(p.wrong), plain[p]))
+            found.append((replace(c, wrong=()), most))
+    return found
 
 
 def _scores(
-    named: list[Candidate],
+    plain: Mapping[Candidate, float],
+    value: Candidate | None,
     start: Candidate,
     suspects: list[Block],
     granted: float,
     against: Mapping[Candidate, float],
     settings: DiagnosisSettings,
 ) -> dict[Candidate, float]:
-    """Logarithms of weights; of sets with wrong values by what the most probable one leaves."""
-    scores = {c: _score(c, start, suspects, granted, settings) - against[c] for c in named}
-    value = max((c for c in named if not c.effects), key=lambda c: scores[c], default=None)
-    if value is not None:
-        scores |= {
-            c: _score_beside(c, value, start, suspects, granted, settings) - against[c]
-            for c in named
-            if c.wrong
-        }
-    return _beside_values(scores, settings.evidence)
+    """Logarithms of weights where a share of the mismatch is granted to the forms of equations; of
+    sets that a wrong value leads, of what the most probable value leaves.
+    """
+
+    def score(c: Candidate) -> float:
+        if value is not None and _led_by_value(c, plain, value):
+            return _score_beside(c, value, start, suspects, granted, settings)
+        return _score(c, start, suspects, granted, settings)
+
+    return _beside_values({c: score(c) - against[c] for c in plain}, settings.evidence)
 
 
 def _trusted_parts(
     weights: Mapping[Candidate, float], trusted: Mapping[Candidate, float]
 ) -> dict[str, float]:
-    """Probabilities of sets: their weights as far as they are trusted; and what of larger sets is
-    not trusted, as far as a part of these is and leads among the sets of as many names.
+    """Probabilities of sets: the weight of each times the trust in it. What a set is not trusted
+    with goes to its best part: by the trust in that part, times its share among sets of its size.
     """
     total, out = sum(weights.values()), dict.fromkeys((c.key for c in weights), 0.0)
+    by_size: dict[int, float] = {}
+    for c, weight in weights.items():
+        by_size[len(c.names)] = by_size.get(len(c.names), 0.0) + weight
+
+    def alone(part: Candidate) -> float:
+        whole = by_size[len(part.names)]
+        return trusted[part] * weights[part] / whole if whole > 0.0 else 0.0
+
     for c, weight in weights.items():
         share = weight / total
         out[c.key] += share * trusted[c]
         parts = [p for p in weights if set(p.names) < set(c.names)]
-        best = max(parts, key=lambda p: trusted[p], default=None)
+        best = max(parts, key=alone, default=None)
         if best is not None:
-            alike = sum(w for p, w in weights.items() if len(p.names) == len(best.names))
-            leads = weights[best] / alike if alike > 0.0 else 0.0
-            out[best.key] += share * (1.0 - trusted[c]) * trusted[best] * leads
+            out[best.key] += share * (1.0 - trusted[c]) * alone(best)
     return out
 
 
@@ -271,6 +314,8 @@ def _score_beside(
 ) -> float:
     """The score of the most probable wrong value, and what a set with wrong values has beyond it;
     ``share`` of what that value leaves is granted to the forms of equations beside it.
+
+    What the value leaves counts once, in its own score: beside itself it gains nothing.
     """
     alone, beside, left = (
         _score(one, other, suspects, share, settings)
@@ -291,7 +336,7 @@ def log_weight(
     """Logarithm of what a hypothesis weighs beside others, up to a constant: by what it leaves, by
     its price and by its values.
 
-    ``value`` is the most probable wrong value alone, if there is one.
+    ``value`` is the most probable wrong value alone, where none of the effects alone weighs more.
     """
     evidence, share = settings.evidence, settings.evidence.form_share_alike
     if value is not None and candidate.wrong:
@@ -505,10 +550,11 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
     parameters lose by how many times they are outside the range of usual values, for certain.
     """
     lost = 0.0
+    forms = {effect: form_in(candidate.fit.rig, effect) for effect in candidate.fit.effects}
     for name, value in _effect_values(candidate):
-        prior = find_parameter(name).prior
-        if prior is not None:
-            lost += math.log1p(((value - prior[0]) / prior[1]) ** 2)
+        usual = usual_values(name, forms)
+        if usual is not None:
+            lost += math.log1p(((value - usual[0]) / usual[1]) ** 2)
     for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
     for name, value in _effect_values(candidate):

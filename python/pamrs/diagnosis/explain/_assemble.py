@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -107,7 +108,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    known = models.chosen if named else models.starts
+    known = (models.chosen, models.owners) if named else (models.starts, _owners(models.starts))
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
@@ -119,27 +120,29 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         case=case.name,
         verdict=verdict,
         where=words.where(located, fitted, judged, picture),
-        effects=_effects(judged, verdict, settings.verdict.in_set),
+        effects=_effects(judged, verdict, fitted),
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, known, settings.fit),
+        parameters=_parameters(nominal, *known, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=next_experiment(
             verdict,
             ambiguity,
-            _hypotheses(judged, probabilities, nominal, settings.next_experiment.simulated_from),
+            _hypotheses(judged, probabilities, nominal, fitted),
             nominal,
             judged,
             fitted,
             held,
         ),
         warnings=_warnings(case, models, table, settings, same=held is fitted),
-        rig=models.final if verdict == "none" else _with_std(models.final, nominal, models.chosen),
+        rig=models.final
+        if verdict == "none"
+        else _with_std(models.final, nominal, models.chosen, models.owners),
         traces=_traces(fitted, held, fit_found, out_found),
         blocks=blocks,
         budget=terms,
         unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal),
-        wrong_parameters=_wrong(nominal, judged, fitted, table),
+        wrong_parameters=_wrong(models, fitted, table),
         measured=list(case.channels),
         residuals=_block_table(groups),
         condition_map=picture.map,
@@ -188,7 +191,10 @@ class _Models:
     judged : list of Judged
         The groups, what they name fitted beside what other groups know better.
     starts, chosen : list of Candidate
-        The baseline of each group, and what goes into the final model.
+        The baseline of each group, and what goes into the final model, with standard deviations
+        that hold for equations that are not quite the rig's.
+    owners : dict of str to int
+        Of each parameter the group whose value the final model has.
     nominal, baseline, final : Rig
         As the rig file has it, refitted inside its tolerances, and with what was found.
     """
@@ -196,6 +202,7 @@ class _Models:
     judged: list[Judged]
     starts: list[Candidate]
     chosen: list[Candidate]
+    owners: dict[str, int]
     nominal: Rig
     baseline: Rig
     final: Rig
@@ -222,20 +229,21 @@ class _Models:
 
 def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> _Models:
     """The rig at every stage, from the verdicts of the groups."""
-    starts = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
-    baseline = _merged(nominal, starts)
-    starts = _widened(fitted, judged, starts)
+    begun = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    baseline = _merged(nominal, begun)
+    starts = _widened(fitted, judged, begun)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
-        return _Models(
-            judged, starts, starts, nominal, baseline, nominal if verdict == "none" else baseline
-        )
-    wanted = [_model_of(j, start) for j, start in zip(judged, starts, strict=True)]
-    chosen = _widened(fitted, judged, _settled(nominal, fitted, judged, wanted))
+        final = nominal if verdict == "none" else baseline
+        return _Models(judged, starts, starts, _owners(begun), nominal, baseline, final)
+    wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
+    ended = _settled(nominal, fitted, judged, wanted)
+    chosen = _widened(fitted, judged, ended)
     judged = [
         replace(j, chosen=c) if j.named or j.wrong else j
         for j, c in zip(judged, chosen, strict=True)
     ]
-    return _Models(judged, starts, chosen, nominal, baseline, _merged(nominal, chosen))
+    final = _merged(nominal, ended)
+    return _Models(judged, starts, chosen, _owners(ended), nominal, baseline, final)
 
 
 def _warnings(
@@ -322,15 +330,17 @@ def _considered(
             left = None
             if there is not None:
                 left = share_left(there, group.candidates[0], blocks, settings)
-            probability = sum(
-                p for key, p in own.probabilities.items() if set(key.split("+")) == set(acting)
-            )
+            probability = _chance(own, acting)
             found.append(Considered(acting, [b.name for b in blocks], probability, left))
         if len(found) == before:
-            one = len(asked) == 1
-            chance = min(1.0, sum(own.probability(asked[0]) for own in judged)) if one else 0.0
+            chance = max(_chance(own, asked) for own in judged)
             found.append(Considered(list(asked), [], chance, None))
     return found
+
+
+def _chance(judged: Judged, names: Sequence[str]) -> float:
+    """Probability that a group has these names and no others."""
+    return sum(p for key, p in judged.probabilities.items() if set(key.split("+")) == set(names))
 
 
 def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
@@ -352,18 +362,22 @@ def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
 
 
 def _hypotheses(
-    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, least: float
+    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, problem: Problem
 ) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
     name; those of an effect with times of its own can predict no other recording.
     """
-    found = []
+    found, least = [], problem.settings.next_experiment.simulated_from
     healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
+
+    def model(chosen: list[Candidate]) -> Rig:
+        stated = _widened(problem, judged, chosen)
+        return _with_std(_merged(nominal, chosen), nominal, stated, _owners(chosen))
+
     likeliest = max(healthy, key=lambda key: healthy[key], default="")
     if sum(healthy.values()) >= least:
         chosen = [j.group.candidates[0] for j in judged]
-        rig = _with_std(_merged(nominal, chosen), nominal, chosen)
-        found.append((likeliest, rig, sum(healthy.values())))
+        found.append((likeliest, model(chosen), sum(healthy.values())))
     for key, p in probabilities.items():
         wanted = frozenset(key.split("+"))
         if p < least or not all(id_of(name) in CATALOGUE or is_parameter(name) for name in wanted):
@@ -372,7 +386,7 @@ def _hypotheses(
         if any(c.fit.events is not None for c in chosen):
             continue
         if {name for c in chosen for name in c.names} == wanted:
-            found.append((key, _with_std(_merged(nominal, chosen), nominal, chosen), p))
+            found.append((key, model(chosen), p))
     return found
 
 
@@ -457,20 +471,21 @@ def _settled(
 
 
 def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of the groups with standard deviations that hold for residuals that are no noise;
-    and, of what no prior holds, for equations that are not quite the rig's.
+    """The fits of the groups with the standard deviations that are stated."""
+    return [_stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
+
+
+def _stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
+    """A fit with standard deviations that hold for residuals that are no noise; and, of what no
+    prior holds, for equations that are not quite the rig's.
     """
-    found = []
-    factor = problem.settings.verdict.spread_factor
-    for j, candidate in zip(judged, chosen, strict=True):
-        own = replace(problem, blocks=j.group.blocks)
-        known = candidate.fit.held_by_prior
-        std = {
-            name: spread * (1.0 if name in known else factor)
-            for name, spread in spread_over_pieces(own, candidate.fit).items()
-        }
-        found.append(replace(candidate, fit=replace(candidate.fit, std=std)))
-    return found
+    own, factor = replace(problem, blocks=group.blocks), problem.settings.verdict.spread_factor
+    known = candidate.fit.held_by_prior
+    std = {
+        name: spread * (1.0 if name in known else factor)
+        for name, spread in spread_over_pieces(own, candidate.fit).items()
+    }
+    return replace(candidate, fit=replace(candidate.fit, std=std))
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
@@ -489,12 +504,11 @@ def _ids(rig: Rig) -> set[str]:
     return {entry["id"] for entry in rig.effects}
 
 
-def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate]) -> Rig:
+def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:
     """A model with the standard deviations of its effects; of one that the nominal model held, as
     the group has it that knows it best.
     """
-    owners = _owners(candidates).items()
-    spread = {name: candidates[k].fit.std[name] for name, k in owners}
+    spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
     rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
     for candidate in candidates:
         for effect in candidate.fit.rig.effects:
@@ -566,11 +580,12 @@ def _gap(table: dict[str, ChannelError], least: float) -> float | None:
     return None if room < least else max(0.0, min(1.0, (refit - after) / room))
 
 
-def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFound]:
+def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[EffectFound]:
     """The effects that are named, the most probable first; without a name those that come
     closest.
     """
     found: dict[str, tuple[float, Candidate]] = {}
+    in_set = problem.settings.verdict.in_set
     for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
         listed = {effect for effect in names if id_of(effect) in CATALOGUE}
@@ -582,10 +597,8 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
                 found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
             elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
-                found[effect] = (
-                    p,
-                    max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed)),
-                )
+                best = max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
+                found[effect] = p, _stated(problem, j.group, best)
     return [
         EffectFound(
             id=id_of(effect),
@@ -605,21 +618,18 @@ def _effects(judged: list[Judged], verdict: str, in_set: float) -> list[EffectFo
 
 
 def _wrong(
-    nominal: Rig, judged: list[Judged], problem: Problem, table: dict[str, ChannelError]
+    models: _Models, problem: Problem, table: dict[str, ChannelError]
 ) -> list[WrongParameter]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for,
     and what the error becomes.
     """
-    found = []
-    owners = _owners([j.chosen for j in judged])
+    found, judged = [], models.judged
     for name in dict.fromkeys(name for j in judged for name in j.wrong):
-        # of a zero that two groups name, the value is that of the group that knows it best
-        j, naming = judged[owners[name]], [j for j in judged if name in j.wrong]
-        known, value, std = (
-            known_parameters(nominal, problem.settings.fit)[name],
-            j.chosen.fit.values[name],
-            j.chosen.fit.std[name],
-        )
+        naming = [j for j in judged if name in j.wrong]
+        # of a zero that two groups have, the value is that of the group that knows it best
+        own = models.chosen[models.owners[name]].fit
+        known = known_parameters(models.nominal, problem.settings.fit)[name]
+        value, std = own.values[name], own.std[name]
         told = [
             b
             for b in problem.blocks
@@ -636,7 +646,7 @@ def _wrong(
                 std=std,
                 interval=_interval(value, std, known.lower),
                 unit=known.unit,
-                moved_sigmas=j.chosen.fit.moved[name],
+                moved_sigmas=own.moved[name],
                 probability=max(j.probability(name) for j in naming),
                 held_out={
                     channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()
@@ -732,12 +742,12 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 
 
 def _parameters(
-    nominal: Rig, candidates: list[Candidate], settings: FitSettings
+    nominal: Rig, candidates: list[Candidate], owners: dict[str, int], settings: FitSettings
 ) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each as the group has it that knows it best."""
     out: dict[str, ParameterFound] = {}
     known = known_parameters(nominal, settings)
-    for name, k in _owners(candidates).items():
+    for name, k in owners.items():
         p, own = known[name], candidates[k].fit
         out[name] = ParameterFound(
             nominal=p.value,

@@ -21,7 +21,7 @@ from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
-from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of
+from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of, usual_values
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
@@ -231,10 +231,9 @@ def residuals(
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
-    """What a function gives for each item, in their order, on both processors.
+    """What a function gives for each item, in their order, two at a time.
 
-    For work that is one simulation at a time: of several blocks and recordings :func:`residuals`
-    takes two at a time by itself.
+    For whole fits and simulations: steps of one that cannot be shared are done beside the other's.
     """
     with ThreadPoolExecutor(max_workers=2) as pool:
         return list(pool.map(function, items))
@@ -501,6 +500,25 @@ def changes(
     return _everywhere(problem, one)
 
 
+def _away_from_usual(
+    scaling: Scaling, usual: Mapping[str, tuple[float, float]], x: Array, slopes: Array
+) -> tuple[Array, Array]:
+    """Rows of the effect parameters that have a usual size, and their sensitivities.
+
+    A size far from the usual one is rare and not ruled out, as by a Cauchy distribution: the row is
+    `sqrt(2 log(1 + z^2))` at `z` deviations. It decides between values that leave the same.
+    """
+    rows, sensitivities = np.zeros(len(usual)), np.zeros((len(usual), len(scaling.names)))
+    for row, (name, (mean, deviation)) in enumerate(usual.items()):
+        k = scaling.names.index(name)
+        z = (scaling.value(name, float(x[k])) - mean) / deviation
+        rows[row] = math.copysign(math.sqrt(2.0 * math.log1p(z * z)), z)
+        # of small z the limit, which is that of the straight row sqrt(2) z
+        slope = 2.0 * z / ((1.0 + z * z) * rows[row]) if abs(z) > 1e-8 else math.sqrt(2.0)
+        sensitivities[row, k] = slope * slopes[k] / deviation
+    return rows, sensitivities
+
+
 def fit(
     problem: Problem,
     nominal: Rig,
@@ -562,6 +580,7 @@ def fit(
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
     prior = np.zeros((count, len(scaling.names)))
     prior[:, :count] = np.diag(bound)
+    usual = {name: known for name in starts if (known := usual_values(name, forms)) is not None}
 
     def evaluate(x: Array) -> tuple[Array, Array, dict[Key, Residual]]:
         found = residuals(problem, scaling.rig(x, fixed or {}), scaling.names, events)
@@ -570,7 +589,12 @@ def fit(
             [scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)]
         )
         jacobian = np.zeros((rows.size, 0)) if slope is None else slope * slopes
-        return np.concatenate([rows, bound * x[:count]]), np.concatenate([jacobian, prior]), found
+        own_rows, own_slopes = _away_from_usual(scaling, usual, x, slopes)
+        return (
+            np.concatenate([rows, bound * x[:count], own_rows]),
+            np.concatenate([jacobian, prior, own_slopes]),
+            found,
+        )
 
     start = scaling.start.copy()
     for index, name in enumerate(baseline):

@@ -5,7 +5,7 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -328,9 +328,11 @@ def _hypotheses(
         ranging=terms.ranging,
         settings=trial.settings,
     )
-    weight = partial(alone, value=max(mistaken, key=alone, default=None))
-    singles = _singles(trial, screened, start.fit, weight, tell)
+    singles = _singles(trial, screened, start.fit, alone, tell)
     singles = _with_same_data(trial, start, singles, terms.seconds)
+    value = max(mistaken, key=alone, default=None)
+    leads = value is not None and all(alone(c) <= alone(value) for c in singles)
+    weight = partial(alone, value=value if leads else None)
     least = trial.settings.search.transient_from
     if transient and all(
         share_left(c, start, trial.compared, evidence) > least for c in (*singles, *mistaken)
@@ -530,11 +532,8 @@ def _singles(
         )
     )
 
-    def begun(scores: list[Score]) -> list[Start]:
-        return [s.start.scaled(s.size) for s in scores]
-
     if screened.strong:
-        every = {e: begun(ranked[e]) for places in worth for e in places}
+        every = {e: ranked[e] for places in worth for e in places}
         chosen, near = _shortlisted(trial, worth, every, baseline, weight)
     else:
         chosen, near = [], {}
@@ -544,7 +543,7 @@ def _singles(
             # of the leading effects another place may yet be the one that leaves least
             for effect in close if leads else places[:1]:
                 chosen.append(effect)
-                near[effect] = begun(
+                near[effect] = _begun(
                     _near(ranked[effect], settings) if leads else ranked[effect][:1]
                 )
     alike = trial.settings.evidence.form_share_alike
@@ -559,39 +558,54 @@ def _singles(
     return found
 
 
+def _begun(scores: Iterable[Score]) -> list[Start]:
+    """Where fits begin: starts in the size in which they take most."""
+    return [s.start.scaled(s.size) for s in scores]
+
+
 def _shortlisted(
     trial: Attempts,
     worth: list[list[str]],
-    near: dict[str, list[Start]],
+    every: dict[str, list[Score]],
     baseline: Fit,
     weight: Weight,
 ) -> tuple[list[str], dict[str, list[Start]]]:
-    """Of many effects (each a list of its places) those that leave least after a few steps from
-    each of their starts, and where the best of these steps led.
+    """Of many effects (each a list of its places) those that leave least after a few steps, and
+    where the best of these steps led.
 
-    Signatures rank strong effects and rule none out: they are linear in what a strong effect is
-    not.
+    Signatures rank the starts of a form and rule no effect out: they are linear in what a strong
+    effect is not. Each form of each effect gets a few steps from its best start, and the effects
+    that then lead from all their others.
     """
     settings = trial.settings.search
     short: dict[str, list[Candidate]] = {}
 
-    def begin(effects: list[str]) -> None:
-        starts = [(e, start) for e in effects for start in near[e]]
-        tried = two_at_a_time(lambda one: trial.fitted_shortly([one[1]], baseline), starts)
-        for effect in effects:
-            own = [c for (e, _), c in zip(starts, tried, strict=True) if e == effect]
-            short[effect] = sorted((c for c in own if c is not None), key=weight, reverse=True)
+    def begin(starts: dict[str, list[Start]]) -> None:
+        tasks = [(e, start) for e, own in starts.items() for start in own]
+        tried = two_at_a_time(lambda one: trial.fitted_shortly([one[1]], baseline), tasks)
+        for effect in starts:
+            own = [c for (e, _), c in zip(tasks, tried, strict=True) if e == effect]
+            known = [*short.get(effect, []), *(c for c in own if c is not None)]
+            short[effect] = sorted(known, key=weight, reverse=True)
 
     def most(effect: str) -> float:
-        if effect not in short:
-            begin([effect])
-        return weight(short[effect][0]) if short[effect] else -math.inf
+        return weight(short[effect][0]) if short.get(effect) else -math.inf
 
-    begin([places[0] for places in worth])
-    first = sorted(worth[: settings.most_strong_singles], key=lambda places: -most(places[0]))
+    best_of = {e: _best_of_each_kind(every[e]) for places in worth for e in places}
+    begin({places[0]: _begun(best_of[places[0]]) for places in worth})
+    first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
+    begin(
+        {p[0]: _begun(s for s in every[p[0]] if s not in best_of[p[0]]) for p in first}
+        | {
+            e: _begun(every[e])
+            for places in first[: settings.effects_with_starts]
+            for e in places[1:]
+        }
+    )
+    first.sort(key=lambda places: -most(places[0]))
     best: list[str] = []
     starts = {}
-    for rank, places in enumerate(first[: settings.most_singles]):
+    for rank, places in enumerate(first):
         leads = rank < settings.effects_with_starts
         tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
         least = min((short[e][0].misfit for e in tried), default=math.inf) / settings.near_place
@@ -603,6 +617,19 @@ def _shortlisted(
             starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
             best.append(effect)
     return best, starts
+
+
+def _kind(score: Score) -> tuple[str, frozenset[tuple[str, float]]]:
+    """The form that a start has, and what is chosen in it."""
+    return score.start.form, frozenset(score.start.held.items())
+
+
+def _best_of_each_kind(scores: list[Score]) -> list[Score]:
+    """The best start of each form and choice; the best of all comes first in ``scores``."""
+    best: dict[tuple[str, frozenset[tuple[str, float]]], Score] = {}
+    for score in scores:
+        best.setdefault(_kind(score), score)
+    return list(best.values())
 
 
 def _by_family(terms: list[str]) -> list[list[str]]:
@@ -630,14 +657,10 @@ def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
 
     A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
     """
-
-    def kind(score: Score) -> tuple[str, frozenset[tuple[str, float]]]:
-        return score.start.form, frozenset(score.start.held.items())
-
-    best = {kind(score): score for score in reversed(scores)}
-    forms = [s for s in best.values() if s.gain > settings.near_form * scores[0].gain]
+    best = _best_of_each_kind(scores)
+    forms = [s for s in best if s.gain > settings.near_form * scores[0].gain]
     forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
-    alike = [s for s in scores if kind(s) == kind(scores[0])]
+    alike = [s for s in scores if _kind(s) == _kind(scores[0])]
     near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
     return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
 

@@ -92,14 +92,6 @@ class SearchSettings(SettingsGroup):
         reason="single effects that are fitted",
         origin="docs/decisions/0013",
     )
-    most_strong_singles: int = setting(
-        12,
-        unit="count",
-        least=1,
-        reason="single effects that are fitted in a few steps where a mismatch is strong, so that "
-        "signatures rank them and rule none out",
-        origin="docs/decisions/0058",
-    )
     first_evaluations: int = setting(
         5,
         unit="count",
