@@ -240,11 +240,24 @@ class RigController(SampledController):
         angles = [named("joint_angle", name) for name in model.joints]
         rates = [named("joint_rate", name) for name in model.joints]
         pressures = [named("muscle_pressure", group.chamber) for group in model.groups]
-        supplies = [
-            None if g.feed.supply is None else named("supply_pressure", g.feed.supply)
-            for g in model.groups
-        ]
+        supplies = [group.feed.source for group in model.groups]
         return angles, rates, pressures, supplies
+
+    @property
+    def command_ranges(self) -> dict[str, tuple[float, float, float]]:
+        """Of every command by its name, ``valve_command.flexor``: a value that is safe, the lowest
+        and the highest. A valve is closed at its safe one and keeps the air, a regulator is set to
+        the ambient pressure.
+        """
+        found = {}
+        for group in (*self.model.groups, *self.model.vented):
+            low, rest, high = 0.0, 0.0, self.model.pressure_limit
+            if group.feed.input == "valve_command":
+                valve = self.model.rig.tables("valve")[group.feed.name]
+                rest, half = float(valve["null_voltage"]), float(valve["half_range"])
+                low, high = rest - half, rest + half
+            found[named(group.feed.input, group.feed.name)] = (rest, low, high)
+        return found
 
     # ------------------------------------------------------------------ used
 
