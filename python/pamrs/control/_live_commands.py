@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, Final, TypeAlias
 
-from pamrs.channels import channel_of, dotted
-from pamrs.control._protocol import Controller, check_drives_valve
+from pamrs.channels import channel_of
+from pamrs.control._protocol import Controller, check_drives_valve, commands_of
 from pamrs.errors import ParameterError
 
-__all__ = ["Command", "LiveCommands", "flat", "pair"]
+__all__ = ["Command", "LiveCommands", "pair"]
 
 #: A number, or a number for each of several commands: ``valve_command.flexor`` -> V.
 Command: TypeAlias = "float | Mapping[str, float]"
@@ -92,7 +92,7 @@ class LiveCommands:
                 f"the controller answered {answer!r}: a mapping of {', '.join(self.names)} is "
                 "needed"
             )
-        given = {"": answer} if self.names == ("",) else dict(flat(answer))
+        given = {"": answer} if self.names == ("",) else dict(commands_of(answer))
         if set(given) != set(self.names):
             raise ParameterError(
                 f"the controller answered {', '.join(map(repr, given)) or 'nothing'}: "
@@ -148,18 +148,6 @@ def _ranges_of_safe(controller: Controller, safe: Any) -> dict[str, tuple[float,
             "value is needed"
         )
     return {str(name): (0.0, -math.inf, math.inf) for name in safe}
-
-
-def flat(answer: Any) -> Iterator[tuple[str, float]]:
-    """Commands by name, ``valve_command.flexor``, of the keywords of
-    :meth:`pamrs.Simulator.step`.
-    """
-    for word, value in answer.items():
-        if isinstance(value, Mapping):
-            for name, one in value.items():
-                yield dotted(word, name), one
-        else:
-            yield word, value
 
 
 def pair(name: str, given: Any) -> tuple[float, float]:

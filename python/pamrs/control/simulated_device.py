@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs.channels import channel_of
-from pamrs.control._live_commands import flat
+from pamrs.control._protocol import commands_of, keywords_of
 from pamrs.control.live import Clock
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
@@ -163,7 +163,7 @@ class SimulatedDevice:
             If it has not the commands of the rig.
         """
         given = (
-            dict(flat(command))
+            dict(commands_of(command))
             if isinstance(command, Mapping)
             else dict.fromkeys(self._held, command)
         )
@@ -187,15 +187,8 @@ class SimulatedDevice:
             (self.clock.now() - self._began - self.simulator.time) / self.simulator.sample_time
         )
         if behind > 0:
-            signals: dict[str, Any] = {}
-            for name, value in self._held.items():
-                word, _, block = name.partition(".")
-                rows = np.full(behind, value)
-                if block:
-                    signals.setdefault(word, {})[block] = rows
-                else:
-                    signals[word] = rows
-            self.simulator.run(**signals)
+            signals = {name: np.full(behind, value) for name, value in self._held.items()}
+            self.simulator.run(**keywords_of(signals))
 
 
 def _at_first(rig: Rig) -> dict[str, float]:
