@@ -1,10 +1,25 @@
-"""A small PID for the tests of everything around controllers; gains may be arrays, one for each
-plant of a batch.
+"""A small PID for the tests of everything around controllers, whose gains may be arrays, one for
+each plant of a batch; a rig with another valve.
 """
 
 import numpy as np
 
+import pamrs
 from pamrs.control import Controller
+
+#: The shoulder's area as a conductance [m3/(s Pa)]: 1 mm2 is 0.199 l/(s bar).
+CONDUCTANCE = 8.4 * 0.1987e-8
+
+
+def with_iso_valve(rig, fill, vent):
+    """A rig of one valve, which has C [m3/(s Pa)] and b where it fills and where it vents."""
+    model = rig.model
+    table = model["valve"]
+    del table["discharge_area_max"]
+    table["flow"] = "iso_6358"
+    for way, (conductance, ratio) in (("fill", fill), ("vent", vent)):
+        table[f"{way}_conductance"], table[f"{way}_critical_ratio"] = conductance, ratio
+    return pamrs.Rig(rig.name, model)
 
 
 class SmallPid(Controller):

@@ -13,6 +13,7 @@ from pamrs.errors import ParameterError
 gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
+from pamrs.control import RigController, RigModel, closed_loop  # noqa: E402
 from pamrs.control import gym as gym_module  # noqa: E402
 from pamrs.control.trajectories import lift_hold_return  # noqa: E402
 
@@ -144,10 +145,139 @@ def test_the_vector_is_made_by_its_name():
     made.reset(seed=[1, 2])
 
 
+# ---------------------------------------------------------------- several valves and joints
+
+
+PAIR, ARM, REGULATED, MASS, BUNDLE = (
+    pamrs.rigs.named(name)
+    for name in (
+        "antagonistic_joint",
+        "two_joint_arm",
+        "regulated_joint",
+        "hanging_mass",
+        "recruitment",
+    )
+)
+LIFTS = {"elbow": SHORT, "wrist": lift_hold_return(0.4, 0.8, ramp=0.2, hold=0.2, duration=0.8)}
+
+
+def of(rig, trajectory=None, **options):
+    if rig is REGULATED:
+        options["pressure_limit"] = 1e6
+    return gym_module.RigEnv(rig, trajectory, **options)
+
+
+@pytest.mark.parametrize(
+    ("rig", "seen", "acted"),
+    [(PAIR, 8, 2), (ARM, 12, 2), (REGULATED, 6, 1), (MASS, 6, 1), (BUNDLE, 10, 3)],
+    ids=lambda value: getattr(value, "name", ""),
+)
+def test_the_checker_finds_nothing_on_any_rig(rig, seen, acted):
+    env = of(rig)
+    assert env.observation_space.shape == (seen,) == (len(env.names),)
+    assert env.action_space.shape == (acted,) == (len(env.inputs),)
+    check_env(env, skip_render_check=True)
+
+
+def test_a_step_of_two_joints_is_the_simulators():
+    env = of(ARM, LIFTS, effort=0.5)
+    assert env.names == (
+        "joint_angle.elbow",
+        "joint_angle.wrist",
+        "joint_rate.elbow",
+        "joint_rate.wrist",
+        "muscle_pressure.elbow",
+        "muscle_pressure.wrist",
+        "reference.elbow",
+        "reference.wrist",
+        "reference_rate.elbow",
+        "reference_rate.wrist",
+        "valve_command.elbow",
+        "valve_command.wrist",
+    )
+    seen, info = env.reset(seed=1)
+    assert info["target"].tolist() == pytest.approx([0.9, 0.8])
+    simulator, last = pamrs.Simulator(ARM, sample_time=0.02), np.zeros(2)
+    for k, action in enumerate(([0.4, -0.2], [1.0, 0.5], [-0.5, 3.0])):
+        seen, reward, *_, info = env.step(np.array(action, dtype=np.float32))
+        action = np.clip(np.float32(action), -1.0, 1.0).astype(float)
+        sample = simulator.step({"elbow": 5.0 + 5.0 * action[0], "wrist": 5.0 + 5.0 * action[1]})
+        wanted = [trajectory(0.02 * (k + 1)) for trajectory in LIFTS.values()]
+        error = [w.angle - sample[n] for w, n in zip(wanted, env.names[:2], strict=True)]
+        assert seen[:6] == pytest.approx([sample[n] for n in env.names[:6]], rel=1e-6)
+        assert seen[6:8] == pytest.approx([w.angle for w in wanted], rel=1e-6)
+        assert seen[8:10] == pytest.approx([w.rate for w in wanted], rel=1e-6)
+        assert seen[10:] == pytest.approx(action, rel=1e-6)
+        change = action - last
+        expected = -(np.dot(error, error) + 0.5 * np.dot(change, change))
+        assert reward == pytest.approx(expected, rel=1e-12)
+        assert info["error"] == pytest.approx(error)
+        assert info["commands"] == pytest.approx(5.0 + 5.0 * action)
+        last = action
+
+
+def test_a_regulator_is_set_from_nothing_to_its_limit():
+    env = of(REGULATED, SHORT)
+    seen, _ = env.reset()
+    start = REGULATED.tables("supply")[""]["initial_pressure"]
+    assert seen[-1] == pytest.approx(start / 5e5 - 1.0)
+    for action, pressure in ((-1.0, 0.0), (0.2, 6e5), (1.0, 1e6)):
+        *_, info = env.step(np.array([action], dtype=np.float32))
+        assert info["supply_command"] == pytest.approx(pressure, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "trajectory"), [("antagonistic_joint", SHORT), ("two_joint_arm", LIFTS)]
+)
+def test_a_controller_of_a_rig_does_in_an_environment_what_it_does_in_a_loop(name, trajectory):
+    rig = pamrs.rigs.named(name)
+    model = RigModel(rig)
+    controller = RigController(model, model.law("sliding", period=0.02))
+    run = closed_loop(rig, controller, trajectory, sample_time=0.02)
+    env = of(rig, trajectory, sample_time=0.02)
+    seen, _ = env.reset()
+    commands = np.array([run.command[name] for name in env.inputs])
+    angles = [seen[: len(model.joints)]]
+    for k in range(40):
+        # what it answers in the loop, as an action
+        seen, *_, info = env.step(((commands[:, k] - 5.0) / 5.0).astype(np.float32))
+        angles.append(seen[: len(model.joints)])
+        assert info["commands"] == pytest.approx(commands[:, k], abs=1e-5)
+    expected = np.array([run.channels[name] for name in run.joints]).T
+    assert np.array(angles) == pytest.approx(expected, abs=1e-5)
+
+
+@pytest.mark.parametrize("rig", [PAIR, ARM, MASS], ids=lambda rig: rig.name)
+def test_many_rigs_are_the_single_ones(rig):
+    many = gym_module.RigVectorEnv(3, rig, sample_time=0.05)
+    ones = [of(rig, sample_time=0.05) for _ in range(3)]
+    seen, info = many.reset(seed=7)
+    first = [env.reset(seed=7 + i) for i, env in enumerate(ones)]
+    assert (seen == np.stack([f[0] for f in first])).all()
+    assert np.array(info["target"]) == pytest.approx(np.array([f[1]["target"] for f in first]))
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        action = rng.uniform(-1, 1, many.action_space.shape).astype(np.float32)
+        seen, reward, terminated, truncated, info = many.step(action)
+        alone = [env.step(a) for env, a in zip(ones, action, strict=True)]
+        np.testing.assert_allclose(seen, np.stack([a[0] for a in alone]), rtol=1e-5, atol=1e-8)
+        assert reward == pytest.approx([a[1] for a in alone], rel=1e-6)
+        assert terminated.tolist() == [a[2] for a in alone]
+        assert truncated.tolist() == [a[3] for a in alone]
+        told = np.array([a[4]["error"] for a in alone])
+        assert info["error"] == pytest.approx(told, rel=1e-6, abs=1e-9)
+
+
 @pytest.mark.parametrize(
     ("call", "word"),
     [
-        (lambda: gym_module.ShoulderEnv(pamrs.rigs.named("antagonistic_joint")), "one joint"),
+        (lambda: gym_module.RigEnv(pamrs.rigs.named("bench")), "bench.*joints or a mass"),
+        (lambda: gym_module.RigEnv(pamrs.rigs.named("regulated_joint")), "pressure_limit"),
+        (lambda: gym_module.RigEnv(REGULATED, pressure_limit=-1.0), "pressure_limit"),
+        (lambda: gym_module.RigEnv(ARM, SHORT), "a mapping of 'elbow', 'wrist'"),
+        (lambda: gym_module.RigEnv(ARM, {"elbow": SHORT}), "a mapping of 'elbow', 'wrist'"),
+        (lambda: gym_module.RigEnv(ARM, targets={"elbow": (0.5, 1.0)}), "joints are 'elbow', 'w"),
+        (lambda: gym_module.RigEnv(MASS, targets=(0.5, 1.0)), "from 0.18 to 0.28 m"),
         (lambda: gym_module.ShoulderEnv(targets=(1.0, 0.5)), "targets"),
         (lambda: gym_module.ShoulderEnv(effort=-1.0), "effort"),
         (lambda: gym_module.ShoulderEnv(sample_time=0.0), "sample_time"),
@@ -166,3 +296,5 @@ def test_bad_input_is_named(call, word):
     env.reset()
     with pytest.raises(ParameterError, match="action"):
         env.step(np.array([math.nan]))
+    with pytest.raises(ParameterError, match=r"action with the shape \(2,\)"):
+        env.step(np.zeros(2))

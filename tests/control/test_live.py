@@ -19,6 +19,7 @@ from pamrs.control import (
     DeadZoneCompensation,
     HysteresisCompensation,
     Parallel,
+    RigController,
     closed_loop,
     sweep,
 )
@@ -26,7 +27,7 @@ from pamrs.control.live import LiveError, SystemClock, run_live
 from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.errors import ParameterError
-from tests.control.cases import CONTROLLERS, DIAGNOSED
+from tests.control.cases import ARM, CONTROLLERS, DIAGNOSED, PAIR, REGULATED
 from tests.control.helpers import SmallPid
 
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=5.0)
@@ -460,8 +461,10 @@ def test_bad_input_is_named(rig, change, word):
         run_live(
             SimulatedDevice(rig, clock), options.pop("controller"), LIFT, clock=clock, **options
         )
-    with pytest.raises(ParameterError, match="2 valves"):
-        SimulatedDevice(pamrs.rigs.named("antagonistic_joint"), clock)
+    with pytest.raises(ParameterError, match="bench.*no valve and no regulator"):
+        SimulatedDevice(pamrs.rigs.named("bench"), clock)
+    with pytest.raises(ParameterError, match="valve_command.flexor, valve_command.extensor"):
+        SimulatedDevice(pamrs.rigs.named("antagonistic_joint"), clock).write(5.0)
     for wrong in ({"dropouts": 2.0}, {"faults": ("smoke",)}):
         with pytest.raises(ParameterError, match=next(iter(wrong))):
             SimulatedDevice(rig, clock, **wrong)
@@ -482,3 +485,149 @@ def test_a_channel_that_goes_is_a_missed_reading(rig):
     clock = VirtualClock()
     run = run_live(Loses(rig, clock), SmallPid(period=0.01), LIFT, clock=clock)
     assert (run.reason, run.missed) == ("lost_sensor", 6)
+
+
+# ---------------------------------------------------------------- several valves and joints
+
+
+TURN = lift_hold_return(*degrees(30, 60), ramp=1.0, hold=1.0, duration=3.0)
+BOTH = {
+    "elbow": lift_hold_return(*degrees(12, 40), ramp=1.0, hold=1.0, duration=3.0),
+    "wrist": TURN,
+}
+VALVES = ["valve_command.flexor", "valve_command.extensor"]
+
+
+def rig_live(model, law="sliding", trajectory=TURN, device=None, **options):
+    """A live loop of a controller of every command."""
+    clock = VirtualClock()
+    made = SimulatedDevice(model.rig, clock, **(device or {}))
+    controller = RigController(model, model.law(law, period=0.01))
+    return run_live(made, controller, trajectory, clock=clock, **options), made
+
+
+@pytest.mark.parametrize(
+    ("model", "trajectory"),
+    [(PAIR, TURN), (ARM, BOTH), (REGULATED, LIFT)],
+    ids=["pair", "arm", "regulated"],
+)
+def test_on_time_a_loop_of_many_commands_is_the_simulated_one(model, trajectory):
+    run, device = rig_live(model, trajectory=trajectory)
+    controller = RigController(model, model.law("sliding", period=0.01))
+    alone = closed_loop(model.rig, controller, trajectory, sample_time=0.001)
+    assert run.reason == "finished"
+    commands = run.command if isinstance(run.command, dict) else {"supply_command": run.command}
+    assert set(commands) == set(alone.command)
+    for name, values in commands.items():
+        assert values == pytest.approx(alone.command[name][:-1:10], rel=1e-9, abs=1e-9)
+    for name in alone.joints:
+        assert run.channels[name] == pytest.approx(alone.channels[name][:-1:10], abs=1e-9)
+    assert run.reference == pytest.approx(alone.reference.angle[..., :-1:10])
+    closed = 0.0 if model is REGULATED else dict.fromkeys(commands, 5.0)
+    assert run.safe_command == device.written[0][1] == device.written[-1][1] == closed
+
+
+@pytest.mark.parametrize(
+    ("safe", "expected"),
+    [
+        (None, (5.0, 5.0)),
+        (0.0, (0.0, 0.0)),
+        ({VALVES[1]: 0.0}, (5.0, 0.0)),
+        (dict(zip(VALVES, (4.0, 6.0), strict=True)), (4.0, 6.0)),
+    ],
+)
+def test_every_valve_gets_its_safe_command(safe, expected):
+    run, device = rig_live(PAIR, device={"lost_from": 1.0}, stamp="time", safe=safe, most_missed=3)
+    assert run.reason == "lost_sensor"
+    wanted = dict(zip(VALVES, expected, strict=True))
+    assert device.written[0] == (0.0, wanted)
+    assert device.written[-1] == (pytest.approx(1.03), wanted)
+    assert device.command == run.safe_command == wanted
+    # what was read until then moved both valves, each by itself
+    flexor, extensor = (run.command[name][:100] for name in VALVES)
+    assert np.ptp(flexor) > 0.1
+    assert np.ptp(extensor) > 0.1
+
+
+def test_every_valve_gets_its_safe_command_at_ctrl_c_and_after_an_error():
+    for error, raised in ((KeyboardInterrupt(), None), (ZeroDivisionError("oh"), LiveError)):
+
+        class Stopped(RigController):
+            def update(self, time, measurement, reference, error=error):
+                if time >= 1.0:
+                    raise error
+                return super().update(time, measurement, reference)
+
+        clock = VirtualClock()
+        device = SimulatedDevice(PAIR.rig, clock)
+        controller = Stopped(PAIR, PAIR.law("sliding", period=0.01))
+        if raised is None:
+            assert run_live(device, controller, TURN, clock=clock).reason == "interrupted"
+        else:
+            with pytest.raises(raised, match="oh"):
+                run_live(device, controller, TURN, clock=clock)
+        assert device.written[-1] == (pytest.approx(1.0), dict.fromkeys(VALVES, 5.0))
+
+
+def test_each_command_is_kept_within_its_own_limits():
+    free, _ = rig_live(PAIR)
+    assert all(values.min() < 3.0 for values in free.command.values())
+    limits = {VALVES[0]: (4.0, 6.0), VALVES[1]: (3.0, 7.0)}
+    run, _ = rig_live(PAIR, limits=limits)
+    for name, (low, high) in limits.items():
+        assert run.command[name].min() == low
+        assert run.command[name].max() <= high
+    same, _ = rig_live(PAIR, limits=(4.96, 5.04))
+    assert [values.min() for values in same.command.values()] == [4.96, 4.96]
+
+
+def test_a_controller_of_one_s_own_says_its_commands_by_the_safe_ones():
+    class Both(SmallPid):
+        answers = "inputs"
+
+        def update(self, time, measurement, reference):
+            seen = {"joint_angle": measurement["joint_angle.elbow"], "joint_rate": 0.0}
+            u = super().update(time, seen, reference)
+            return {"valve_command": {"flexor": u, "extensor": 10.0 - u}}
+
+    clock = VirtualClock()
+    run = run_live(
+        SimulatedDevice(PAIR.rig, clock),
+        Both(period=0.01, kd=0.0),
+        TURN,
+        clock=clock,
+        safe=dict.fromkeys(VALVES, 5.0),
+    )
+    flexor, extensor = (run.command[name] for name in VALVES)
+    assert flexor + extensor == pytest.approx(np.full(300, 10.0))
+    assert np.ptp(flexor) > 0.5
+    with pytest.raises(ParameterError, match=r"safe = None.*command_ranges"):
+        run_live(SimulatedDevice(PAIR.rig, clock), Both(period=0.01), TURN, clock=clock)
+    only = VirtualClock()
+    with pytest.raises(LiveError, match=r"answered 'valve_command.flexor', 'valve_command.ext"):
+        run_live(
+            OneValve(PAIR.rig, only), Both(period=0.01), TURN, clock=only, safe={VALVES[0]: 5.0}
+        )
+
+
+class OneValve(SimulatedDevice):
+    """A device that does not know of its second valve."""
+
+    def write(self, command):
+        super().write(dict.fromkeys(VALVES, command))
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        ({"safe": {"valve_command.other": 5.0}}, "valve_command.other"),
+        ({"safe": 11.0}, r"safe\['valve_command.flexor'\] = 11"),
+        ({"safe": {VALVES[0]: "open"}}, "'open' is not allowed"),
+        ({"limits": {VALVES[0]: (6.0, 7.0)}}, r"safe\['valve_command.flexor'\] = 5"),
+        ({"limits": {"valve_command": (0.0, 7.0)}}, "limits has 'valve_command'"),
+        ({"trajectory": BOTH}, "those of the controller are 'elbow'"),
+    ],
+)
+def test_bad_commands_are_named(options, word):
+    with pytest.raises(ParameterError, match=word):
+        rig_live(PAIR, **options)

@@ -12,16 +12,20 @@ from pamrs import _core
 from pamrs.control import (
     AirModel,
     ArmModel,
+    ConductanceInverse,
     Feedforward,
     FullTorque,
     GaylordTorque,
     OrificeInverse,
     Reference,
+    RigModel,
     SimplifiedTorque,
     torque_line,
 )
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
+from tests.control.helpers import CONDUCTANCE, with_iso_valve
+from tests.reference.gas import iso_flow
 
 SHOULDER = pamrs.rigs.shoulder()
 
@@ -126,14 +130,12 @@ def test_a_muscle_of_two_branches_has_two_desired_pressures():
     np.testing.assert_array_equal(same, torque_line(rig, angle))
 
 
+GAS_KEYS = ("ambient_pressure", "temperature", "gas_constant", "heat_capacity_ratio")
+
+
 def test_orifice_inverse_against_the_core():
     gas = SHOULDER.model["gas"]
-    values = (
-        gas["ambient_pressure"],
-        gas["temperature"],
-        gas["gas_constant"],
-        gas["heat_capacity_ratio"],
-    )
+    values = [gas[key] for key in GAS_KEYS]
     core, inverse = _core.Gas(*values), OrificeInverse(*values)
     upstream, area = 7.3e5, 3.1e-6
     ratios = np.concatenate(
@@ -154,10 +156,71 @@ def test_orifice_inverse_against_the_core():
 def test_area_table_backwards():
     air, valve = AirModel(SHOULDER), SHOULDER.model["valve"]
     opening = np.linspace(0.0, 1.0, 101)
-    area = valve["discharge_area_max"] * np.interp(opening, valve["opening"], valve["fraction"])
-    assert air.opening(area) == pytest.approx(opening, abs=1e-12)
-    assert [air.opening(float(a)) for a in area] == air.opening(area).tolist()
-    assert air.opening(1.0) == 1.0
+    share = np.interp(opening, valve["opening"], valve["fraction"])
+    assert air.opening(share) == pytest.approx(opening, abs=1e-12)
+    assert [air.opening(float(a)) for a in share] == air.opening(share).tolist()
+    assert air.opening(1e5) == 1.0
+
+
+def test_conductance_inverse_against_the_core_and_iso_6358():
+    gas = SHOULDER.model["gas"]
+    values = [gas[key] for key in GAS_KEYS]
+    upstream, conductance = 7.3e5, 2.4e-8
+    for b in (0.0, 0.2, 0.528, 0.9):
+        core, inverse = _core.Gas(*values), ConductanceInverse(b, *values)
+        ratios = np.concatenate([np.linspace(0.02, 0.99, 98), [0.998, 0.999, 0.9995, 0.99999]])
+        flow = core.conductance_flow(conductance, b, upstream, upstream * ratios)
+        reference = [
+            iso_flow(conductance, b, upstream, upstream * r, gas["temperature"]) for r in ratios
+        ]
+        assert flow == pytest.approx(reference, rel=1e-12)
+        found = [
+            inverse.conductance(float(m), upstream, float(upstream * r))
+            for m, r in zip(flow, ratios, strict=True)
+        ]
+        assert found == pytest.approx([conductance] * ratios.size, rel=1e-9)
+        assert inverse.conductance(flow, upstream, upstream * ratios).tolist() == found
+        assert inverse.flow(1e5, 2e5) == 0.0
+        assert math.isfinite(inverse.conductance(1e-3, 2e5, 2e5))
+
+
+ISO = with_iso_valve(SHOULDER, (CONDUCTANCE, 0.3), (1.3 * CONDUCTANCE, 0.45))
+
+
+@pytest.mark.parametrize("rate", [2e5, -1e5, 3e4])
+@pytest.mark.parametrize("pressure", [1e5, 4e5, 11e5])
+def test_an_iso_valve_makes_the_wanted_pressure_rate_in_the_simulator(rate, pressure):
+    start = {"joint_angle": math.radians(60.0), "muscle_pressure": pressure, "joint_rate": 0.3}
+    simulator = pamrs.Simulator(ISO, sample_time=1e-6, initial=start)
+    sample, air = simulator.observe(), AirModel(ISO)
+    names = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
+    volts = air.command(rate, *(sample[name] for name in names))
+    assert abs(volts) < air.half_range
+    after = simulator.step(air.null + volts)
+    found = (after["muscle_pressure"] - sample["muscle_pressure"]) / 1e-6
+    assert found == pytest.approx(rate, rel=1e-3, abs=100.0)
+    many = air.command(np.array([rate, -rate]), *(sample[name] for name in names))
+    assert many[0] == pytest.approx(volts, rel=1e-12)
+
+
+def test_a_valve_that_only_fills_is_asked_for_no_vent():
+    air = AirModel(with_iso_valve(SHOULDER, (CONDUCTANCE, 0.3), (0.0, 0.3)))
+    assert air.command(-1e5, 5e5, 1e6, 1.0, 0.0) == 0.0
+    assert air.command(1e5, 5e5, 1e6, 1.0, 0.0) > 0.0
+    assert air.command(np.array([-1e5, 1e5]), 5e5, 1e6, 1.0, 0.0)[0] == 0.0
+    with pytest.raises(ParameterError, match=r"valve\.fill_conductance = 0 .*fills nothing"):
+        AirModel(with_iso_valve(SHOULDER, (0.0, 0.3), (CONDUCTANCE, 0.3)))
+
+
+def test_gain_of_a_pressure_loop_is_by_the_conductance_that_fills():
+    """The equivalent area asks for the same gain, twice the conductance for half of it."""
+    gas = SHOULDER.model["gas"]
+    unit = _core.Gas(*(gas[key] for key in GAS_KEYS)).area_of_conductance(1.0)
+    same = with_iso_valve(SHOULDER, (8.4e-6 / unit, 0.528), (8.4e-6 / unit, 0.528))
+    wide = with_iso_valve(SHOULDER, (2 * 8.4e-6 / unit, 0.528), (1e-9, 0.2))
+    gains = [RigModel(rig).pressure_loop("", period=0.005).kp for rig in (SHOULDER, same, wide)]
+    assert gains[1] == pytest.approx(gains[0], rel=0.01)
+    assert gains[2] == pytest.approx(0.5 * gains[1], rel=0.01)
 
 
 @pytest.mark.parametrize("rate", [2e5, -1e5, 3e4])

@@ -13,6 +13,7 @@ from pamrs.control import (
     Cascade,
     CoContraction,
     Demand,
+    Feedforward,
     Parallel,
     PlanarArmModel,
     PressureLoop,
@@ -25,6 +26,7 @@ from pamrs.control import (
 from pamrs.control.trajectories import cosine_cycles, degrees, step
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
+from tests.control.helpers import CONDUCTANCE, with_iso_valve
 from tests.reference.planar import Link, PlanarArm
 
 PERIOD = 0.005
@@ -484,6 +486,63 @@ def test_a_regulator_is_asked_for_the_pressure_itself():
         wanted = alone.update(time, {}, LIFT(time))
         assert run.command["supply_command"][row] == wanted
         alone.reset()
+
+
+SAME_VALVE = with_iso_valve(
+    pamrs.rigs.shoulder(), (CONDUCTANCE, 0.528), (CONDUCTANCE, 0.528)
+)  # the area's own numbers
+
+
+@pytest.mark.parametrize("kind", ["feedforward", "sliding", "adaptive", "neural"])
+def test_an_iso_valve_follows_as_its_equivalent_area(kind):
+    """Both by the controller's inverse of its own valve; the flows differ by 0.8 % at most."""
+    errors = []
+    for rig in (pamrs.rigs.shoulder(), SAME_VALVE):
+        model = RigModel(rig)
+        law = model.law(kind, period=PERIOD, **OPTIONS.get(kind, {}))
+        errors.append(rms(closed_loop(rig, RigController(model, law), LIFT, 10.0))[0][0])
+    assert errors[1] == pytest.approx(errors[0], rel=0.02)
+    assert errors[1] < 1.15 * FOUND["shoulder", kind][0]
+
+
+def test_the_controllers_of_one_muscle_follow_with_an_iso_valve_too():
+    each = []
+    for rig in (pamrs.rigs.shoulder(), SAME_VALVE):
+        arm, air = ArmModel.from_rig(rig), AirModel(rig)
+        forward = Feedforward(arm, air, 20.0, period=PERIOD)
+        cascade = Cascade(Sliding(arm, period=PERIOD), PressureLoop(period=PERIOD))
+        each.append([rms(closed_loop(rig, one, LIFT, 10.0))[0][0] for one in (forward, cascade)])
+    assert each[1] == pytest.approx(each[0], rel=0.02)
+
+
+def test_a_free_exhaust_and_a_narrow_inlet_are_both_inverted():
+    """What is left of the error is the lag of the pressure, that of kM and of no valve; a model
+    with one area for both paths is off by what it does not know.
+    """
+    area = without_friction("shoulder")
+    rig = with_iso_valve(area, (0.4 * CONDUCTANCE, 0.25), (1.5 * CONDUCTANCE, 0.45))
+
+    def largest(rig, known):
+        model = RigModel(known)
+        law = model.law("feedforward", period=PERIOD)
+        start = on_the_way(model, law, LIFT)
+        run = closed_loop(rig, RigController(model, law, km=20.0), LIFT, 10.0, initial=start)
+        return rms(run, 0.0)[1][0]
+
+    lag = largest(area, area)
+    assert largest(rig, rig) == pytest.approx(lag, rel=0.002)
+    assert largest(rig, area) > 2.0 * lag
+
+
+def test_a_valve_behind_a_supply_line_is_fed_from_what_stands_in_front_of_it():
+    rig = pamrs.rigs.named("throttled_supply")
+    model = RigModel(rig)
+    (group,) = model.groups
+    assert (group.feed.supply, group.feed.source) == ("", "muscle_pressure.feed")
+    for kind, most in (("sliding", 0.35), ("feedforward", 1.35)):
+        law = model.law(kind, period=PERIOD, **OPTIONS.get(kind, {}))
+        run = closed_loop(rig, RigController(model, law), LIFT, 10.0)
+        assert rms(run)[0][0] < most
 
 
 def test_muscles_that_are_left_out_stay_without_air():

@@ -57,6 +57,24 @@ fn coefficients_are_those_of_the_equations() {
 }
 
 #[test]
+fn a_regulator_follows_what_it_is_set_to_by_its_time_constant() {
+    for limit in [1e12, 1e5] {
+        let mut spec = regulated();
+        (spec.supplies[0].rise_limit, spec.supplies[0].fall_limit) = (limit, limit);
+        let rig = Rig::new(spec).unwrap();
+        // at rest away from where it begins by itself, so that a limit is none to a small motion
+        let start = Initial::rest(&rig).with(&rig, "supply_pressure", 3e5).unwrap();
+        let start = start.with(&rig, "muscle_pressure", 2e5).unwrap();
+        let model = Progress::start(&rig, &start).unwrap().linearised(&rig, Side::Mean).unwrap();
+        assert_eq!(model.inputs, ["valve_command", "supply_command"]);
+        let (own, by) = row(&model, "supply_pressure");
+        assert!((own[0] + 10.0).abs() < 1e-9, "{own:?}");
+        assert!((by[1] - 10.0).abs() < 1e-9, "{by:?}");
+        assert!(model.b.iter().skip(3).step_by(2).all(|slope| *slope == 0.0));
+    }
+}
+
+#[test]
 fn a_spring_across_the_joint_is_stiffness_over_inertia() {
     let by_angle = |spec: &RigSpec| {
         let model = linearised(&Rig::new(spec.clone()).unwrap(), Side::Fill);

@@ -1,8 +1,9 @@
-//! `_core.Gas`: the orifice law.
+//! `_core.Gas`: the orifice law, and that of a sonic conductance.
 
 use crate::convert::{array, error, values};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pam_core::blocks::gas::Gas as CoreGas;
+use pam_core::blocks::tube::Tube;
 use pam_core::error::check_range;
 use pyo3::prelude::*;
 
@@ -10,6 +11,7 @@ use pyo3::prelude::*;
 #[pyclass(frozen, module = "pamrs._core")]
 pub struct Gas {
     inner: CoreGas,
+    temperature: f64,
 }
 
 #[pymethods]
@@ -33,6 +35,7 @@ impl Gas {
         }
         Ok(Self {
             inner: CoreGas::new(ambient_pressure, temperature, gas_constant, heat_capacity_ratio),
+            temperature,
         })
     }
 
@@ -51,6 +54,33 @@ impl Gas {
         };
         check_range("area", area, 0.0, 1.0, "m2").map_err(|e| error(py, &e))?;
         check_range("upstream", upstream, 1.0, 1e9, "Pa (absolute)").map_err(|e| error(py, &e))?;
+        let flows: pam_core::Result<Vec<f64>> = values(&downstream).into_iter().map(flow).collect();
+        flows.map(|v| array(py, v)).map_err(|e| error(py, &e))
+    }
+
+    /// Mass flow [kg/s] through a sonic conductance [m3/(s Pa)] with a critical pressure ratio [1]
+    /// (ISO 6358) from an upstream pressure [Pa] to downstream pressures [Pa].
+    fn conductance_flow<'py>(
+        &self,
+        py: Python<'py>,
+        conductance: f64,
+        critical_ratio: f64,
+        upstream: f64,
+        downstream: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let checked = [
+            ("conductance", conductance, 0.0, 1.0, "m3/(s Pa)"),
+            ("critical_ratio", critical_ratio, 0.0, 0.99, "(1)"),
+            ("upstream", upstream, 1.0, 1e9, "Pa (absolute)"),
+        ];
+        for (name, value, low, high, unit) in checked {
+            check_range(name, value, low, high, unit).map_err(|e| error(py, &e))?;
+        }
+        let tube = Tube::<f64>::of_conductance(conductance, critical_ratio, self.temperature);
+        let flow = |p: f64| {
+            check_range("downstream", p, 0.0, 1e9, "Pa (absolute)")?;
+            Ok(tube.mass_flow(upstream, p))
+        };
         let flows: pam_core::Result<Vec<f64>> = values(&downstream).into_iter().map(flow).collect();
         flows.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }

@@ -10,7 +10,7 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.control._adaptive import AdaptiveSliding
-from pamrs.control._air import AirModel, OrificeInverse
+from pamrs.control._air import AirModel, ConductanceInverse, OrificeInverse
 from pamrs.control._cascade import Cascade, PressureLoop, cascaded_pid
 from pamrs.control._feedforward import Feedforward, FeedforwardPressure, Parallel
 from pamrs.control._fuzzy import FUZZY_SETS, Fuzzy, fuzzy_rules, fuzzy_surface
@@ -92,6 +92,7 @@ __all__ = [
     "BundleTorque",
     "Cascade",
     "ClosedLoop",
+    "ConductanceInverse",
     "Controller",
     "DeadZoneCompensation",
     "Device",

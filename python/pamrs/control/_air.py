@@ -7,13 +7,14 @@ from __future__ import annotations
 import bisect
 import functools
 import math
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.control._groups import Group, groups_of
+from pamrs.control._groups import Group, groups_of, named
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._torque import _parts
@@ -22,7 +23,7 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["AirModel", "OrificeInverse"]
+__all__ = ["AirModel", "ConductanceInverse", "OrificeInverse"]
 
 Array = NDArray[np.float64]
 
@@ -32,31 +33,25 @@ _LAMINAR: Final = (
 _LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
 
 
-class OrificeInverse:
-    """Area that lets a mass flow through, ``A_d = mdot_d/(pu f(pd/pu))``, with ``f`` tabulated from
-    the core's orifice law.
+class _PassageInverse:
+    """Size of a passage that lets a mass flow through, from what a passage of one unit passes.
 
     Parameters
     ----------
-    ambient_pressure, temperature, gas_constant, heat_capacity_ratio : float
-        Of the gas: [Pa, absolute], [K], [J/(kg K)], [1].
+    flows : callable
+        Upstream pressure [Pa, absolute] and ratios of the downstream one to it -> mass flow per
+        unit of the passage [kg/s].
+    critical : float
+        Ratio below which the flow is choked [1].
     """
 
-    def __init__(
-        self,
-        ambient_pressure: float,
-        temperature: float,
-        gas_constant: float,
-        heat_capacity_ratio: float,
-    ) -> None:
-        core = _core.Gas(ambient_pressure, temperature, gas_constant, heat_capacity_ratio)
+    def __init__(self, flows: Callable[[float, Array], Array], critical: float) -> None:
         upstream = 1e5  # the law is in proportion to it
 
         def per_pressure(ratio: Array) -> Array:
-            return core.mass_flow(1.0, upstream, upstream * ratio) / upstream
+            return flows(upstream, upstream * ratio) / upstream
 
-        gamma = heat_capacity_ratio
-        self.critical = (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0))
+        self.critical = critical
         self._choked = float(per_pressure(np.array([0.5 * self.critical]))[0])
         # in sqrt(1 - r) the law is smooth up to r = 1
         root = np.linspace(math.sqrt(1.0 - _LAMINAR), math.sqrt(1.0 - self.critical), 2049)
@@ -66,8 +61,8 @@ class OrificeInverse:
         self._slope = float(per_pressure(np.array([_LAMINAR]))[0]) / (1.0 - _LAMINAR)
 
     def flow(self, upstream: Value, downstream: Value) -> Value:
-        """Mass flow per area [kg/(s m2)] between absolute pressures [Pa], zero for none or a
-        reversed difference.
+        """Mass flow of a passage of one unit [kg/s] between absolute pressures [Pa], zero for none
+        or a reversed difference.
         """
         ratio = downstream / upstream
         if ratio.__class__ is float:
@@ -84,14 +79,80 @@ class OrificeInverse:
             np.where(ratio <= _LAMINAR, self._between(np.sqrt(gap)), self._slope * gap),
         )
 
-    def area(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
-        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where
+    def size(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
+        """Size of the passage for a mass flow [kg/s] >= 0; zero for no flow, very large where
         nothing can flow.
         """
         unit, least = self.flow(upstream, downstream), _LEAST_FLOW * self._choked * upstream
         if unit.__class__ is float and least.__class__ is float:
             return mass_flow / (unit if unit > least else least)
         return mass_flow / np.maximum(unit, least)
+
+
+class OrificeInverse(_PassageInverse):
+    """Area that lets a mass flow through, ``A_d = mdot_d/(pu f(pd/pu))``, with ``f`` tabulated from
+    the core's orifice law; :meth:`flow` is per area [kg/(s m2)].
+
+    Parameters
+    ----------
+    ambient_pressure, temperature, gas_constant, heat_capacity_ratio : float
+        Of the gas: [Pa, absolute], [K], [J/(kg K)], [1].
+    """
+
+    def __init__(
+        self,
+        ambient_pressure: float,
+        temperature: float,
+        gas_constant: float,
+        heat_capacity_ratio: float,
+    ) -> None:
+        core = _core.Gas(ambient_pressure, temperature, gas_constant, heat_capacity_ratio)
+        gamma = heat_capacity_ratio
+        super().__init__(
+            lambda upstream, downstream: core.mass_flow(1.0, upstream, downstream),
+            (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0)),
+        )
+
+    def area(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
+        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where
+        nothing can flow.
+        """
+        return self.size(mass_flow, upstream, downstream)
+
+
+class ConductanceInverse(_PassageInverse):
+    """Sonic conductance ``C`` that lets a mass flow through at a critical ratio ``b`` (ISO
+    6358-1:2013), tabulated from the core's law; :meth:`flow` is per conductance [kg Pa/m3].
+
+    Parameters
+    ----------
+    critical_ratio : float
+        ``b`` [1].
+    ambient_pressure, temperature, gas_constant, heat_capacity_ratio : float
+        As for :class:`OrificeInverse`.
+    """
+
+    def __init__(
+        self,
+        critical_ratio: float,
+        ambient_pressure: float,
+        temperature: float,
+        gas_constant: float,
+        heat_capacity_ratio: float,
+    ) -> None:
+        core = _core.Gas(ambient_pressure, temperature, gas_constant, heat_capacity_ratio)
+        super().__init__(
+            lambda upstream, downstream: core.conductance_flow(
+                1.0, critical_ratio, upstream, downstream
+            ),
+            critical_ratio,
+        )
+
+    def conductance(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
+        """Sonic conductance [m3/(s Pa)] for a mass flow [kg/s] >= 0; zero for no flow, very large
+        where nothing can flow.
+        """
+        return self.size(mass_flow, upstream, downstream)
 
 
 class AirModel:
@@ -106,20 +167,14 @@ class AirModel:
     Raises
     ------
     ParameterError
-        If there is no such chamber, no valve feeds it or no supply the valve, the valve has
-        conductances in the place of an area, or its area table is level somewhere but at its ends,
-        so that it has no inverse.
+        If there is no such chamber, no valve feeds it or no supply the valve, the valve fills
+        nothing, or its area table is level somewhere but at its ends, so that it has no inverse.
     """
 
     def __init__(self, rig: Rig, chamber: str | None = None) -> None:
         group = _group(rig, chamber)
         valve = rig.tables("valve")[group.feed.name]
         table = rig.tables("chamber")[group.chamber]
-        if valve["flow"] != "orifice":
-            raise ParameterError(
-                f"valve.flow = {valve['flow']!r} is not allowed: a controller's model inverts a "
-                "valve with an area, flow = 'orifice'"
-            )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
         supply = rig.tables("supply")[group.feed.supply or ""]
@@ -139,11 +194,8 @@ class AirModel:
             )
             volume = volume + int(muscle.parameters["count"]) * muscle.air_volume(contraction)
         self.volume = Spline(low, high, volume)
-        self.orifice = _orifice(
-            self.ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
-        )
+        self._fill, self._vent = _paths(rig.name, named("valve", group.feed.name), valve, gas)
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
-        self.largest_area = float(valve["discharge_area_max"])
         self._fraction, self._opening = _inverse(valve)
 
     def rate_per_volt(self) -> float:
@@ -154,11 +206,10 @@ class AirModel:
         volts = self.command(slow, 0.5 * self.supply_pressure, self.supply_pressure, middle, 0.0)
         return slow / float(volts)
 
-    def opening(self, area: Value) -> Value:
-        """Opening ``|x|`` [1] of an effective area [m2] >= 0: the area table backwards, 1 where it
-        cannot be so large.
+    def opening(self, fraction: Value) -> Value:
+        """Opening ``|x|`` [1] of a share of the widest area or conductance [1] >= 0: the area table
+        backwards, 1 where it cannot be so large.
         """
-        fraction = area / self.largest_area
         places, values = self._fraction, self._opening
         if fraction.__class__ is float:
             if fraction <= places[0]:
@@ -198,7 +249,7 @@ class AirModel:
         -------
         float or ndarray
             From minus to plus the half range; 0 where the supply is below the muscle and air would
-            be needed.
+            be needed, and where a valve without a vent would have to let air out.
         """
         inside, feed = pressure + self.ambient, supply + self.ambient
         demand = pressure_rate * self.volume(angle) + self.alpha * inside * (
@@ -208,32 +259,72 @@ class AirModel:
             if demand > 0.0:
                 if feed <= inside:
                     return 0.0
-                return self.half_range * self.opening(
-                    self.orifice.area(demand / (self._rt * self.alpha_in), feed, inside)
+                return self.half_range * self._opened(
+                    self._fill, demand / (self._rt * self.alpha_in), feed, inside
                 )
             if demand == 0.0:
                 return 0.0
-            return -self.half_range * self.opening(
-                self.orifice.area(-demand / (self._rt * self.alpha_out), inside, self.ambient)
+            return -self.half_range * self._opened(
+                self._vent, -demand / (self._rt * self.alpha_out), inside, self.ambient
             )
         demand, feed, inside = np.broadcast_arrays(demand, feed, inside)
-        filling = self.opening(
-            self.orifice.area(np.maximum(demand, 0.0) / (self._rt * self.alpha_in), feed, inside)
+        filling = self._opened(
+            self._fill, np.maximum(demand, 0.0) / (self._rt * self.alpha_in), feed, inside
         )
-        venting = self.opening(
-            self.orifice.area(
-                np.maximum(-demand, 0.0) / (self._rt * self.alpha_out), inside, self.ambient
-            )
+        venting = self._opened(
+            self._vent, np.maximum(-demand, 0.0) / (self._rt * self.alpha_out), inside, self.ambient
         )
         return self.half_range * np.where(
             demand > 0.0, np.where(feed <= inside, 0.0, filling), -venting
         )
+
+    def _opened(self, path: _Path, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
+        """Opening ``|x|`` [1] at which a path passes a mass flow; 0 of a path that is none."""
+        inverse, widest = path
+        if widest == 0.0:
+            return 0.0 * mass_flow
+        return self.opening(inverse.size(mass_flow, upstream, downstream) / widest)
+
+
+#: What inverts a path of a valve, and its widest area [m2] or conductance [m3/(s Pa)].
+_Path: TypeAlias = "tuple[_PassageInverse, float]"
+
+
+def _paths(
+    rig: str, block: str, valve: Mapping[str, Any], gas: Mapping[str, float]
+) -> tuple[_Path, _Path]:
+    """The paths by which a valve fills and vents."""
+    air = tuple(
+        float(gas[key])
+        for key in ("ambient_pressure", "temperature", "gas_constant", "heat_capacity_ratio")
+    )
+    if valve["flow"] == "orifice":
+        path = _orifice(*air), float(valve["discharge_area_max"])
+        return path, path
+    if not valve["fill_conductance"] > 0.0:
+        raise ParameterError(
+            f"rig {rig!r}: {block}.fill_conductance = {valve['fill_conductance']:g} m3/(s Pa), so "
+            "that the valve fills nothing: a controller's model needs one that does"
+        )
+    fill, vent = (
+        (
+            _conductance(float(valve[f"{way}_critical_ratio"]), *air),
+            float(valve[f"{way}_conductance"]),
+        )
+        for way in ("fill", "vent")
+    )
+    return fill, vent
 
 
 @functools.lru_cache(maxsize=16)
 def _orifice(*gas: float) -> OrificeInverse:
     """The same for every chamber of a gas: a bundle has hundreds."""
     return OrificeInverse(*gas)
+
+
+@functools.lru_cache(maxsize=16)
+def _conductance(*ratio_and_gas: float) -> ConductanceInverse:
+    return ConductanceInverse(*ratio_and_gas)
 
 
 def _group(rig: Rig, chamber: str | None) -> Group:

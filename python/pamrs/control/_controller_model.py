@@ -4,7 +4,6 @@ its state and its measurements.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Final
@@ -12,7 +11,8 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control._protocol import Controller, Reference
+from pamrs.channels import channel_of
+from pamrs.control._protocol import Controller, Reference, commands_of
 from pamrs.errors import ParameterError
 
 __all__ = ["LinearController", "heard", "linear_controller"]
@@ -24,7 +24,12 @@ _WIDTHS: Final[dict[str, float]] = {
     "joint_angle": 1e-5,
     "joint_rate": 1e-5,
     "muscle_pressure": 10.0,
+    "supply_pressure": 10.0,
+    "length": 1e-6,
+    "length_rate": 1e-6,
 }
+#: What controllers of one valve are told.
+_OF_ONE: Final = ("joint_angle", "joint_rate", "muscle_pressure")
 #: By how much of the slope the slopes of both sides may differ.
 _KINK: Final = 0.01
 SIDES: Final = ("", "up", "down", "mean")
@@ -38,13 +43,15 @@ class LinearController:
     Attributes
     ----------
     a, b, c, d : ndarray
-        Shapes (n, n), (n, p), (1, n), (1, p).
+        Shapes (n, n), (n, p), (m, n), (m, p).
     inputs : tuple of str
         Channels that the controller reads.
     period : float
         [s]
-    command : float
-        What it answers at the operating point.
+    command : float or dict of str to float
+        What it answers at the operating point; of a controller of every input each by its name.
+    outputs : tuple of str
+        Names of its m commands; one without a name is that of the only input of a plant.
     """
 
     a: Array = field(repr=False)
@@ -53,13 +60,14 @@ class LinearController:
     d: Array = field(repr=False)
     inputs: tuple[str, ...]
     period: float
-    command: float = 0.0
+    command: Any = 0.0
+    outputs: tuple[str, ...] = ("",)
 
 
 def linear_controller(
     controller: Controller,
     point: Mapping[str, float],
-    angle: float | None = None,
+    angle: Any = None,
     *,
     state: Mapping[str, Any] | None = None,
     side: str = "",
@@ -76,8 +84,9 @@ def linear_controller(
     controller : Controller
         For one plant; it is reset before and after.
     point : mapping of str to float
-        Channels at the operating point; the reference rests at its ``joint_angle``.
-    angle : float, optional
+        Channels at the operating point; the reference rests at its ``joint_angle``, of a
+        :class:`pamrs.control.RigController` at those of its joints.
+    angle : float or array_like, shape (joints,), optional
         Another reference [rad].
     state : mapping, optional
         The controller's state at the operating point, for one whose integrals have to hold the arm
@@ -93,7 +102,7 @@ def linear_controller(
     -------
     LinearController
         From ``joint_angle``, ``joint_rate`` and ``muscle_pressure``, those of them that are in
-        ``point``.
+        ``point``; of a controller of every input from every channel that moves a command.
 
     Raises
     ------
@@ -105,37 +114,70 @@ def linear_controller(
         raise ParameterError(
             f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}"
         )
-    inputs = tuple(
-        name for name in ("joint_angle", "joint_rate", "muscle_pressure") if name in point
+    whole_rig = controller.answers == "inputs"
+    kinds = (
+        [name for name in point if channel_of(name) in _WIDTHS]
+        if whole_rig
+        else [name for name in _OF_ONE if name in point]
     )
-    reference = Reference(point["joint_angle"] if angle is None else angle)
+    inputs = tuple(kinds)
+    reference = _resting(controller, point, angle)
     update = _Update(
         controller, dict(point), reference, _settled(controller, point, reference, state)
     )
     slopes, middle = _slopes(update, inputs, side)
     controller.reset()
-    command = float(middle[-1])
-    n = len(update.paths)
+    n, m = len(update.paths), len(update.names)
+    commands = middle[n:]
     whole = np.array([slope for slope, _ in slopes]).T
-    if not (np.isfinite(whole).all() and math.isfinite(command)):
+    if not (np.isfinite(whole).all() and np.isfinite(commands).all()):
         raise ParameterError(
             "the controller's command is not finite at the operating point: no linear model is "
             "there"
         )
-    if not whole[n].any() or not whole[:, n:].any():
+    if not whole[n:].any() or not whole[:, n:].any():
+        answered = ", ".join(
+            f"{name} = {value:g}" if name else f"{value:g}"
+            for name, value in zip(update.names, commands, strict=True)
+        )
         raise ParameterError(
-            f"the controller answers {command:g} whatever it measures: it is at a limit; give the "
+            f"the controller answers {answered} whatever it measures: it is at a limit; give the "
             "state in which it holds the arm here"
         )
     # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion
     # that never dies out
     moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
-    kept = sorted(set(heard(whole[:n, :n], whole[n, :n])) & set(moved))
+    reach = np.abs(whole[n:, :n]).sum(axis=0)
+    kept = sorted(set(heard(whole[:n, :n], reach)) & set(moved))
     if side == "":
         _refuse_corners(update, inputs, [step for _, step in slopes], kept)
-    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, range(n, n + len(inputs)))]
-    c, d = whole[[n]][:, kept], whole[[n]][:, n:]
-    return LinearController(a, b, c, d, inputs, controller.period, command)
+    read = [
+        k
+        for k in range(len(inputs))
+        if not whole_rig or whole[[*kept, *range(n, n + m)], n + k].any()
+    ]
+    columns = [n + k for k in read]
+    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, columns)]
+    c, d = whole[n:][:, kept], whole[n:][:, columns]
+    answer: Any = float(commands[0])
+    if whole_rig:
+        answer = dict(zip(update.names, commands.tolist(), strict=True))
+    named = tuple(inputs[k] for k in read)
+    return LinearController(a, b, c, d, named, controller.period, answer, update.names)
+
+
+def _resting(controller: Controller, point: Mapping[str, float], angle: Any) -> Reference:
+    """A reference that rests, at the joints' angles of a point or at others."""
+    tracked: tuple[str, ...] = getattr(controller, "tracked", ("joint_angle",))
+    if angle is None:
+        missing = [name for name in tracked if name not in point]
+        if missing:
+            raise ParameterError(
+                f"point has no {', '.join(missing)}: the reference cannot rest there; give angle"
+            )
+        angle = [point[name] for name in tracked]
+    values = np.atleast_1d(np.asarray(angle, dtype=np.float64))
+    return Reference(float(values[0])) if values.size == 1 else Reference(values)
 
 
 def _settled(
@@ -182,13 +224,19 @@ class _Update:
         self.paths = [path for path, _ in floats if path[-1] != "time"]
         clocks = [value for path, value in floats if path[-1] == "time"]  # of the parts too
         self.now = max(clocks, default=2.0 * controller.period) + controller.period
+        self.names: tuple[str, ...] = ("",)
+        if controller.answers == "inputs":
+            controller.restore(start)
+            answer: Any = controller.update(self.now, self.point, reference)
+            self.names = tuple(name for name, _ in commands_of(answer))
 
     def __call__(self, state: Mapping[str, Any], sample: Mapping[str, float]) -> Array:
-        """Every float of the state after the update, and behind them the command."""
+        """Every float of the state after the update, and behind them the commands."""
         self.controller.restore(state)
-        command = float(self.controller.update(self.now, sample, self.reference))
+        answer: Any = self.controller.update(self.now, sample, self.reference)
+        commands = [answer] if self.names == ("",) else [value for _, value in commands_of(answer)]
         after = self.controller.state
-        return np.array([*(_at(after, path) for path in self.paths), command])
+        return np.array([*(_at(after, path) for path in self.paths), *map(float, commands)])
 
 
 def _slopes(
@@ -205,7 +253,7 @@ def _slopes(
         up, down = (update(_changed(start, path, s * width), point) for s in (1.0, -1.0))
         slopes.append(_slope(up, middle, down, width, side))
     for name in inputs:
-        width = _WIDTHS[name]
+        width = _WIDTHS[channel_of(name)]
         up, down = (update(start, {**point, name: point[name] + s * width}) for s in (1.0, -1.0))
         slopes.append(_slope(up, middle, down, width, side))
     return slopes, middle
@@ -219,11 +267,11 @@ def _refuse_corners(
     """
     n = len(update.paths)
     names = [".".join(map(str, path)) for path in update.paths]
-    places = [*kept, n]
+    places = [*kept, *range(n, n + len(update.names))]
     for name, step in zip([*names, *inputs], steps, strict=True):
         if step[places].any():
             k = places[int(np.argmax(step[places]))]
-            what = "its command" if k == n else names[k]
+            what = f"its command {update.names[k - n]}".rstrip() if k >= n else names[k]
             raise ParameterError(
                 f"the controller has a corner at the operating point: the slopes of {what} over "
                 f"{name} differ by {step[k]:.3g} between its sides; choose a side (up, down, "

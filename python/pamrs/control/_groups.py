@@ -45,12 +45,16 @@ class Feed:
     name : str
         Of the valve, regulator or chamber.
     supply : str or None
-        Name of the supply behind it; None where there is none.
+        Name of the supply behind it, through lines; None where there is none.
+    source : str or None
+        Channel of the pressure that it fills from: the supply's, or that of a chamber in front of
+        the valve.
     """
 
     input: str
     name: str
     supply: str | None
+    source: str | None = None
 
 
 @dataclass(frozen=True)
@@ -191,9 +195,7 @@ def _feed(
                 "controller's model needs one"
             )
         if fed:
-            place = fed[0][1]["from"]
-            supply = _short(place) if place.partition(".")[0] == "supply" else None
-            return Feed("valve_command", fed[0][0], supply)
+            return Feed("valve_command", fed[0][0], *_behind(fed[0][1]["from"], lines))
         before = [ports["from"] for ports in lines.values() if ports["to"] == here]
         before += [named("line", name) for name, ports in lines.items() if ports["to"] == here]
         places = [place for place in before if place and place not in passed]
@@ -202,7 +204,7 @@ def _feed(
             name = _short(supplied[0])
             if supplies[name].get("kind") != "regulator":
                 break
-            return Feed("supply_command", name, name)
+            return Feed("supply_command", name, name, named("supply_pressure", name))
         if not places:
             return Feed("pressure", chamber, None)
         here = places[-1]
@@ -210,3 +212,22 @@ def _feed(
         f"rig {rig!r}: nothing that can be commanded feeds {named('chamber', chamber)}; a valve or "
         "a regulator is needed"
     )
+
+
+def _behind(place: str, lines: Mapping[str, Mapping[str, str]]) -> tuple[str | None, str | None]:
+    """The supply behind a valve, and the channel of what it fills from; lines between the two are
+    passed.
+    """
+    block, name = place.partition(".")[0], _short(place)
+    if block == "supply":
+        return name, named("supply_pressure", name)
+    here, passed = place, set()
+    while here not in passed:
+        passed.add(here)
+        for ports in lines.values():
+            if ports["to"] == here and ports["from"]:
+                here = ports["from"]
+                break
+        if here.partition(".")[0] == "supply":
+            return _short(here), named("muscle_pressure", name)
+    return None, None

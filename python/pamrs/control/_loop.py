@@ -22,7 +22,15 @@ from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_sam
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Actuation", "ClosedLoop", "actuation_of", "closed_loop", "measured_by", "tracked_of"]
+__all__ = [
+    "Actuation",
+    "ClosedLoop",
+    "actuation_of",
+    "closed_loop",
+    "measured_by",
+    "tracked_of",
+    "trajectories_of",
+]
 
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
@@ -237,7 +245,7 @@ def closed_loop(
     simulator = _simulator(plant, controller, sample_time, step, initial)
     dt = simulator.sample_time
     every = whole_samples("controller.period", controller.period, dt, least=1)
-    wanted_of = _trajectories(trajectory, controller)
+    wanted_of = trajectories_of(trajectory, controller)
     total = whole_samples(
         "duration", wanted_of.duration if duration is None else duration, dt, least=1
     )
@@ -303,10 +311,25 @@ def closed_loop(
     )
 
 
-def _trajectories(
+def trajectories_of(
     given: Trajectory | Mapping[str, Trajectory] | JointTrajectories, controller: Controller
 ) -> Trajectory | JointTrajectories:
-    """A trajectory for each joint of the controller, in its order."""
+    """A trajectory for each joint of a controller, in its order.
+
+    Parameters
+    ----------
+    given : Trajectory, JointTrajectories, or mapping of str to Trajectory
+    controller : Controller
+
+    Returns
+    -------
+    Trajectory or JointTrajectories
+
+    Raises
+    ------
+    ParameterError
+        If the joints are not those of the controller.
+    """
     joints: tuple[str, ...] = getattr(controller, "joints", ("",))
     if isinstance(given, JointTrajectories):
         given = given.of_joint

@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import abc
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -32,6 +33,8 @@ __all__ = [
     "check_answers_pressure",
     "check_controller",
     "check_drives_valve",
+    "commands_of",
+    "keywords_of",
 ]
 
 #: A float, or one number for each plant of a batch.
@@ -188,3 +191,45 @@ def check_answers_pressure(outer: Controller) -> None:
             "allowed: 'pressure' is needed, a desired gauge pressure [Pa] (an angle PID is in "
             "cascaded_pid; a controller of your own says answers = 'pressure')"
         )
+
+
+def commands_of(answer: Mapping[str, Any]) -> Iterator[tuple[str, Any]]:
+    """Commands by name, ``valve_command.flexor``, of an answer that has every input of a rig.
+
+    Parameters
+    ----------
+    answer : mapping
+        Keywords of :meth:`pamrs.Simulator.step`, or names already.
+
+    Yields
+    ------
+    tuple of (str, value)
+    """
+    for word, value in answer.items():
+        if isinstance(value, Mapping):
+            for name, one in value.items():
+                yield dotted(word, name), one
+        else:
+            yield word, value
+
+
+def keywords_of(commands: Mapping[str, Any]) -> dict[str, Any]:
+    """Keywords of :meth:`pamrs.Simulator.step` of commands by name: :func:`commands_of` backwards.
+
+    Parameters
+    ----------
+    commands : mapping
+        ``valve_command.flexor`` -> value.
+
+    Returns
+    -------
+    dict
+    """
+    found: dict[str, Any] = {}
+    for name, value in commands.items():
+        word, _, block = name.partition(".")
+        if block:
+            found.setdefault(word, {})[block] = value
+        else:
+            found[word] = value
+    return found

@@ -16,6 +16,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from pamrs.control._air import AirModel
 from pamrs.control._groups import Group, named
@@ -32,6 +33,7 @@ from pamrs.control._sharing import CoContraction, Demand, Share, Together
 from pamrs.control._values import where as chosen
 from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.errors import ParameterError
+from pamrs.simulation import core_rig
 
 __all__ = ["RigController"]
 
@@ -177,6 +179,8 @@ class RigController(SampledController):
         self._gain_batch = sizes.pop() if sizes else None
         self._number = {name: k for k, name in enumerate(model.joints)}
         self._channels = self._named_channels()
+        #: Channels of the joints that are tracked, base first.
+        self.tracked = tuple(self._channels[0])
         self._vented = [(group, self._opened(group)) for group in model.vented]
         self._open = [self._opened(group) for group in model.groups]
         self._before = Restorer(self)
@@ -240,11 +244,24 @@ class RigController(SampledController):
         angles = [named("joint_angle", name) for name in model.joints]
         rates = [named("joint_rate", name) for name in model.joints]
         pressures = [named("muscle_pressure", group.chamber) for group in model.groups]
-        supplies = [
-            None if g.feed.supply is None else named("supply_pressure", g.feed.supply)
-            for g in model.groups
-        ]
+        supplies = [group.feed.source for group in model.groups]
         return angles, rates, pressures, supplies
+
+    @property
+    def command_ranges(self) -> dict[str, tuple[float, float, float]]:
+        """Of every command by its name, ``valve_command.flexor``: a value that is safe, the lowest
+        and the highest. A valve is closed at its safe one and keeps the air, a regulator is set to
+        the ambient pressure.
+        """
+        found = {}
+        for group in (*self.model.groups, *self.model.vented):
+            low, rest, high = 0.0, 0.0, self.model.pressure_limit
+            if group.feed.input == "valve_command":
+                valve = self.model.rig.tables("valve")[group.feed.name]
+                rest, half = float(valve["null_voltage"]), float(valve["half_range"])
+                low, high = rest - half, rest + half
+            found[named(group.feed.input, group.feed.name)] = (rest, low, high)
+        return found
 
     # ------------------------------------------------------------------ used
 
@@ -323,22 +340,7 @@ class RigController(SampledController):
         each = [self._of_each(value) for value in (drive, torque, at)]
         turning = aim.rate if self._commanded else sample.get("joint_rate", 0.0)
         turned = self._of_each(self._full(turning))
-        wanted: dict[str, Value] = {}
-        idle: dict[str, Any] = {}
-        for k, (name, share) in enumerate(zip(self.joints, self._shares, strict=True)):
-            which = [i for i, g in enumerate(self.model.groups) if g.joint == name]
-            demand = Demand(
-                time,
-                each[0][k],
-                each[1][k],
-                each[2][k],
-                tuple(pressures[i] for i in which),
-                tuple(supplies[i] for i in which),
-            )
-            for i, value in zip(which, share.pressures(demand), strict=True):
-                wanted[self.model.groups[i].chamber] = value
-            for i, vented in zip(which, share.vented, strict=True):
-                idle[self.model.groups[i].chamber] = vented
+        wanted, idle = self._shared(time, each, pressures, supplies)
         answers: dict[str, Any] = {}
         for i, (group, way) in enumerate(zip(self.model.groups, self._ways, strict=True)):
             k = self._number[group.joint]
@@ -356,6 +358,98 @@ class RigController(SampledController):
         for group, command in self._vented:
             self._answer(answers, group, self._sized_for_batch(command))
         return answers
+
+    def _shared(
+        self,
+        time: float,
+        each: Sequence[Sequence[Value]],
+        pressures: Sequence[Value],
+        supplies: Sequence[Value],
+    ) -> tuple[dict[str, Value], dict[str, Any]]:
+        """Pressure of every chamber [Pa], and whether it is open to the ambient, of the drives,
+        torques and angles of the joints.
+        """
+        wanted: dict[str, Value] = {}
+        idle: dict[str, Any] = {}
+        for k, (name, share) in enumerate(zip(self.joints, self._shares, strict=True)):
+            which = [i for i, g in enumerate(self.model.groups) if g.joint == name]
+            demand = Demand(
+                time,
+                each[0][k],
+                each[1][k],
+                each[2][k],
+                tuple(pressures[i] for i in which),
+                tuple(supplies[i] for i in which),
+            )
+            for i, value in zip(which, share.pressures(demand), strict=True):
+                wanted[self.model.groups[i].chamber] = value
+            for i, vented in zip(which, share.vented, strict=True):
+                idle[self.model.groups[i].chamber] = vented
+        return wanted, idle
+
+    def holding(self, angle: ArrayLike) -> dict[str, float]:
+        """Initial values at which the model rests: joints at their angles, chambers at the
+        pressures that the shares ask for there, regulators set to them.
+
+        Parameters
+        ----------
+        angle : float or array_like, shape (joints,)
+            Of every joint [rad], base first.
+
+        Returns
+        -------
+        dict of str to float
+            For :func:`pamrs.simulate`, :func:`closed_loop` and
+            :func:`pamrs.control.linear.linearise`.
+
+        Raises
+        ------
+        ParameterError
+            If there is not an angle for each joint within its range, or no pressures up to the
+            limit hold them.
+        """
+        arm, joints = self.model.arm, len(self.joints)
+        at = np.asarray(angle, dtype=np.float64)
+        low, high = (np.broadcast_to(end, joints) for end in arm.angle_range)
+        if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
+            raise ParameterError(
+                f"angle = {angle!r} is not allowed: {joints} from {low.tolist()} to "
+                f"{high.tolist()} are needed"
+            )
+        rows: Any = float(at.ravel()[0]) if joints == 1 else at.ravel()
+        still = rows * 0.0
+        drive = arm.pressure(arm.inverse_dynamics(rows, still, still, still), rows)
+        least, most = (np.broadcast_to(end, joints) for end in arm.limits(rows))
+        for k, asked in enumerate(np.broadcast_to(drive, joints)):
+            if not least[k] <= asked <= most[k]:
+                raise ParameterError(
+                    f"no pressures hold {self.tracked[k]} = {at.ravel()[k]:g}: a drive of "
+                    f"{asked:.4g} Pa is needed, and {least[k]:.4g} to {most[k]:.4g} can be had"
+                )
+        c1, c2 = arm.torque.at(rows)
+        each = [
+            [float(value) for value in np.broadcast_to(values, joints)]
+            for values in (drive, c1 * drive + c2, rows)
+        ]
+        groups, before = self.model.groups, self._before.take()
+        rest, limit = [0.0] * len(groups), [self.model.pressure_limit] * len(groups)
+        wanted, _ = self._shared(0.0, each, rest, limit)
+        self._before.put_back(before)
+        start = {name: value for name, value in zip(self.tracked, each[2], strict=True)}
+        for group in groups:
+            pressure = float(wanted[group.chamber])
+            start[named("muscle_pressure", group.chamber)] = pressure
+            if group.feed.input == "supply_command":
+                start[named("supply_pressure", group.feed.name)] = pressure
+            start |= {name: pressure for name in self._lines_to(group.chamber)}
+        return start
+
+    def _lines_to(self, chamber: str) -> list[str]:
+        """Names of the pressures in lines that end in a chamber."""
+        rig = self.model.rig
+        known, place = core_rig(rig).states, named("chamber", chamber)
+        lines = [name for name, ports in rig.ports("line").items() if ports["to"] == place]
+        return [name for name in (named("line_pressure", n) for n in lines) if name in known]
 
     def _opened(self, group: Group) -> float:
         """The command that opens a group that is not used to the ambient."""

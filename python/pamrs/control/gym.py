@@ -1,22 +1,24 @@
-"""Gymnasium environments: one arm, and many of them in one :class:`pamrs.Batch`.
+"""Gymnasium environments: one rig, and many of them in one :class:`pamrs.Batch`.
 
 Importing this module registers ``pamrs/Shoulder-v0``;
-``gymnasium.make("pamrs.control.gym:pamrs/Shoulder-v0")`` imports it too.
+``gymnasium.make("pamrs.control.gym:pamrs/Shoulder-v0")`` imports it too. Any rig with joints, or a
+hanging mass, behind valves or regulators is an environment: ``RigEnv(rig)``.
 
-**Task.** Follow a lift, hold and return to an angle that is drawn at each reset, or a trajectory
-that is given.
+**Task.** Follow a lift, hold and return to an angle that is drawn at each reset, of several joints
+one for each, or trajectories that are given. A mass that hangs is followed by its muscle's length.
 
-**Action.** Opening of the valve, from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V), held
-for one sample.
+**Action.** One number for every valve and regulator, held for one sample: the opening of a valve,
+from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V); the set pressure of a regulator, from
+-1 (ambient) to 1 (the pressure limit).
 
-**Observation.** Joint angle [rad], joint rate [rad/s], muscle pressure [Pa, gauge], reference angle
-[rad] and its rate [rad/s], and the opening that was held last, which the reward asks for; kept
-within the bounds of the space: the stops with 0.2 rad of give, 30 rad/s, vacuum and twice the
-supply.
+**Observation.** Joint angles [rad], joint rates [rad/s], chamber pressures [Pa, gauge], reference
+angles [rad] and their rates [rad/s], and the actions that were held last, which the reward asks
+for; the names of all are in ``env.names``. Kept within the bounds of the space: the stops with 0.2
+rad of give, 30 rad/s (0.05 m, 5 m/s of a length), vacuum and twice the supply or the limit.
 
-**Reward.** ``-(error^2 + effort * change^2)`` for each sample: error [rad] after the step, change
-of the opening since the last one. A plant that leaves the range of its model costs ``penalty``
-more.
+**Reward.** ``-(error^2 + effort * change^2)`` for each sample, summed over joints and actions:
+error [rad] (or [m]) after the step, change of the action since the last one. A plant that leaves
+the range of its model costs ``penalty`` more.
 
 **End.** *Terminated* when the plant leaves the range of its model; *truncated* when the record is
 over.
@@ -25,16 +27,19 @@ over.
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import channel_of, dotted, unit_of
+from pamrs.control._protocol import keywords_of
 from pamrs.control._values import positive_number
-from pamrs.control.trajectories import Trajectory, lift_hold_return
+from pamrs.control.trajectories import JointTrajectories, Trajectory, lift_hold_return
 from pamrs.errors import ParameterError, SimulationError, missing_package
 from pamrs.rig import Rig
-from pamrs.simulation import Simulator
+from pamrs.simulation import Simulator, core_rig
 
 try:
     import gymnasium
@@ -43,12 +48,50 @@ try:
 except ImportError as error:
     raise missing_package(error, "control") from error
 
-__all__ = ["ID", "ShoulderEnv", "ShoulderVectorEnv"]
+__all__ = ["ID", "RigEnv", "RigVectorEnv", "ShoulderEnv", "ShoulderVectorEnv"]
 
 ID = "pamrs/Shoulder-v0"
 
 Array = NDArray[np.float64]
 Array32 = NDArray[np.float32]
+
+
+class _Moved(NamedTuple):
+    """A joint, or a load's length."""
+
+    name: str
+    angle: str
+    rate: str
+    low: float
+    high: float
+    give: float
+    fastest: float
+
+
+def _moved(rig: Rig) -> list[_Moved]:
+    """What of a rig follows a trajectory."""
+    found = [
+        _Moved(
+            name,
+            dotted("joint_angle", name),
+            dotted("joint_rate", name),
+            float(table["min_angle"]),
+            float(table["max_angle"]),
+            0.2,
+            30.0,
+        )
+        for name, table in rig.tables("joint").items()
+    ]
+    for table in rig.tables("load").values():
+        if table.get("kind", "mass") == "mass":
+            ends = float(table["min_length"]), float(table["max_length"])
+            found.append(_Moved("", "length", "length_rate", *ends, 0.05, 5.0))
+    if not found or not core_rig(rig).inputs:
+        raise ParameterError(
+            f"rig {rig.name!r} is not allowed: joints or a mass that hangs, and a valve or "
+            "regulator, are needed"
+        )
+    return found
 
 
 class _Task:
@@ -57,33 +100,18 @@ class _Task:
     def __init__(
         self,
         rig: Rig | None,
-        trajectory: Trajectory | None,
-        targets: tuple[float, float] | None,
+        trajectory: Any,
+        targets: Any,
         sample_time: float,
         effort: float,
         penalty: float,
+        pressure_limit: float | None,
     ) -> None:
         from pamrs import rigs
 
         self.rig = rigs.shoulder() if rig is None else rig
-        joints, valves = self.rig.tables("joint"), self.rig.tables("valve")
-        if any(set(tables) != {""} for tables in (joints, valves, self.rig.tables("chamber"))):
-            raise ParameterError(
-                f"rig {self.rig.name!r} is not allowed: one joint, one valve and one chamber, "
-                "without names, are needed"
-            )
-        joint = joints[""]
-        self.low, self.high = float(joint["min_angle"]), float(joint["max_angle"])
-        self.rest = float(joint["rest_angle"])
-        reach = self.high - self.low
-        self.targets = (
-            (self.low + 0.2 * reach, self.low + 0.6 * reach) if targets is None else targets
-        )
-        if not self.low <= self.targets[0] <= self.targets[1] <= self.high:
-            raise ParameterError(
-                f"targets = {targets} is not allowed: rising, from {self.low:g} to {self.high:g} "
-                "rad"
-            )
+        self.moved = _moved(self.rig)
+        self.targets = self._targets(targets)
         if not (
             math.isfinite(effort) and effort >= 0.0 and math.isfinite(penalty) and penalty >= 0.0
         ):
@@ -91,77 +119,192 @@ class _Task:
                 f"effort = {effort} and penalty = {penalty} are not allowed: zero or more is needed"
             )
         sample_time = positive_number("sample_time", sample_time)
-        self.trajectory, self.sample_time, self.effort, self.penalty = (
-            trajectory,
-            sample_time,
-            effort,
-            penalty,
-        )
-        self.null, self.range = (float(valves[""][key]) for key in ("null_voltage", "half_range"))
-        length = 15.0 if trajectory is None else trajectory.duration
+        self.trajectory = self._given(trajectory)
+        self.sample_time, self.effort, self.penalty = sample_time, effort, penalty
+        self.inputs = tuple(core_rig(self.rig).inputs)
+        self.middle, self.range, most = self._commands(pressure_limit)
+        length = 15.0 if self.trajectory is None else self.trajectory.duration
         self.samples = math.floor(length / sample_time + 1e-9)
         if self.samples < 1:
             raise ParameterError(
                 f"sample_time = {sample_time} s is not allowed: the record of {length:g} s needs "
                 "one sample at least"
             )
-        supply = max(
-            float(table["initial_pressure"]) for table in self.rig.tables("supply").values()
-        )
-        ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
-        least = [self.low - 0.2, -30.0, -ambient, self.low - 0.2, -30.0, -1.0]
-        most = [self.high + 0.2, 30.0, 2.0 * supply, self.high + 0.2, 30.0, 1.0]
-        self.observed = gymnasium.spaces.Box(
-            np.array(least, dtype=np.float32), np.array(most, dtype=np.float32), dtype=np.float32
-        )
-        self.acted = gymnasium.spaces.Box(-1.0, 1.0, (1,), dtype=np.float32)
+        self.pressures = [dotted("muscle_pressure", name) for name in self.rig.tables("chamber")]
+        self.observed, self.names = self._observed(most)
+        self.acted = gymnasium.spaces.Box(-1.0, 1.0, (len(self.inputs),), dtype=np.float32)
+        first = Simulator(self.rig, sample_time=sample_time).observe()
+        self.rest = [first[one.angle] for one in self.moved]
 
-    def draw(self, random: np.random.Generator) -> Trajectory:
+    def _targets(self, given: Any) -> list[tuple[float, float]]:
+        """Range of the highest angle of every joint."""
+        if isinstance(given, Mapping):
+            names = [one.name for one in self.moved]
+            if sorted(given) != sorted(names):
+                raise ParameterError(
+                    f"targets has {', '.join(map(repr, given))}; the joints are "
+                    f"{', '.join(map(repr, names))}"
+                )
+            each = [given[name] for name in names]
+        else:
+            each = [given] * len(self.moved)
+        found = []
+        for one, pair in zip(self.moved, each, strict=True):
+            reach = one.high - one.low
+            low, high = (one.low + 0.2 * reach, one.low + 0.6 * reach) if pair is None else pair
+            if not one.low <= low <= high <= one.high:
+                raise ParameterError(
+                    f"targets = {given} is not allowed: rising, from {one.low:g} to {one.high:g} "
+                    f"{unit_of(one.angle)}"
+                )
+            found.append((low, high))
+        return found
+
+    def _given(self, trajectory: Any) -> Trajectory | JointTrajectories | None:
+        """A trajectory for every joint."""
+        if isinstance(trajectory, JointTrajectories):
+            trajectory = trajectory.of_joint
+        names = [one.name for one in self.moved]
+        if trajectory is None or (isinstance(trajectory, Trajectory) and len(names) == 1):
+            return trajectory
+        if not isinstance(trajectory, Mapping) or sorted(trajectory) != sorted(names):
+            raise ParameterError(
+                "trajectory is not allowed: a mapping of "
+                f"{', '.join(map(repr, names))} to a trajectory each is needed"
+            )
+        return JointTrajectories({name: trajectory[name] for name in names})
+
+    def _commands(self, limit: float | None) -> tuple[Array, Array, float]:
+        """Middle and half range of every command, and the largest pressure [Pa]."""
+        supplies = self.rig.tables("supply")
+        most = max(float(table["initial_pressure"]) for table in supplies.values())
+        ends = []
+        for name in self.inputs:
+            block = name.partition(".")[2]
+            if channel_of(name) == "valve_command":
+                valve = self.rig.tables("valve")[block]
+                ends.append((float(valve["null_voltage"]), float(valve["half_range"])))
+                continue
+            limit = self.rig.limits.get("max_pressure") if limit is None else limit
+            if limit is None:
+                raise ParameterError(
+                    f"rig {self.rig.name!r} has a regulator: give pressure_limit, or [limits] "
+                    "max_pressure in the rig"
+                )
+            limit = positive_number("pressure_limit", limit)
+            most = max(most, limit)
+            ends.append((0.5 * limit, 0.5 * limit))
+        middle, half = np.array(ends).T
+        return middle, half, most
+
+    def _observed(self, most: float) -> tuple[Any, tuple[str, ...]]:
+        """The space of observations, and the name of each."""
+        ambient = float(self.rig.tables("gas")[""]["ambient_pressure"])
+        angles = [(m.angle, m.low - m.give, m.high + m.give) for m in self.moved]
+        rates = [(m.rate, -m.fastest, m.fastest) for m in self.moved]
+        bounds = [
+            *angles,
+            *rates,
+            *((name, -ambient, 2.0 * most) for name in self.pressures),
+            *(
+                (dotted("reference", m.name), low, high)
+                for m, (_, low, high) in zip(self.moved, angles, strict=True)
+            ),
+            *((dotted("reference_rate", m.name), -m.fastest, m.fastest) for m in self.moved),
+            *((name, -1.0, 1.0) for name in self.inputs),
+        ]
+        least, largest = (np.array([row[k] for row in bounds], dtype=np.float32) for k in (1, 2))
+        names = tuple(row[0] for row in bounds)
+        return gymnasium.spaces.Box(least, largest, dtype=np.float32), names
+
+    def draw(self, random: np.random.Generator) -> Trajectory | JointTrajectories:
         """The trajectory of an episode."""
-        target = float(
-            random.uniform(*self.targets)
-        )  # drawn also where it is not used, so that seeds mean the same
+        # drawn also where it is not used, so that seeds mean the same
+        each = [float(random.uniform(*pair)) for pair in self.targets]
         if self.trajectory is not None:
             return self.trajectory
-        return lift_hold_return(self.rest, target, duration=15.0)
+        made = {
+            one.name: lift_hold_return(rest, target, duration=15.0)
+            for one, rest, target in zip(self.moved, self.rest, each, strict=True)
+        }
+        return made[self.moved[0].name] if len(made) == 1 else JointTrajectories(made)
 
-    def seen(self, sample: dict[str, Any], angle: Any, rate: Any, opening: Any) -> Array32:
-        """The observation, kept in its space."""
+    def held_first(self) -> Array:
+        """Actions before the first one: valves closed, regulators as they begin."""
+        found = []
+        for k, name in enumerate(self.inputs):
+            value = self.middle[k]
+            if channel_of(name) == "supply_command":
+                table = self.rig.tables("supply")[name.partition(".")[2]]
+                value = float(table["initial_pressure"])
+            found.append((value - self.middle[k]) / self.range[k])
+        return np.asarray(np.clip(found, -1.0, 1.0), dtype=np.float64)
+
+    def seen(self, sample: dict[str, Any], angle: Any, rate: Any, actions: Any) -> Array32:
+        """The observation, kept in its space; angles, rates and actions along the first axis."""
         values = [
-            sample["joint_angle"],
-            sample["joint_rate"],
-            sample["muscle_pressure"],
-            angle,
-            rate,
-            opening,
+            *(sample[one.angle] for one in self.moved),
+            *(sample[one.rate] for one in self.moved),
+            *(sample[name] for name in self.pressures),
+            *angle,
+            *rate,
+            *actions,
         ]
         space = self.observed
         return np.clip(np.stack(values, axis=-1).astype(np.float32), space.low, space.high)
 
-    def worth(self, error: Any, change: Any) -> Any:
-        """The reward of a sample."""
-        return -(error * error + self.effort * change * change)
+    def errors(self, sample: dict[str, Any], angle: Any) -> Array:
+        """Reference less angle of every joint, along the first axis."""
+        return np.array(
+            [wanted - sample[one.angle] for one, wanted in zip(self.moved, angle, strict=True)]
+        )
 
-    def volts(self, opening: Any) -> Any:
-        """The valve's command."""
-        return self.null + self.range * opening
+    def worth(self, error: Array, change: Array) -> Any:
+        """The reward of a sample, of arrays along their first axis."""
+        return -((error * error).sum(axis=0) + self.effort * (change * change).sum(axis=0))
+
+    def commands(self, actions: Array) -> Array:
+        """Commands of actions, along the first axis."""
+        shape = (-1,) + (1,) * (actions.ndim - 1)
+        made: Array = self.middle.reshape(shape) + self.range.reshape(shape) * actions
+        return made
+
+    def keywords(self, commands: Array) -> dict[str, Any]:
+        """The same as keywords of a step."""
+        values = commands if commands.ndim > 1 else commands.tolist()
+        return keywords_of(dict(zip(self.inputs, values, strict=True)))
+
+    def told(self, values: Array) -> Any:
+        """Values along the first axis as they are told: plants first, one of them by itself."""
+        if len(values) == 1:
+            return values[0] if values.ndim > 1 else float(values[0])
+        return values.T
+
+    def info(self, error: Array, commands: Array) -> dict[str, Any]:
+        """What is told of a step."""
+        name = channel_of(self.inputs[0]) if len(self.inputs) == 1 else "commands"
+        return {"error": self.told(error), name: self.told(commands)}
 
 
-class ShoulderEnv(gymnasium.Env[Array32, Array32]):
-    """One arm with one valve; see the module for actions, observations, rewards and ends.
+class RigEnv(gymnasium.Env[Array32, Array32]):
+    """One rig; see the module for actions, observations, rewards and ends.
 
     Parameters
     ----------
     rig : Rig, optional
         The plant; the shoulder by default.
-    trajectory : Trajectory, optional
-        What to follow; by default lifts of 15 s to an angle that is drawn from ``targets``.
-    targets : (float, float), optional
-        Range of that angle [rad]; a fifth to three fifths of the way between the stops by default.
+    trajectory : Trajectory, JointTrajectories, or mapping of str to Trajectory, optional
+        What to follow, of several joints one for each; by default lifts of 15 s to an angle that is
+        drawn from ``targets``.
+    targets : (float, float), or mapping of str to that, optional
+        Range of that angle [rad], one for all joints or one for each; a fifth to three fifths of
+        the way between the stops by default.
     sample_time : float
         Time that an action is held [s].
     effort, penalty : float
         Of the reward.
+    pressure_limit : float, optional
+        Largest set pressure of a regulator [Pa]; by default ``max_pressure`` of ``[limits]``.
 
     Raises
     ------
@@ -176,20 +319,31 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
     def __init__(
         self,
         rig: Rig | None = None,
-        trajectory: Trajectory | None = None,
+        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
         *,
-        targets: tuple[float, float] | None = None,
+        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
         sample_time: float = 0.02,
         effort: float = 0.01,
         penalty: float = 100.0,
+        pressure_limit: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         _check_render_mode(render_mode)
         self.render_mode = None
-        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty)
+        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self.observation_space, self.action_space = self._task.observed, self._task.acted
         self._simulator = Simulator(self._task.rig, sample_time=sample_time)
-        self._trajectory: Trajectory | None = None
+        self._trajectory: Trajectory | JointTrajectories | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of every number of an observation."""
+        return self._task.names
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Name of the command of every number of an action."""
+        return self._task.inputs
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -205,60 +359,68 @@ class ShoulderEnv(gymnasium.Env[Array32, Array32]):
 
         Returns
         -------
-        observation : ndarray, shape (6,)
+        observation : ndarray, shape (len(names),)
         info : dict
-            ``target`` [rad], the highest angle of the trajectory.
+            ``target`` [rad], the highest angle of the trajectory, (joints,) of several.
         """
         super().reset(seed=None if seed is None else int(seed))
         self._trajectory = self._task.draw(self.np_random)
-        self._k, self._opening = 0, 0.0
+        self._k, self._actions = 0, self._task.held_first()
         sample = self._simulator.reset()
-        wanted = self._trajectory(0.0)
-        return self._task.seen(sample, wanted.angle, wanted.rate, self._opening), {
-            "target": _target(self._trajectory)
+        angle, rate = _wanted(self._trajectory, 0.0)
+        return self._task.seen(sample, angle, rate, self._actions), {
+            "target": self._task.told(_target(self._trajectory))
         }
 
     def step(self, action: Array32) -> tuple[Array32, float, bool, bool, dict[str, Any]]:
-        """Hold an opening for one sample.
+        """Hold an action for one sample.
 
         Parameters
         ----------
-        action : ndarray, shape (1,)
+        action : ndarray, shape (len(inputs),)
             From -1 to 1; kept within.
 
         Returns
         -------
         observation, reward, terminated, truncated, info
-            ``info`` has the ``error`` [rad] and the ``valve_command`` [V].
+            ``info`` has the ``error`` [rad], of several joints shape (joints,), and the
+            ``valve_command`` [V] or ``supply_command`` [Pa], of several ``commands`` in the order
+            of :attr:`inputs`.
 
         Raises
         ------
         ParameterError
-            If the action is not one finite number, or the environment was not reset.
+            If the action has not one finite number for each command, or the environment was not
+            reset.
         """
         if self._trajectory is None:
             raise ParameterError("step was called before reset")
-        opening = float(_openings(action, 1)[0])
+        task = self._task
+        actions = _actions(action, (len(task.inputs),))
+        commands = task.commands(actions)
         failed = False
         try:
-            sample = self._simulator.step(self._task.volts(opening))
+            sample = self._simulator.step(**task.keywords(commands))
         except SimulationError:
             failed, sample = True, self._simulator.observe()
         self._k += 1
-        wanted = self._trajectory(self._k * self._task.sample_time)
-        error = float(wanted.angle) - sample["joint_angle"]
-        reward = float(self._task.worth(error, opening - self._opening)) - (
-            self._task.penalty if failed else 0.0
+        angle, rate = _wanted(self._trajectory, self._k * task.sample_time)
+        error = task.errors(sample, angle)
+        reward = float(task.worth(error, actions - self._actions))
+        self._actions = actions
+        seen, over = task.seen(sample, angle, rate, actions), self._k >= task.samples
+        return (
+            seen,
+            reward - (task.penalty if failed else 0.0),
+            failed,
+            not failed and over,
+            task.info(error, commands),
         )
-        self._opening = opening
-        info = {"error": error, "valve_command": self._task.volts(opening)}
-        seen = self._task.seen(sample, wanted.angle, wanted.rate, opening)
-        return seen, reward, failed, not failed and self._k >= self._task.samples, info
 
 
-class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
-    """Many arms in one :class:`pamrs.Batch`; arm ``i`` of a reset with ``seed`` is
-    :class:`ShoulderEnv` reset with ``seed + i``, to some 1e-9 where the batch runs in lanes.
+class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
+    """Many rigs in one :class:`pamrs.Batch`; rig ``i`` of a reset with ``seed`` is :class:`RigEnv`
+    reset with ``seed + i``, to some 1e-9 where the batch runs in lanes.
 
     All episodes begin and end together: the batch has one clock. When one plant leaves the range of
     its model, that one is terminated and all others are truncated. The step after an end begins the
@@ -267,9 +429,9 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     Parameters
     ----------
     num_envs : int
-        How many arms.
-    rig, trajectory, targets, sample_time, effort, penalty
-        As for :class:`ShoulderEnv`.
+        How many rigs.
+    rig, trajectory, targets, sample_time, effort, penalty, pressure_limit
+        As for :class:`RigEnv`.
 
     Raises
     ------
@@ -283,19 +445,20 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self,
         num_envs: int = 1,
         rig: Rig | None = None,
-        trajectory: Trajectory | None = None,
+        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
         *,
-        targets: tuple[float, float] | None = None,
+        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
         sample_time: float = 0.02,
         effort: float = 0.01,
         penalty: float = 100.0,
+        pressure_limit: float | None = None,
         render_mode: str | None = None,
     ) -> None:
         from pamrs.simulation import Batch
 
         _check_render_mode(render_mode)
         self.render_mode = None
-        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty)
+        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
         self.num_envs = num_envs
         self.single_observation_space, self.single_action_space = (
@@ -305,7 +468,7 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self.observation_space = batch_space(self._task.observed, num_envs)
         self.action_space = batch_space(self._task.acted, num_envs)
         self._randoms = [np.random.default_rng() for _ in range(num_envs)]
-        self._trajectories: list[Trajectory] = []
+        self._trajectories: list[Trajectory | JointTrajectories] = []
         self._over = False
 
     def reset(
@@ -322,9 +485,9 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
         Returns
         -------
-        observations : ndarray, shape (n, 6)
+        observations : ndarray, shape (n, len(names))
         infos : dict
-            ``target`` [rad], shape (n,).
+            ``target`` [rad], shape (n,), of several joints (n, joints).
         """
         if seed is not None:
             seeds = (
@@ -344,27 +507,29 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     def _begin(self) -> tuple[Array32, dict[str, Any]]:
         self._trajectories = [self._task.draw(random) for random in self._randoms]
         self._k, self._over = 0, False
-        self._openings = np.zeros(self.num_envs)
+        self._actions = np.repeat(self._task.held_first()[:, None], self.num_envs, axis=1)
         angle, rate = self._wanted()
-        targets = np.array([_target(trajectory) for trajectory in self._trajectories])
-        seen = self._task.seen(self._batch.reset(), angle, rate, self._openings)
-        return seen, {"target": targets, "_target": np.ones(self.num_envs, dtype=np.bool_)}
+        targets = np.array([_target(trajectory) for trajectory in self._trajectories]).T
+        seen = self._task.seen(self._batch.reset(), angle, rate, self._actions)
+        return seen, {
+            "target": self._task.told(targets),
+            "_target": np.ones(self.num_envs, dtype=np.bool_),
+        }
 
     def _wanted(self) -> tuple[Array, Array]:
         now = self._k * self._task.sample_time
-        points = np.array(
-            [trajectory(now)[:2] for trajectory in self._trajectories], dtype=np.float64
-        )
-        return points[:, 0], points[:, 1]
+        points = np.array([_wanted(trajectory, now) for trajectory in self._trajectories])
+        angle, rate = points.transpose(1, 2, 0)
+        return angle, rate
 
     def step(
         self, actions: Array32
     ) -> tuple[Array32, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Hold an opening of every arm for one sample.
+        """Hold an action of every rig for one sample.
 
         Parameters
         ----------
-        actions : ndarray, shape (n, 1)
+        actions : ndarray, shape (n, len(inputs))
 
         Returns
         -------
@@ -381,24 +546,26 @@ class ShoulderVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         if self._over:
             seen, info = self._begin()
             return seen, np.zeros(self.num_envs), none, none.copy(), info
-        openings = _openings(actions, self.num_envs)
-        sample = self._batch.step(self._task.volts(openings))
+        task = self._task
+        held = _actions(actions, (self.num_envs, len(task.inputs))).T
+        commands = task.commands(held)
+        sample = self._batch.step(**task.keywords(commands))
         self._k += 1
         failed = np.array([status is not None for status in self._batch.status], dtype=np.bool_)
         angle, rate = self._wanted()
-        error = angle - sample["joint_angle"]
-        reward = self._task.worth(error, openings - self._openings) - self._task.penalty * failed
-        self._openings = openings
-        self._over = bool(failed.any()) or self._k >= self._task.samples
+        error = task.errors(sample, angle)
+        reward = task.worth(error, held - self._actions) - task.penalty * failed
+        self._actions = held
+        self._over = bool(failed.any()) or self._k >= task.samples
         truncated = ~failed if self._over else none
         there = np.ones(self.num_envs, dtype=np.bool_)
-        info = {
-            "error": error,
-            "_error": there,
-            "valve_command": self._task.volts(openings),
-            "_valve_command": there,
-        }
-        return self._task.seen(sample, angle, rate, openings), reward, failed, truncated, info
+        told = task.info(error, commands)
+        info = {**told, **{f"_{name}": there for name in told}}
+        return task.seen(sample, angle, rate, held), reward, failed, truncated, info
+
+
+#: The environments of the shoulder, by the names that they had first.
+ShoulderEnv, ShoulderVectorEnv = RigEnv, RigVectorEnv
 
 
 def _check_render_mode(render_mode: str | None) -> None:
@@ -410,19 +577,29 @@ def _check_render_mode(render_mode: str | None) -> None:
         )
 
 
-def _target(trajectory: Trajectory) -> float:
-    """The highest angle of a trajectory [rad]."""
-    return float(np.max(trajectory.sampled(trajectory.duration / 200.0)[1].angle))
+def _wanted(trajectory: Trajectory | JointTrajectories, time: float) -> tuple[Array, Array]:
+    """Reference angle and rate of every joint."""
+    angle, rate, _ = trajectory(time)
+    return np.atleast_1d(angle), np.atleast_1d(rate)
 
 
-def _openings(action: Any, n: int) -> Array:
+def _target(trajectory: Trajectory | JointTrajectories) -> Array:
+    """The highest angle of every joint [rad]."""
+    each = (
+        trajectory.of_joint.values() if isinstance(trajectory, JointTrajectories) else [trajectory]
+    )
+    return np.array([np.max(one.sampled(one.duration / 200.0)[1].angle) for one in each])
+
+
+def _actions(action: Any, shape: tuple[int, ...]) -> Array:
     values = np.asarray(action, dtype=np.float64)
-    if values.shape not in ((n, 1), (n,)) or not np.isfinite(values).all():
+    flat = shape[:-1] if shape[-1] == 1 else shape
+    if values.shape not in (shape, flat) or not np.isfinite(values).all():
         raise ParameterError(
-            f"action with the shape {values.shape} is not allowed: ({n}, 1) finite numbers are "
+            f"action with the shape {values.shape} is not allowed: {shape} finite numbers are "
             "needed"
         )
-    return np.clip(values.reshape(n), -1.0, 1.0)
+    return np.clip(values.reshape(shape), -1.0, 1.0)
 
 
 if ID not in gymnasium.registry:

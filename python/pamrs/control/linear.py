@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
 from pamrs.errors import ParameterError
@@ -204,16 +204,17 @@ def equilibrium(
 
 def linearise(
     rig: Rig,
-    angle: float,
+    angle: float | None = None,
     *,
     side: str = "mean",
     friction: str = "rest",
-    held: tuple[str, ...] = ("supply_pressure",),
+    held: tuple[str, ...] | None = None,
     joint: str = "",
     chamber: str = "",
     initial: Mapping[str, float] | None = None,
 ) -> LinearModel:
-    """A rig about an angle that it holds with its valves closed.
+    """A rig about an angle that it holds with its valves closed, its regulators set to what they
+    have.
 
     A and B are the exact derivatives of the core's state equation, by dual numbers, with whatever
     effects are in the rig: what they move (a lag, a delay, a creeping strain, a mounting that gives
@@ -229,17 +230,19 @@ def linearise(
     Parameters
     ----------
     rig : Rig
-        As for :func:`equilibrium`.
-    angle : float
-        The true one [rad], whatever the zero of its sensor.
+        As for :func:`equilibrium`; any with valves or regulators where no angle is given.
+    angle : float, optional
+        The true one [rad], whatever the zero of its sensor. Without, ``initial`` holds the rig:
+        that of :meth:`pamrs.control.RigController.holding`, for example.
     side : {"mean", "fill", "vent"}
         Slope by the opening above, below, or on both sides of the valve's null.
     friction : {"rest", "moving"}
         Dry friction as it is at rest, or as in a motion that does not turn round: without Coulomb
         friction, ``joint_coulomb_stribeck`` and ``muscle_hysteresis``.
-    held : tuple of str
-        Kinds of states (or effects) that are regarded as constant; the tank's pressure by default,
-        a slow one with an eigenvalue of zero.
+    held : tuple of str, optional
+        States, kinds of states or effects that are regarded as constant. By default the pressures
+        of supplies, slow ones with an eigenvalue of zero, but not that of a regulator that feeds a
+        chamber by itself: it is how the rig is driven.
     joint, chamber, initial
         As for :func:`equilibrium`; of several joints each has to rest, so that ``initial`` must
         hold the others.
@@ -254,7 +257,7 @@ def linearise(
     ParameterError
         As :func:`equilibrium`, or if the side or the friction is unknown, the rig has an effect
         without a linear model (play, dead zone, relay: the message names it), another joint does
-        not rest, or a command moves nothing.
+        not rest, or a command moves nothing; if there is neither an angle nor ``initial``.
     """
     if side not in SIDES:
         raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
@@ -262,22 +265,43 @@ def linearise(
         raise ParameterError(
             f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}"
         )
-    check_smooth(rig, supplies="supply_pressure" not in held)
+    constant = _held_supplies(rig) if held is None else held
+
+    def is_held(name: str) -> bool:
+        return name in constant or channel_of(name) in constant
+
+    moving = [name for name in rig.tables("supply") if not is_held(dotted("supply_pressure", name))]
+    check_smooth(rig, supplies=bool(moving))
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
-    start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
-    simulator, commands = Simulator(rig, sample_time=_SAMPLE, initial=start), _closed(rig)
+    if angle is not None:
+        start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
+    elif initial:
+        start = dict(initial)
+    else:
+        raise ParameterError(
+            "angle is missing: give the angle that the rig holds, or initial values that hold it "
+            "(RigController.holding)"
+        )
+    simulator = Simulator(rig, sample_time=_SAMPLE, initial=start)
     first = simulator.observe()
+    commands = {**_closed(rig), **_kept(rig, first)}
     _check_rest(simulator, commands)
     (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
-    free = [k for k, name in enumerate(states) if channel_of(name) not in held]
-    read = [k for k, name in enumerate(outputs) if channel_of(name) not in held]
-    a, b, c = a[np.ix_(free, free)], b[free], c[np.ix_(read, free)]
+    free = [k for k, name in enumerate(states) if not is_held(name)]
+    read = [k for k, name in enumerate(outputs) if not is_held(name)]
+    driving = [
+        k
+        for k, name in enumerate(inputs)
+        if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
+    ]
+    inputs = [inputs[k] for k in driving]
+    a, b, c = a[np.ix_(free, free)], b[np.ix_(free, driving)], c[np.ix_(read, free)]
     named = [row for row, k in enumerate(free) if states[k] in outputs]
     for k, name in enumerate(inputs):
         if not set(heard(a.T, b[:, k])) & set(named):
             raise ParameterError(
-                f"{name} moves nothing about {commands[name]:g} V (side = {side!r}): no linear "
-                "model is there"
+                f"{name} moves nothing about {commands[name]:g} {unit_of(name)} (side = "
+                f"{side!r}): no linear model is there"
             )
     # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
     felt = np.abs(c).sum(axis=0)
@@ -289,17 +313,36 @@ def linearise(
     )
 
 
+def _held_supplies(rig: Rig) -> tuple[str, ...]:
+    """Supplies that change slowly, or not by a command: all but regulators without a valve."""
+    behind = {ports["from"] for ports in rig.ports("valve").values()}
+    return tuple(
+        dotted("supply_pressure", name)
+        for name, table in rig.tables("supply").items()
+        if table.get("kind") != "regulator" or dotted("supply", name) in behind
+    )
+
+
+def _kept(rig: Rig, sample: Mapping[str, float]) -> dict[str, float]:
+    """Every regulator set to the pressure that it has."""
+    return {
+        dotted("supply_command", name): sample[dotted("supply_pressure", name)]
+        for name, table in rig.tables("supply").items()
+        if table.get("kind") == "regulator"
+    }
+
+
 def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
-    """Refuse a state in which a joint does not rest."""
+    """Refuse a state in which a joint or a load does not rest."""
     state = simulator.state
     block = simulator._advance(1, {name: np.array([value]) for name, value in commands.items()})
     simulator.restore(state)
     for name, values in block.items():
-        if channel_of(name) == "joint_rate" and not abs(values[0]) < _REST:
+        if channel_of(name) in ("joint_rate", "length_rate") and not abs(values[0]) < _REST:
             raise ParameterError(
-                f"{name} is {values[0]:.3g} rad/s a quarter of a millisecond after the start: the "
-                "joint does not rest; give initial values that hold it: those of equilibrium for "
-                "each joint in turn, until none moves"
+                f"{name} is {values[0]:.3g} {unit_of(name)} a quarter of a millisecond after the "
+                "start: the joint does not rest; give initial values that hold it: those of "
+                "RigController.holding, or of equilibrium for each joint in turn, until none moves"
             )
 
 

@@ -21,9 +21,11 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
+from pamrs.control._live_commands import Command, LiveCommands, pair
+from pamrs.control._loop import trajectories_of
+from pamrs.control._protocol import Controller, Reference, check_controller
 from pamrs.control._termination import Termination
-from pamrs.control.trajectories import Trajectory, check_angles
+from pamrs.control.trajectories import JointTrajectories, Trajectory, check_angles
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.simulation import whole_samples
 
@@ -66,8 +68,11 @@ class Device(Protocol):
         missed reading.
         """
 
-    def write(self, command: float) -> None:
-        """Hold a command from now on."""
+    def write(self, command: Any) -> None:
+        """Hold a command from now on: a number where the controller has one command (volts of a
+        valve), else a mapping with a number for each by its name, ``{"valve_command.flexor": 5.0,
+        "valve_command.extensor": 5.0}``; all of them, always.
+        """
 
 
 class Clock(Protocol):
@@ -105,8 +110,10 @@ class LiveRun:
         system). Interrupted by Ctrl-C, failed in :attr:`LiveError.run` only.
     time : ndarray, shape (rows,)
         Nominal time of each period [s].
-    reference, command : ndarray, shape (rows,)
-        Reference angle [rad] and what the plant was told to hold.
+    reference : ndarray, shape (rows,)
+        Reference angle [rad]; of several joints (joints, rows).
+    command : ndarray, shape (rows,), or mapping of str to ndarray
+        What the plant was told to hold; of several commands each by its name.
     channels : mapping of str to ndarray, shape (rows,)
         What was read; NaN where nothing was.
     late : ndarray, shape (rows,)
@@ -115,7 +122,7 @@ class LiveRun:
         Periods without a usable reading, those left out by overruns not counted.
     overruns : int
         Periods left out because the loop came more than a period late.
-    safe_command : float
+    safe_command : float or dict of str to float
         What was written at the end.
     stall : float
         Largest lateness of all, periods that were left out included [s].
@@ -124,12 +131,12 @@ class LiveRun:
     reason: str
     time: Array
     reference: Array
-    command: Array
+    command: Any
     channels: Mapping[str, Array] = field(repr=False)
     late: Array = field(repr=False)
     missed: int
     overruns: int
-    safe_command: float
+    safe_command: Any
     stall: float
 
     @property
@@ -148,11 +155,11 @@ class LiveRun:
 def run_live(
     device: Device,
     controller: Controller,
-    trajectory: Trajectory,
+    trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories,
     duration: float | None = None,
     *,
-    safe: float = 5.0,
-    limits: tuple[float, float] = (0.0, 10.0),
+    safe: Command | None = None,
+    limits: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
     most_missed: int = 5,
     stamp: str | None = None,
     plausible: Mapping[str, tuple[float, float]] | None = None,
@@ -170,16 +177,22 @@ def run_live(
     device : Device
         Anything with ``read()`` and ``write(command)``.
     controller : Controller
-        For one plant; it is reset first. It answers what the device takes, volts: one that answers
-        a pressure belongs in a :class:`pamrs.control.Cascade`.
-    trajectory : Trajectory
+        For one plant; it is reset first. It answers what the device takes: volts of a valve, or
+        every command of a rig, as a :class:`pamrs.control.RigController` does. One that answers a
+        pressure belongs in a :class:`pamrs.control.Cascade`.
+    trajectory : Trajectory, JointTrajectories, or mapping of str to Trajectory
+        Of several joints one for each name.
     duration : float, optional
         [s], a multiple of the controller's period; the trajectory's by default.
-    safe : float
-        The command that is safe: 5 V closes the valve and keeps the air, 0 V vents the muscle, and
-        the arm comes down.
-    limits : (float, float)
-        Commands are kept within; the safe one too.
+    safe : float or mapping of str to float, optional
+        The command that is safe, one for all or each by its name, ``valve_command.flexor``. By
+        default 5 V, which closes the valve and keeps the air (0 V vents the muscle, and the arm
+        comes down); of a :class:`pamrs.control.RigController` the null of every valve of its rig,
+        and 0 Pa of a regulator, as nothing else is sure to be had: the arm comes down.
+    limits : (float, float) or mapping of str to (float, float), optional
+        Commands are kept within; the safe ones too. By default 0 to 10 V; of a
+        :class:`pamrs.control.RigController` the range of every valve, and of a regulator 0 to the
+        model's pressure limit.
     most_missed : int
         Readings missed in a row that are borne; one more is a lost sensor. Periods left out by an
         overrun count too.
@@ -250,54 +263,46 @@ class _Loop:
         self,
         device: Device,
         controller: Controller,
-        trajectory: Trajectory,
+        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories,
         duration: float | None,
-        safe: float,
-        limits: tuple[float, float],
+        safe: Command | None,
+        limits: Any,
         most_missed: int,
         stamp: str | None,
         plausible: Mapping[str, tuple[float, float]] | None,
         clock: Clock,
     ) -> None:
         check_controller(controller)
-        check_drives_valve(controller)
-        low, high = _pair("limits", limits)
-        if not low <= safe <= high:
-            raise ParameterError(
-                f"safe = {safe} is not allowed: from {low:g} to {high:g} is needed"
-            )
+        self.commands = LiveCommands(controller, safe, limits)
         if isinstance(most_missed, bool) or not isinstance(most_missed, int) or most_missed < 0:
             raise ParameterError(
                 f"most_missed = {most_missed!r} is not allowed: a whole number from 0 on is needed"
             )
-        self.device, self.controller, self.trajectory, self.clock = (
-            device,
-            controller,
-            trajectory,
-            clock,
-        )
-        self.safe, self.low, self.high, self.most_missed, self.stamp = (
-            float(safe),
-            low,
-            high,
-            most_missed,
-            stamp,
-        )
+        self.device, self.controller, self.clock = device, controller, clock
+        self.trajectory = trajectories_of(trajectory, controller)
+        self.most_missed, self.stamp = most_missed, stamp
         self.plausible = {
-            name: _pair(f"plausible[{name}]", pair) for name, pair in (plausible or {}).items()
+            name: pair(f"plausible[{name}]", values) for name, values in (plausible or {}).items()
         }
         self.period = controller.period
         self.total = whole_samples(
-            "duration", trajectory.duration if duration is None else duration, self.period, least=1
+            "duration",
+            self.trajectory.duration if duration is None else duration,
+            self.period,
+            least=1,
         )
-        check_angles(trajectory, self.total * self.period)
+        of_joint = getattr(self.trajectory, "of_joint", {"": self.trajectory})
+        for one in of_joint.values():
+            check_angles(one, self.total * self.period)
         self.k = 0
-        self.held = self.safe
+        self.held = self.commands.safe
         self.last: Mapping[str, float] | None = None
         self.seen = -math.inf
         self.missed = self.in_a_row = self.overruns = 0
         self.stall = 0.0
-        self.rows: list[tuple[float, float, float, float, Mapping[str, float] | None]] = []
+        self.rows: list[
+            tuple[float, Any, Mapping[str, float], float, Mapping[str, float] | None]
+        ] = []
 
     def run(self, termination: Termination) -> str:
         """To the end or until the sensor is lost; only in here a signal may raise."""
@@ -310,7 +315,7 @@ class _Loop:
     def _run(self) -> str:
         self.controller.reset()
         # until something is seen the plant holds what is safe, not what was left on it
-        self.device.write(self.safe)
+        self.device.write(self.commands.written(self.commands.safe))
         begin = self.clock.now()
         while self.k < self.total:
             late = self._wait(begin + self.k * self.period)
@@ -356,18 +361,15 @@ class _Loop:
     def _with_reading(self, reading: Mapping[str, float], begun: float, late: float) -> None:
         """A period with a usable reading; its answer is written unless it took too long."""
         self.last, wanted = reading, self._wanted()
-        command = float(self.controller.update(self.k * self.period, reading, wanted))
-        if not math.isfinite(command):
-            raise ParameterError(
-                f"the controller's command is {command}: a finite number is needed"
-            )
+        answer = self.controller.update(self.k * self.period, reading, wanted)
+        held = self.commands.kept(answer)
         if self.clock.now() - begun > self.period:
             self.missed += 1
             self.in_a_row += 1
             self._note(wanted, late, None)
             return
-        self.in_a_row, self.held = 0, min(max(command, self.low), self.high)
-        self.device.write(self.held)
+        self.in_a_row, self.held = 0, held
+        self.device.write(self.commands.written(held))
         self._note(wanted, late, reading)
 
     def _without_reading(self, late: float) -> None:
@@ -381,7 +383,7 @@ class _Loop:
         self._note(wanted, late, None)
 
     def _note(self, wanted: Reference, late: float, reading: Mapping[str, float] | None) -> None:
-        self.rows.append((self.k * self.period, float(wanted.angle), self.held, late, reading))
+        self.rows.append((self.k * self.period, wanted.angle, self.held, late, reading))
         self.k += 1
 
     def _read(self) -> Mapping[str, float] | None:
@@ -412,24 +414,28 @@ class _Loop:
 
     def stop(self) -> str:
         """Write the safe command; words for the message if that was not possible."""
-        why = ""
+        why, safe = "", self.commands.written(self.commands.safe)
         for _ in range(_SAFE_ATTEMPTS):
             try:
-                self.device.write(self.safe)
+                self.device.write(safe)
             except BaseException as error:  # a second Ctrl-C must not keep the valve open
                 why = (
-                    f"; and the safe command {self.safe:g} could not be written: "
-                    f"{type(error).__name__} {error}"
-                )
+                    f"; and the safe command {safe:g} could not be written: "
+                    if self.commands.single
+                    else f"; and the safe commands {safe} could not be written: "
+                ) + f"{type(error).__name__} {error}"
             else:
                 return ""
         return why
 
     def result(self, reason: str) -> LiveRun:
         """What happened."""
-        when, wanted, command, late = (
-            np.array([row[i] for row in self.rows], dtype=np.float64) for i in range(4)
-        )
+        when, late = (np.array([row[i] for row in self.rows], dtype=np.float64) for i in (0, 3))
+        wanted = np.array([row[1] for row in self.rows], dtype=np.float64)
+        held = {
+            name: np.array([row[2][name] for row in self.rows], dtype=np.float64)
+            for name in self.commands.names
+        }
         names = dict.fromkeys(name for row in self.rows for name in (row[4] or ()))
         channels = {
             n: np.array([math.nan if r[4] is None else r[4].get(n, math.nan) for r in self.rows])
@@ -438,25 +444,12 @@ class _Loop:
         return LiveRun(
             reason,
             when,
-            wanted,
-            command,
+            wanted.T,
+            self.commands.written(held),
             channels,
             late,
             self.missed,
             self.overruns,
-            self.safe,
+            self.commands.written(self.commands.safe),
             self.stall,
         )
-
-
-def _pair(name: str, given: Any) -> tuple[float, float]:
-    """Two rising finite numbers."""
-    try:
-        low, high = (float(value) for value in given)
-    except (TypeError, ValueError):
-        low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError(
-            f"{name} = {given} is not allowed: two rising finite numbers are needed"
-        )
-    return low, high

@@ -6,14 +6,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
+from pamrs.channels import channel_of
+from pamrs.control._protocol import commands_of, keywords_of
 from pamrs.control.live import Clock
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Simulator
+from pamrs.simulation import Simulator, core_rig
 
 __all__ = ["FAULTS", "SimulatedDevice", "VirtualClock"]
 
@@ -68,8 +70,12 @@ class VirtualClock:
 
 
 class SimulatedDevice:
-    """A rig with one valve behind ``read()`` and ``write(command)``; it moves with its clock,
-    whatever the loop does.
+    """A rig behind ``read()`` and ``write(command)``; it moves with its clock, whatever the loop
+    does.
+
+    A rig with one valve or regulator takes a number; one with several a mapping of all of them by
+    their names, ``{"valve_command.flexor": 5.0, "valve_command.extensor": 5.0}``. Until something
+    is written valves are at their null, and regulators hold what they begin with.
 
     Parameters
     ----------
@@ -114,14 +120,10 @@ class SimulatedDevice:
             )
         if not faults or any(fault not in FAULTS for fault in faults):
             raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
-        valves = rig.tables("valve")
-        if len(valves) != 1:
-            raise ParameterError(
-                f"rig {rig.name!r} is not allowed: it has {len(valves)} valves, and one is needed"
-            )
+        self._held = _at_first(rig)
         self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
-        self.clock, self.command = clock, float(next(iter(valves.values()))["null_voltage"])
-        self.written: list[tuple[float, float]] = []
+        self.clock = clock
+        self.written: list[tuple[float, Any]] = []
         """Time [s] and value of every command that was written."""
         self._began = clock.now()
         self._dropouts, self._faults, self._lost_from = dropouts, faults, lost_from
@@ -142,10 +144,38 @@ class SimulatedDevice:
         self._last = self._sample()
         return self._last
 
-    def write(self, command: float) -> None:
-        """Hold a command from now on."""
+    @property
+    def command(self) -> Any:
+        """What is held: a number, or a mapping of names to one."""
+        return next(iter(self._held.values())) if len(self._held) == 1 else dict(self._held)
+
+    def write(self, command: float | Mapping[str, float]) -> None:
+        """Hold a command from now on.
+
+        Parameters
+        ----------
+        command : float or mapping of str to float
+            [V] of a valve, [Pa] of a regulator.
+
+        Raises
+        ------
+        ParameterError
+            If it has not the commands of the rig.
+        """
+        given = (
+            dict(commands_of(command))
+            if isinstance(command, Mapping)
+            else dict.fromkeys(self._held, command)
+        )
+        if set(given) != set(self._held) or (
+            not isinstance(command, Mapping) and len(self._held) > 1
+        ):
+            raise ParameterError(
+                f"command = {command!r} is not allowed: a number for each of "
+                f"{', '.join(self._held)} is needed"
+            )
         self._advance()
-        self.command = float(command)
+        self._held = {name: float(given[name]) for name in self._held}
         self.written.append((self.clock.now() - self._began, self.command))
 
     def _sample(self) -> dict[str, float]:
@@ -157,4 +187,22 @@ class SimulatedDevice:
             (self.clock.now() - self._began - self.simulator.time) / self.simulator.sample_time
         )
         if behind > 0:
-            self.simulator.run(np.full(behind, self.command))
+            signals = {name: np.full(behind, value) for name, value in self._held.items()}
+            self.simulator.run(**keywords_of(signals))
+
+
+def _at_first(rig: Rig) -> dict[str, float]:
+    """Every command of a rig, as it is before anything is written."""
+    found = {}
+    for name in core_rig(rig).inputs:
+        kind, block = channel_of(name), name.partition(".")[2]
+        if kind == "valve_command":
+            found[name] = float(rig.tables("valve")[block]["null_voltage"])
+        elif kind == "supply_command":
+            found[name] = float(rig.tables("supply")[block]["initial_pressure"])
+    if not found:
+        raise ParameterError(
+            f"rig {rig.name!r} is not allowed: it has no valve and no regulator, and one at least "
+            "is needed"
+        )
+    return found

@@ -28,7 +28,15 @@ from pamrs.control.linear import (
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 
-__all__ = ["Margins", "StableRegion", "loop_matrix", "margins", "spectral_radius", "stable_region"]
+__all__ = [
+    "Margins",
+    "StableRegion",
+    "loop_matrix",
+    "margins",
+    "margins_of_each",
+    "spectral_radius",
+    "stable_region",
+]
 
 Array = NDArray[np.float64]
 
@@ -131,9 +139,9 @@ def loop_matrix(model: LinearModel, controller: LinearController, *, delay: floa
     Parameters
     ----------
     model : LinearModel
-        With one input.
     controller : LinearController
-        Reads channels that are outputs of the model; others stay as they are.
+        Reads channels that are outputs of the model; others stay as they are. It has a command for
+        every input of the model.
     delay : float
         Between sampling and the command's effect [s]: computation, transport; any number from 0 on.
 
@@ -145,9 +153,10 @@ def loop_matrix(model: LinearModel, controller: LinearController, *, delay: floa
     Raises
     ------
     ParameterError
-        If the model has several inputs, or the delay is negative.
+        If an input of the model has no command or a command no input, or the delay is negative.
     """
     phi, gamma, c = _delayed(model, controller.period, delay)
+    gamma = gamma @ _by_inputs(model, controller)
     b_c, d_c = _by_outputs(model, controller)
     n, k = phi.shape[0], controller.a.shape[0]
     out = np.zeros((n + k, n + k))
@@ -184,17 +193,20 @@ def margins(
     model: LinearModel,
     controller: Controller | LinearController,
     *,
+    command: str | None = None,
     delay: float = 0.0,
     points: int = 4000,
 ) -> Margins:
-    """Gain and phase margin of a sampled loop, opened at the command, by python-control.
+    """Gain and phase margin of a sampled loop, opened at a command, by python-control.
 
     Parameters
     ----------
     model : LinearModel
-        With one input.
     controller : Controller or LinearController
         A controller is made linear about the model's point.
+    command : str, optional
+        Of several commands that at which the loop is opened, the others staying closed: its margins
+        are those of one valve, all others doing what they do. See :func:`margins_of_each`.
     delay : float
         As for :func:`loop_matrix` [s].
     points : int
@@ -208,7 +220,7 @@ def margins(
     Raises
     ------
     ParameterError
-        As :func:`loop_matrix`.
+        As :func:`loop_matrix`; if there are several commands and none, or an unknown one, is named.
     MissingPackageError
         If python-control is not installed.
     """
@@ -218,20 +230,11 @@ def margins(
         if isinstance(controller, LinearController)
         else linear_controller(controller, model.point)
     )
-    phi, gamma, c = _delayed(model, linear.period, delay)
-    b_c, d_c = _by_outputs(model, linear)
+    radius = spectral_radius(model, linear, delay=delay)
+    opened_at = _command(linear, command)
     period = linear.period
-    plant = library.ss(phi, gamma, c, np.zeros((c.shape[0], 1)), period)
-    feedback = (
-        library.ss(linear.a, b_c, linear.c, d_c, period)
-        if linear.a.size
-        else library.ss([], [], [], d_c, period)
-    )
     frequencies = np.geomspace(1e-6, 1.0, points) * math.pi / period
-    z = np.exp(1j * frequencies * period)
-    response = np.array(
-        [-(feedback(point, squeeze=False) @ plant(point, squeeze=False))[0, 0] for point in z]
-    )
+    response = _response(model, linear, opened_at, delay, frequencies)
     opened = library.frd(response, frequencies, smooth=True)
     gain, phase, _, at_gain, at_phase, _ = library.stability_margins(opened)
     last = float(response[-1].real)
@@ -244,9 +247,83 @@ def margins(
         gain, at_gain = nyquist, math.pi / period
     gain, phase = (float(value) if value is not None else math.inf for value in (gain, phase))
     spare = math.radians(phase) / float(at_phase) if math.isfinite(phase) and at_phase else math.inf
-    radius = spectral_radius(model, linear, delay=delay)
     left = (math.radians(phase), spare) if radius < 1.0 else (None, None)
     return Margins(gain, left[0], _number(at_gain), _number(at_phase), left[1], radius)
+
+
+def margins_of_each(
+    model: LinearModel,
+    controller: Controller | LinearController,
+    *,
+    delay: float = 0.0,
+    points: int = 4000,
+) -> dict[str, Margins]:
+    """Margins loop by loop: opened at one command after the other, all others staying closed.
+
+    What every loop bears by itself says nothing of changes in several at once; whether the whole is
+    stable, and how fast it settles, is :attr:`Margins.radius`, the same for all.
+
+    Parameters
+    ----------
+    model, controller, delay, points
+        As for :func:`margins`.
+
+    Returns
+    -------
+    dict of str to Margins
+        By the name of the command.
+
+    Raises
+    ------
+    ParameterError, MissingPackageError
+        As :func:`margins`.
+    """
+    linear = (
+        controller
+        if isinstance(controller, LinearController)
+        else linear_controller(controller, model.point)
+    )
+    return {
+        name or model.inputs[0]: margins(model, linear, command=name, delay=delay, points=points)
+        for name in linear.outputs
+    }
+
+
+def _command(controller: LinearController, command: str | None) -> int:
+    """Number of the command at which a loop is opened."""
+    if command is None and len(controller.outputs) == 1:
+        return 0
+    if command not in controller.outputs:
+        raise ParameterError(
+            f"command = {command!r} is not allowed: one of {', '.join(controller.outputs)}, or "
+            "margins_of_each"
+        )
+    return controller.outputs.index(command)
+
+
+def _response(
+    model: LinearModel, controller: LinearController, at: int, delay: float, frequencies: Array
+) -> NDArray[np.complex128]:
+    """Frequency response of a loop that is opened at a command, the others staying closed:
+    ``-(T_kk + T_ko (1 - T_oo)^-1 T_ok)`` of ``T = K P``.
+    """
+    phi, gamma, c = _delayed(model, controller.period, delay)
+    gamma = gamma @ _by_inputs(model, controller)
+    b_c, d_c = _by_outputs(model, controller)
+    z = np.exp(1j * frequencies * controller.period)[:, None, None]
+    plant = c @ np.linalg.solve(z * np.eye(phi.shape[0]) - phi, gamma.astype(np.complex128)[None])
+    feedback = np.broadcast_to(d_c.astype(np.complex128), (z.shape[0], *d_c.shape))
+    if controller.a.size:
+        state = z * np.eye(controller.a.shape[0]) - controller.a
+        feedback = feedback + controller.c @ np.linalg.solve(state, b_c.astype(np.complex128)[None])
+    turned = feedback @ plant
+    others = [k for k in range(gamma.shape[1]) if k != at]
+    found = turned[:, at, at]
+    if others:
+        rest = np.eye(len(others)) - turned[:, others][:, :, others]
+        into = turned[:, others, at][:, :, None]
+        found = found + (turned[:, at, others][:, None] @ np.linalg.solve(rest, into))[:, 0, 0]
+    return np.asarray(-found, dtype=np.complex128)
 
 
 def stable_region(
@@ -255,10 +332,12 @@ def stable_region(
     axes: Mapping[str, Sequence[float]],
     *,
     payloads: Sequence[float],
-    angle: float,
+    angle: float | None = None,
     delay: float = 0.0,
     sides: Sequence[str] = ("fill", "vent"),
     friction: str = "rest",
+    payload: str = "arm.payload",
+    hold: Callable[[Rig], Mapping[str, float]] | None = None,
 ) -> StableRegion:
     """Which gains are stable for small motions, payload by payload.
 
@@ -274,15 +353,15 @@ def stable_region(
     Parameters
     ----------
     rig : Rig
-        With ``arm.payload``.
+        With a payload.
     controller : callable
         Makes a controller from one gain each by name: ``lambda kp, ki: PID(kp, ki)``.
     axes : mapping of str to sequence of float
         Values of each gain.
     payloads : sequence of float
         [kg]
-    angle : float
-        At which the arm is held [rad].
+    angle : float, optional
+        At which the arm is held [rad]; not where ``hold`` says how.
     delay : float
         As for :func:`loop_matrix` [s].
     sides : sequence of str
@@ -290,6 +369,11 @@ def stable_region(
     friction : {"rest", "moving"}
         As there: the region for motions below, or beyond, the speed at which Coulomb friction has
         turned round.
+    payload : str
+        Parameter of the rig that is the payload: ``link.hand.payload``, ``load.mass``.
+    hold : callable, optional
+        From the rig with a payload to initial values at which it rests, for rigs with several
+        joints or chambers: :meth:`pamrs.control.RigController.holding` of a model of it.
 
     Returns
     -------
@@ -310,8 +394,11 @@ def stable_region(
     radius = np.zeros((masses.size, *(values.size for values in grid.values())))
     period = 0.0
     for p, mass in enumerate(masses):
-        loaded = rig.with_parameters({"arm.payload": float(mass)})
-        models = [linearise(loaded, angle, side=side, friction=friction) for side in sides]
+        loaded = rig.with_parameters({payload: float(mass)})
+        start = None if hold is None else hold(loaded)
+        models = [
+            linearise(loaded, angle, side=side, friction=friction, initial=start) for side in sides
+        ]
         for index in itertools.product(*(range(values.size) for values in grid.values())):
             made = controller(
                 **{
@@ -331,8 +418,6 @@ def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Ar
     """The sampled plant with the commands on their way as states: state, input and output
     matrix.
     """
-    if len(model.inputs) != 1:
-        raise ParameterError(f"the model has the inputs {', '.join(model.inputs)}; one is needed")
     if not (math.isfinite(delay) and delay >= 0.0):
         raise ParameterError(f"delay = {delay} s is not allowed: zero or more is needed")
     phi, gamma = model.sampled(period)
@@ -345,18 +430,32 @@ def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Ar
         model.sampled(period - late)[1] if period - late > 1e-12 * period else np.zeros_like(gamma)
     )
     before = gamma - last
-    n = phi.shape[0]
-    out, into = np.zeros((n + count, n + count)), np.zeros((n + count, 1))
+    n, m = gamma.shape
+    out, into = np.zeros((n + count * m, n + count * m)), np.zeros((n + count * m, m))
     out[:n, :n] = phi
-    out[:n, n + count - 1] = before[:, 0]  # the oldest on its way
+    out[:n, n + (count - 1) * m :] = before  # the oldest on its way
     if count == 1:
-        into[:n, 0] = last[:, 0]
+        into[:n] = last
     else:
-        out[:n, n + count - 2] = last[:, 0]
-    for k in range(1, count):
-        out[n + k, n + k - 1] = 1.0
-    into[n, 0] = 1.0
-    return out, into, np.hstack([model.c, np.zeros((model.c.shape[0], count))])
+        out[:n, n + (count - 2) * m : n + (count - 1) * m] = last
+    out[n + m :, n : n + (count - 1) * m] = np.eye((count - 1) * m)
+    into[n : n + m] = np.eye(m)
+    return out, into, np.hstack([model.c, np.zeros((model.c.shape[0], count * m))])
+
+
+def _by_inputs(model: LinearModel, controller: LinearController) -> Array:
+    """Which command of a controller is which input of a model."""
+    if controller.outputs == ("",) and len(model.inputs) == 1:
+        return np.eye(1)
+    if set(controller.outputs) != set(model.inputs):
+        commands = ", ".join(name or "one without a name" for name in controller.outputs)
+        raise ParameterError(
+            f"the model has the inputs {', '.join(model.inputs)}, the controller the commands "
+            f"{commands}: one of each is needed"
+        )
+    return np.array(
+        [[float(name == command) for command in controller.outputs] for name in model.inputs]
+    )
 
 
 def _by_outputs(model: LinearModel, controller: LinearController) -> tuple[Array, Array]:

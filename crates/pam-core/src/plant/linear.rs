@@ -1,5 +1,5 @@
-//! Linear model of a rig about a state in which its valves hold their null, by dual numbers through
-//! its equations.
+//! Linear model of a rig about a state in which its valves hold their null and its regulators the
+//! pressure that they have, by dual numbers through its equations.
 //!
 //! `x' = A x + B u, y = C x`. States are the pressures, angles and rates that an initial value can
 //! be given for and, behind them, what effects move. What follows a small motion of a joint
@@ -90,7 +90,7 @@ pub struct LinearModel {
     /// States: first those that an initial value can be given for, then masses of gases with an
     /// energy balance, then what effects move, in the order in which the effects were given.
     pub states: Vec<String>,
-    /// Commands of the valves.
+    /// Commands of the valves, then of the regulators.
     pub inputs: Vec<String>,
     /// Readings of the states that an initial value can be given for.
     pub outputs: Vec<String>,
@@ -117,6 +117,8 @@ struct Moving {
 enum By {
     State(usize),
     Command(usize),
+    /// What a supply is set to.
+    Set(usize),
 }
 
 impl Rig {
@@ -135,9 +137,11 @@ impl Rig {
         let (moving, point) = (self.moving(), Point::new(self, state, memory));
         let commands = 0..self.wiring.valves.len();
         let opening = moving.iter().filter(|m| m.opens).map(|m| By::State(m.place));
-        let opening: Vec<By> = opening.chain(commands.clone().map(By::Command)).collect();
-        let shut: Vec<By> =
-            moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place)).collect();
+        let opening: Vec<By> = opening.chain(commands.map(By::Command)).collect();
+        let regulators = self.spec().supplies.iter().enumerate();
+        let set = regulators.filter(|(_, s)| s.kind == "regulator").map(|(k, _)| By::Set(k));
+        let shut = moving.iter().filter(|m| !m.opens).map(|m| By::State(m.place));
+        let shut: Vec<By> = shut.chain(set).collect();
         let mut opened = point.mean_slopes(&opening, &side.open())?.into_iter();
         let mut others = point.mean_slopes(&shut, &SHUT)?.into_iter();
         let mut columns: Vec<Vec<f64>> = moving
@@ -146,7 +150,7 @@ impl Rig {
             .collect();
         self.let_follow(&point, &moving, &mut columns)?;
         let (mut a, mut b) = (Vec::new(), Vec::new());
-        let inputs: Vec<Vec<f64>> = opened.collect();
+        let inputs: Vec<Vec<f64>> = opened.chain(others).collect();
         for row in &moving {
             // (a sum with zero has no negative one)
             a.extend(
@@ -166,7 +170,7 @@ impl Rig {
         let named = self.names.initial.len();
         let plant = Plant::new(self, self.parameters().lift::<f64>(), false)?;
         let c = (0..named).flat_map(|k| plant.reading_of(k, &moving, state)).collect();
-        let inputs = self.names.inputs[commands].to_vec();
+        let inputs = self.names.inputs.clone();
         let outputs = self.names.initial.iter().map(|(name, _)| name.clone()).collect();
         Ok(LinearModel {
             states: moving.into_iter().map(|m| m.name).collect(),
@@ -314,10 +318,14 @@ impl<'a> Point<'a> {
             constant(if gases.contains(&place) { x * (1.0 + beside.shift) } else { *x })
         };
         let mut state: Vec<Dual<LANES>> = self.state.iter().enumerate().map(shifted).collect();
+        let mut set: Vec<Dual<LANES>> = (0..self.rig.spec().supplies.len())
+            .map(|k| constant(state[layout.supply(k)].re()))
+            .collect();
         for (lane, by) in by.iter().enumerate() {
             match *by {
                 By::State(place) => state[place] = state[place].along(lane),
                 By::Command(valve) => values.seed(self.rig.wiring.valves[valve].null, lane),
+                By::Set(supply) => set[supply] = set[supply].along(lane),
             }
         }
         let plant = Plant::new(self.rig, values, false)?;
@@ -325,7 +333,7 @@ impl<'a> Point<'a> {
         let still: Vec<Dual<LANES>> = self.state.iter().map(|x| constant(*x)).collect();
         let mut start = vec![constant(0.0); self.memory.len()];
         plant.contractions(&still, &mut start);
-        Ok(plant.rates_beside(&state, &self.memory, &start, beside))
+        Ok(plant.rates_beside(&state, &self.memory, &start, beside, &set))
     }
 }
 
@@ -337,10 +345,11 @@ impl<S: Scalar> Plant<'_, S> {
         memory: &[Memory<S>],
         start: &[S],
         beside: Beside,
+        set: &[S],
     ) -> Vec<S> {
         let (wiring, layout) = (&self.rig.wiring, &self.layout);
         let mut closed: Vec<(&Acting, S)> = Vec::new();
-        let mut controls = self.held();
+        let mut controls = self.held(set);
         for (k, path) in wiring.ports.command.iter().enumerate() {
             let null = self.valves[k].null;
             let mut spool =
@@ -370,16 +379,12 @@ impl<S: Scalar> Plant<'_, S> {
         rates
     }
 
-    /// Controls with every valve shut and every supply at its first pressure, at the start of a
+    /// Controls with every valve shut and every supply set to a pressure, at the start of a
     /// recording.
-    fn held(&self) -> Controls<S> {
-        let ambient = self.rig.gas.ambient_pressure;
-        let supplies = self.rig.spec().supplies.iter();
+    fn held(&self, set: &[S]) -> Controls<S> {
         Controls {
             spool: vec![constant(0.0); self.valves.len()],
-            set_pressure: supplies
-                .map(|s| SetPressure::steady(constant(s.initial_pressure + ambient)))
-                .collect(),
+            set_pressure: set.iter().map(|pressure| SetPressure::steady(*pressure)).collect(),
             time: 0.0,
         }
     }

@@ -1,0 +1,290 @@
+"""Linear models and margins of loops with several commands: what the nonlinear loop does, the loop
+of one muscle, and gains at which a loop is at its boundary.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.control import (
+    PID,
+    ArmModel,
+    Cascade,
+    PressureLoop,
+    Reference,
+    RigController,
+    RigModel,
+    Sliding,
+    closed_loop,
+)
+from pamrs.control.linear import linear_controller, linearise
+from pamrs.control.stability import (
+    loop_matrix,
+    margins,
+    margins_of_each,
+    spectral_radius,
+    stable_region,
+)
+from pamrs.control.trajectories import step
+from pamrs.errors import ParameterError
+from tests.control.helpers import CONDUCTANCE
+
+PERIOD = 0.005
+ELBOW = math.radians(45.0)
+BOTH = np.radians([45.0, 40.0])
+
+
+def even_valves(name, angle, **options):
+    """A packaged rig without dry friction whose valves have, at the pressures that hold it, the
+    same slope where they fill as where they vent: a small motion then has one linear model.
+    """
+    rig = pamrs.rigs.named(name)
+    model = rig.model
+    for table in model["muscle"].values():
+        table |= dict.fromkeys(
+            ("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0
+        )
+    for table in [model["arm"]] if model["link"] is None else model["link"].values():
+        table["coulomb"] = 0.0
+    smooth = pamrs.Rig(rig.name, model)
+    start = RigController(RigModel(smooth), law_of(RigModel(smooth)), **options).holding(angle)
+    gas, model = smooth.model["gas"], smooth.model
+    ambient = gas["ambient_pressure"]
+    supply = smooth.tables("supply")[""]["initial_pressure"] + ambient
+    for valve, table in model["valve"].items():
+        chamber = smooth.tables("chamber")[valve]
+        pressure = start[f"muscle_pressure.{valve}"] + ambient
+        del table["discharge_area_max"]
+        # both choked: the flow is in proportion to the pressure in front, the rate to alpha
+        ratio = chamber["alpha_in"] * supply / (chamber["alpha_out"] * pressure)
+        table |= {"flow": "iso_6358", "fill_critical_ratio": 0.85, "vent_critical_ratio": 0.85}
+        table |= {"fill_conductance": CONDUCTANCE, "vent_conductance": CONDUCTANCE * ratio}
+    return pamrs.Rig(rig.name, model)
+
+
+def law_of(model, **changes):
+    return model.law(
+        "sliding",
+        **{"slope": 8.0, "switching": 4e3, "boundary_layer": 2.0, "period": PERIOD, **changes},
+    )
+
+
+def controller_of(rig, options):
+    return RigController(RigModel(rig), law_of(RigModel(rig)), **options)
+
+
+CASES = {
+    "antagonistic_joint": (ELBOW, {"stiffness": 18.0}),
+    "two_joint_arm": (BOTH, {}),
+}
+
+
+@pytest.fixture(scope="module", params=CASES)
+def held(request):
+    """Rig, controller, start, linear model, linear controller, angles."""
+    angle, options = CASES[request.param]
+    rig = even_valves(request.param, angle, **options)
+    controller = controller_of(rig, options)
+    start = controller.holding(angle)
+    model = linearise(rig, initial=start)
+    return rig, controller, start, model, linear_controller(controller, model.point), angle
+
+
+def resting(angle, joints):
+    if len(joints) == 1:
+        return step(float(angle), float(angle), duration=1.0)
+    return {
+        name: step(float(one), float(one), duration=1.0)
+        for name, one in zip(joints, angle, strict=True)
+    }
+
+
+def test_what_holds_a_rig_holds_it(held):
+    rig, controller, start, model, linear, angle = held
+    valves = list(rig.tables("valve"))
+    run = pamrs.simulate(
+        rig,
+        {name: np.full(501, 5.0) for name in valves},
+        sample_time=0.001,
+        initial=start,
+    )
+    for name, wanted in zip(controller.tracked, np.atleast_1d(angle), strict=True):
+        assert np.abs(run[name] - wanted).max() < 1e-6
+    assert linear.outputs == tuple(f"valve_command.{name}" for name in valves)
+    assert linear.command == pytest.approx(dict.fromkeys(linear.outputs, 5.0), abs=1e-5)
+    assert model.inputs == linear.outputs
+    assert set(linear.inputs) <= set(model.outputs)
+
+
+def test_the_nonlinear_loop_moves_as_the_linear_one(held):
+    """From a joint that was pushed aside, sample by sample; filters have seen the rest."""
+    rig, controller, start, model, linear, angle = held
+    aside, pushed = 2e-5, controller.tracked[-1]
+    aim = resting(angle, controller.joints)
+    controller.reset()
+    for k in range(3):
+        controller.update(k * PERIOD, model.point, Reference(angle))
+    run = closed_loop(
+        rig,
+        controller,
+        aim,
+        0.5,
+        initial={**start, pushed: start[pushed] + aside},
+        sample_time=PERIOD,
+        step=1e-4,
+        start=3 * PERIOD,
+        reset=False,
+    )
+    matrix = loop_matrix(model, linear)
+    x = np.zeros((run.time.size, matrix.shape[0]))
+    x[0, model.states.index(pushed)] = aside
+    for k in range(run.time.size - 1):
+        x[k + 1] = matrix @ x[k]
+    for name in (*controller.tracked, *(n for n in model.states if n.startswith("muscle_pre"))):
+        expected = x[:, model.states.index(name)]
+        found = run.channels[name] - start[name]
+        assert found == pytest.approx(expected, abs=0.005 * np.abs(expected).max()), name
+    # and it comes back as fast as the slowest eigenvalue says
+    assert np.abs(matrix @ np.linalg.eig(matrix)[1]).max() < 1.0
+    assert spectral_radius(model, linear) < 1.0
+
+
+def test_each_loop_is_at_its_boundary_at_its_gain_margin(held):
+    """One command is multiplied by it, the others as they are: an eigenvalue on the unit circle."""
+    *_, model, linear, _ = held
+    found = margins_of_each(model, linear, delay=0.004)
+    assert set(found) == set(linear.outputs)
+    finite = 0
+    for k, (name, one) in enumerate(found.items()):
+        assert one == margins(model, linear, command=name, delay=0.004)
+        assert one.stable
+        assert one.phase > 0.0
+        if math.isinf(one.gain):
+            continue
+        finite += 1
+        scale = np.ones(len(linear.outputs))
+        scale[k] = one.gain
+        turned = replace(linear, c=scale[:, None] * linear.c, d=scale[:, None] * linear.d)
+        assert spectral_radius(model, turned, delay=0.004) == pytest.approx(1.0, abs=2e-4)
+    assert finite
+
+
+def test_each_loop_is_at_its_boundary_at_its_phase_margin(held):
+    """One command is turned back by it at its frequency: ``det(1 - K P D) = 0`` there."""
+    *_, model, linear, _ = held
+    phi, gamma = model.sampled(PERIOD)
+    pick = np.array([[float(name == out) for out in model.outputs] for name in linear.inputs])
+    for k, one in enumerate(margins_of_each(model, linear).values()):
+        z = np.exp(1j * one.phase_frequency * PERIOD)
+        plant = pick @ model.c @ np.linalg.solve(z * np.eye(phi.shape[0]) - phi, gamma)
+        inner = np.linalg.solve(z * np.eye(linear.a.shape[0]) - linear.a, linear.b)
+        turned = np.ones(len(model.inputs), dtype=complex)
+        turned[k] = np.exp(-1j * one.phase)
+        loop = (linear.c @ inner + linear.d) @ plant
+        nothing = np.linalg.det(np.eye(turned.size) - loop @ np.diag(turned))
+        assert abs(nothing) < 1e-3 * abs(np.linalg.det(np.eye(turned.size) - loop))
+        assert one.delay == pytest.approx(one.phase / one.phase_frequency)
+
+
+def test_the_shoulder_as_a_rig_is_the_loop_of_its_cascade():
+    rig = pamrs.rigs.shoulder()
+    model = linearise(rig, ELBOW, side="fill")
+    known, arm = RigModel(rig), ArmModel.from_rig(rig)
+    way = PressureLoop(period=PERIOD)
+    whole = RigController(known, Sliding(known.arm, period=PERIOD), air={"": way})
+    parts = Cascade(Sliding(arm, period=PERIOD), PressureLoop(period=PERIOD))
+    one, other = (linear_controller(c, model.point) for c in (whole, parts))
+    assert one.outputs == ("valve_command",)
+    assert one.command == {"valve_command": pytest.approx(other.command)}
+    radii = [spectral_radius(model, c, delay=0.003) for c in (one, other)]
+    assert radii[0] == pytest.approx(radii[1], rel=1e-9)
+    found, expected = margins(model, one), margins(model, other)
+    assert found.gain == pytest.approx(expected.gain, rel=1e-6)
+    assert found.phase == pytest.approx(expected.phase, rel=1e-6)
+
+
+def test_a_regulated_rig_has_its_set_pressure_as_input():
+    # air that comes in as it goes out: else a flow that turns round has two slopes
+    rig = pamrs.rigs.named("regulated_joint").with_parameters(
+        dict.fromkeys(("chamber.alpha_in", "chamber.alpha_out"), 1.2)
+    )
+    known = RigModel(rig, pressure_limit=1e6)
+    law = known.law("sliding", period=PERIOD)
+    controller = RigController(known, law)
+    start = controller.holding(ELBOW)
+    model = linearise(rig, initial=start)
+    assert model.inputs == ("supply_command",)
+    supply = rig.tables("supply")[""]
+    row = model.states.index("supply_pressure")
+    assert model.b[row, 0] == pytest.approx(1.0 / supply["time_constant"], rel=1e-12)
+    assert np.count_nonzero(model.b) == 1
+    linear = linear_controller(controller, model.point)
+    assert linear.command["supply_command"] == pytest.approx(start["muscle_pressure"], rel=1e-6)
+    assert margins(model, linear).stable
+    # what is driven moves as the simulation does
+    step_of = 50.0  # so that the flow stays in the straight piece of its law
+    run = pamrs.simulate(
+        rig,
+        supply_command=np.full(201, start["supply_pressure"] + step_of),
+        sample_time=0.001,
+        initial=start,
+    )
+    phi, gamma = model.sampled(0.001)
+    x = np.zeros((201, len(model.states)))
+    for k in range(200):
+        x[k + 1] = phi @ x[k] + gamma[:, 0] * step_of
+    for k, name in enumerate(model.states):
+        moved = run[name] - run[name][0]
+        assert moved == pytest.approx(x[:, k], abs=0.01 * np.abs(x[:, k]).max()), name
+
+
+def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
+    rig = even_valves("antagonistic_joint", ELBOW, stiffness=18.0)
+
+    def hold(loaded):
+        return controller_of(loaded, {"stiffness": 18.0}).holding(ELBOW)
+
+    def made(switching):
+        return RigController(
+            RigModel(rig), law_of(RigModel(rig), switching=switching), stiffness=18.0
+        )
+
+    region = stable_region(
+        rig,
+        made,
+        {"switching": [4e3, 4e6]},
+        payloads=[rig.model["arm"]["payload"]],
+        hold=hold,
+        delay=0.005,
+    )
+    model = linearise(rig, initial=hold(rig), side="fill")
+    alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
+    assert region.radius[0, 1] >= alone > 1.0
+    assert region.stable.tolist() == [[True, False]]
+
+
+def test_what_cannot_be_is_named(held):
+    rig, controller, start, model, linear, angle = held
+    with pytest.raises(ParameterError, match="margins_of_each"):
+        margins(model, linear)
+    with pytest.raises(ParameterError, match="command = 'valve_command.other'"):
+        margins(model, linear, command="valve_command.other")
+    with pytest.raises(ParameterError, match="one without a name"):
+        loop_matrix(model, linear_controller(PID(1.0), {"joint_angle": 0.5}))
+    with pytest.raises(ParameterError, match="angle is missing"):
+        linearise(rig)
+    with pytest.raises(ParameterError, match="does not rest"):
+        linearise(rig, initial={**start, controller.tracked[0]: start[controller.tracked[0]] + 0.1})
+    with pytest.raises(ParameterError, match=r"point has no joint_angle\."):
+        linear_controller(controller, {"joint_angle": 0.5})
+    with pytest.raises(ParameterError, match=r"angle = .*are needed"):
+        controller.holding(np.zeros(len(controller.joints)) - 3.0)
+    heavy = {
+        name: 500.0 for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")
+    }
+    loaded = RigModel(rig.with_parameters(heavy))
+    with pytest.raises(ParameterError, match=r"no pressures hold joint_angle\."):
+        RigController(loaded, law_of(loaded)).holding(angle)
