@@ -15,6 +15,7 @@ __all__ = [
     "MOST_DEPTH",
     "MOST_TOML_BYTES",
     "check_regular",
+    "found_outside",
     "is_inside",
     "parse_toml",
     "read_file",
@@ -168,3 +169,24 @@ def is_inside(folder: Path, path: Path) -> bool:
     bool
     """
     return path.resolve().is_relative_to(folder.resolve())
+
+
+def found_outside(folder: Path, path: Path) -> Path | None:
+    """The first of what is read from a path that lies outside a folder, links followed.
+
+    Parameters
+    ----------
+    folder : Path
+        What it should lie in.
+    path : Path
+        A file, or a folder of which any file may be read; it need not be there.
+
+    Returns
+    -------
+    Path or None
+        The path itself, or what lies in it and is a link out of `folder`; None if nothing is.
+    """
+    if not is_inside(folder, path):
+        return path
+    inside = (Path(home, name) for home, *names in os.walk(path) for name in sum(names, []))
+    return next((one for one in inside if one.is_symlink() and not is_inside(folder, one)), None)

@@ -21,6 +21,7 @@ UNITS: Final[dict[str, str]] = {
     "force": "N",
     "joint_torque": "N m",
     "temperature": "K",
+    "ambient_temperature": "K",
     "reference": "rad",
     "joint_rate": "rad/s",
     "length_rate": "m/s",

@@ -253,3 +253,25 @@ def test_isometric_loops_without_a_direction_are_fitted_and_drawn(capsys, tmp_pa
     assert "rising pressure counts as contracting" in out
     assert json.loads(result.read_text(encoding="utf-8"))["fit"]["isometric"] is True
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+DESCRIBED = """schema = "pamrs.force_map/1"
+file = "{table}"
+[muscle]
+model = "robinson"
+rest_length = {{ value = 276, unit = "mm" }}
+rest_diameter = {{ value = 25.4, unit = "mm" }}
+braid_angle = {{ value = 73.5, unit = "deg" }}
+wall_thickness = {{ value = 3.175, unit = "mm" }}
+"""
+
+
+@pytest.mark.parametrize("fit", ["friction", "muscle", "map"])
+def test_a_table_outside_a_description_needs_to_be_allowed(capsys, table, tmp_path, fit):
+    described = tmp_path / "map.toml"
+    described.write_text(DESCRIBED.format(table=table.as_posix()), encoding="utf-8")
+    words = ["fit", fit, str(described)]
+    assert cli.main(words) != 0
+    assert "lies outside the folder of the description" in capsys.readouterr().err
+    assert cli.main([*words, "--allow-outside"]) == 0
+    assert capsys.readouterr().out.startswith("map: ")

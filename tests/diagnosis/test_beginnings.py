@@ -10,6 +10,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.next_experiment import Experiment, Outcome, counted, outcome_of
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
@@ -98,3 +99,51 @@ def test_a_diagnosis_says_what_it_did_not_judge() -> None:
     assert "of r0, " in told
     assert "of r2" in told
     assert "a gauge for supply_pressure would" in told
+
+
+def fills(duration: float, *channels: str) -> Outcome:
+    """What a set pressure that begins far above the chamber would tell of two time constants."""
+    command = np.full(round(duration / DT), 4e5)
+    done = Experiment(
+        "fill",
+        "open the stopcock",
+        {"kind": "fill"},
+        command,
+        command.size,
+        DT,
+        {"supply_pressure": 4e5, "muscle_pressure": 0.0},
+        channel="supply_command",
+    )
+    nominal = parse_rig(TEXT.replace(", tol = 0.01 }", " }", 1))  # of the time constant
+    slow = nominal.with_parameters({"supply.time_constant": 0.2})
+    hypotheses = [("none", nominal, 0.5), ("supply.time_constant", slow, 0.5)]
+    sound = {"muscle_pressure": 400.0, "supply_pressure": 400.0}
+    return outcome_of(done, hypotheses, sound, ("supply_command", *channels), SETTINGS)
+
+
+def test_an_experiment_tells_nothing_by_samples_that_are_not_judged() -> None:
+    """All that the two differ by is in the filling: a gauge at the regulator tells it."""
+    blind, seen = fills(8.0, "muscle_pressure"), fills(8.0, "supply_pressure", "muscle_pressure")
+    (prepared,) = blind.problem.recordings
+    dropped = prepared.unsettled["muscle_pressure"]
+    assert 0.5 < dropped * DT < 6.0
+    assert seen.problem.recordings[0].unsettled == {}
+    assert blind.bits < 0.05
+    assert seen.bits > 0.9
+
+
+def test_a_recording_counts_by_the_samples_that_are_judged() -> None:
+    """What is told of nothing but rows after the beginning is told by as many as are left."""
+    (prepared,) = fills(8.0, "muscle_pressure").problem.recordings
+    (block,) = available_blocks(RIG, ("supply_command", "muscle_pressure"), SETTINGS.prepare)
+    most = SETTINGS.next_experiment.effective_samples
+    dropped = prepared.unsettled["muscle_pressure"]
+    assert counted(prepared, block, SETTINGS.next_experiment) == most * (1 - dropped / prepared.n)
+    whole = replace(prepared, unsettled={})
+    assert counted(whole, block, SETTINGS.next_experiment) == most
+
+
+def test_an_experiment_shorter_than_its_beginning_tells_nothing() -> None:
+    found = fills(0.5, "muscle_pressure")
+    assert found.problem.recordings[0].unsettled["muscle_pressure"] >= 100
+    assert np.array_equal(found.distance, np.zeros((2, 2)))

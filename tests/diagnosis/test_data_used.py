@@ -12,6 +12,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import (
+    at_ambient,
     available_blocks,
     averaged,
     averaged_to_need,
@@ -20,7 +21,8 @@ from pamrs.diagnosis.prepare import (
 )
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
-from pamrs.simulation import core_rig
+from pamrs.rig import parse_rig
+from pamrs.simulation import core_rig, differences, replay
 from tests.diagnosis.test_overlap import of, run
 
 SETTINGS = DiagnosisSettings()
@@ -117,10 +119,9 @@ def test_channels_without_use_are_told_everywhere() -> None:
     assert [e.id for e in found.effects][:1] == ["leak_muscle"]
     (own,) = json.loads(found.to_json())["data"]
     assert own["used"] == ["muscle_pressure"]
-    assert own["unused"] == {
-        "line_pressure": "the rig has no block [line]",
-        "temperature": "no block that is judged needs it",
-    }
+    assert list(own["unused"]) == ["line_pressure", "temperature"]
+    assert own["unused"]["line_pressure"] == "the rig has no block [line]"
+    assert own["unused"]["temperature"].startswith("it is that of the gas, and a block predicts")
     assert (own["averaged"], own["samples"]) == (5, 599)
     told = " ".join(found.summary().split())
     assert "at 10 Hz (means of 5 samples recorded at 50 Hz); used: muscle_pressure" in told
@@ -128,3 +129,87 @@ def test_channels_without_use_are_told_everywhere() -> None:
     from pamrs.report import render_html
 
     assert "recorded but not used: line_pressure" in render_html(found)
+
+
+WARM = 320.0
+NOZZLE = parse_rig("""
+schema = "pamrs.rig/1"
+name = "nozzle"
+[gas]
+[chamber]
+dead_volume = { value = 1.0, unit = "l" }
+alpha_in    = { value = 1.0, unit = "1" }
+alpha_out   = { value = 1.0, unit = "1" }
+alpha       = { value = 1.0, unit = "1" }
+[line]
+kind = "orifice"
+from = "chamber"
+to   = "ambient"
+discharge_area = { value = 0.15, unit = "mm2" }
+""")
+
+
+def warm_stand(seed: int, role: str = "fit", room: float = WARM) -> Recording:
+    """A tank that empties through a nozzle at 320 K, by 4.5 % faster than at 293 K."""
+    rig = NOZZLE.with_parameters({"gas.temperature": WARM})
+    start = {"muscle_pressure": 5e5 + 2e4 * seed}
+    made = pamrs.simulate(rig, duration=40.0, sample_time=0.02, step=0.01, initial=start)
+    rng = np.random.default_rng(seed)
+    size = made.time.size
+    channels = {
+        "muscle_pressure": made["muscle_pressure"] + rng.normal(0.0, 150.0, size),
+        "ambient_temperature": np.round(rng.normal(room, 0.1, size), 1),
+    }
+    return of(f"hold{seed}", role, 0.02, channels)
+
+
+def test_a_measured_room_is_that_of_the_rig() -> None:
+    """Air of 320 K goes through a nozzle faster than the 293 K of the rig file say."""
+    recordings = [warm_stand(1), warm_stand(2), warm_stand(3, "held_out")]
+    found = pamrs.diagnose(pamrs.Case("warm", NOZZLE, recordings, Path()))
+    assert found.verdict == "none"
+    (told,) = (text for text in found.warnings if text.startswith("gas.temperature is"))
+    assert told.startswith("gas.temperature is 320.0 K, as ambient_temperature was measured (293")
+    for own in json.loads(found.to_json())["data"]:
+        assert "ambient_temperature" in own["used"]
+        assert own["unused"] == {}
+    blind = [
+        replace(r, channels={"muscle_pressure": r.channels["muscle_pressure"]}) for r in recordings
+    ]
+    assert pamrs.diagnose(pamrs.Case("blind", NOZZLE, blind, Path())).verdict != "none"
+
+
+def test_one_temperature_holds_for_all_recordings() -> None:
+    rig, said = at_ambient(NOZZLE, [warm_stand(k, room=t) for k, t in enumerate((290, 291, 299))])
+    assert rig.parameter("gas.temperature").value == pytest.approx(291.0, abs=0.1)
+    assert "differs between the recordings, from 290.0 to 299.0 K" in said[1]
+    assert at_ambient(NOZZLE, [])[1] == []
+
+
+def test_a_room_that_cannot_be_is_an_error() -> None:
+    hot = replace(warm_stand(1), channels={"ambient_temperature": np.full(2000, 1900.0)})
+    with pytest.raises(DiagnosisError, match=r"ambient_temperature of hold1: .*gas.temperature"):
+        at_ambient(NOZZLE, [hot])
+
+
+def test_a_recorded_temperature_of_the_gas_is_compared_by_a_replay() -> None:
+    """Air that is let out cools; a thermometer that reads 2 K too much shows there."""
+    rig = parse_rig(
+        NOZZLE.to_toml_text()
+        .replace(
+            "[chamber]",
+            '[chamber]\ngas = "energy_balance"\n'
+            'heat_transfer_coefficient = { value = 20.0, unit = "W/(m2 K)" }',
+            1,
+        )
+        .replace("alpha", "# alpha")
+    )
+    made = pamrs.simulate(rig, duration=20.0, sample_time=0.02, initial={"muscle_pressure": 5e5})
+    assert made["temperature"].min() < 289.0
+    channels = {
+        "muscle_pressure": made["muscle_pressure"],
+        "temperature": made["temperature"] + 2.0,
+    }
+    recording = of("hold", "fit", 0.02, channels)
+    told = differences(replay(rig, recording), recording)
+    assert told["temperature"] == pytest.approx(2.0, rel=0.01)

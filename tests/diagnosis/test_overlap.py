@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -177,14 +178,124 @@ def test_a_copy_is_left_out_of_the_proof_and_said() -> None:
     assert without_copies([one, two], SETTINGS) == ([one, two], [])
 
 
-def test_a_diagnosis_says_that_there_is_no_proof() -> None:
+def joined(name: str, *parts: Recording, role: str = "held_out") -> Recording:
+    """Recordings one after the other."""
+    names = parts[0].channels
+    channels = {n: np.concatenate([part.channels[n] for part in parts]) for n in names}
+    return of(name, role, parts[0].sample_time, channels)
+
+
+def every(one: Recording, count: int) -> Recording:
+    """The same at a lower rate."""
+    channels = {n: v[::count] for n, v in one.channels.items()}
+    return of(one.name, one.role, one.sample_time * count, channels)
+
+
+@pytest.mark.parametrize(
+    ("kind", "bits", "count"),
+    [*((kind, bits, 1) for kind in KINDS for bits in (0.0, 2.0)), ("steps", 0.0, 4)],
+)
+def test_what_a_held_out_window_does_not_share_is_kept(kind: str, bits: float, count: int) -> None:
+    """Two windows of one file, the second one at another rate too."""
+    whole = run(kind, duration=40.0, bits=bits)
+    one = whole.between(0.0, 18.0)
+    proof = replace(every(whole.between(10.0, 40.0), count), name="proof", role="held_out")
+    kept, said = without_copies([one, proof], SETTINGS)
+    assert [r.name for r in kept] == [one.name, "proof"]
+    # the first 8 s of it are shared; a gap, and a window in which that is told, are left out too
+    begin = proof.duration - kept[1].duration
+    margin = SETTINGS.gap + SETTINGS.window_samples * proof.sample_time
+    assert 8.0 + SETTINGS.gap <= begin <= 8.0 + margin + 0.5
+    step = round(begin / proof.sample_time)
+    for name, values in kept[1].channels.items():
+        np.testing.assert_array_equal(values, proof.channels[name][step:])
+    assert overlap(kept[1], one, SETTINGS) is None
+    assert len(said) == 1
+    assert f"{proof.duration:.4g} s are held out, the rest is no proof" in said[0]
+
+
+def test_a_copy_inside_other_data_leaves_both_sides() -> None:
+    one = run(duration=40.0)
+    before, after = run(seed=77, duration=15.0), run(seed=78, duration=20.0)
+    proof = joined("proof", before, one.between(4.0, 12.0), after)
+    kept, said = without_copies([one, proof], SETTINGS)
+    first, second = (r for r in kept if r.role == "held_out")
+    assert first.duration == pytest.approx(15.0 - SETTINGS.gap, abs=0.7)
+    assert second.duration == pytest.approx(20.0 - SETTINGS.gap, abs=0.7)
+    assert first.duration < 15.0 - SETTINGS.gap
+    assert second.duration < 20.0 - SETTINGS.gap
+    assert first.name.startswith("proof, 0 to 1")
+    assert second.name.endswith(f"{proof.duration:.4g} s")
+    assert " and " in said[0]
+
+
+def test_two_copies_at_different_times_are_both_cut_out() -> None:
+    one, two = run(duration=30.0), run("fast", seed=5, duration=30.0)
+    new = run(seed=77, duration=24.0)
+    proof = joined("proof", two.between(3.0, 13.0), new, one.between(6.0, 16.0))
+    kept, _ = without_copies([one, two, proof], SETTINGS)
+    (left,) = (r for r in kept if r.role == "held_out")
+    assert left.duration == pytest.approx(24.0 - 2 * SETTINGS.gap, abs=1.4)
+    assert all(overlap(left, fitted, SETTINGS) is None for fitted in (one, two))
+    at = proof.channels["muscle_pressure"].tolist().index(left.channels["muscle_pressure"][0])
+    assert 2000 < at < 2000 + 4800
+
+
+def test_what_is_left_is_left_out_where_it_is_short() -> None:
+    whole = run(duration=40.0)
+    proof = replace(whole.between(4.0, 26.0), name="proof", role="held_out")
+    kept, said = without_copies([whole.between(0.0, 18.0), proof], SETTINGS)
+    assert len(kept) == 1
+    assert "it is no held-out proof and was left out of it" in said[0]
+    assert "s, is too short" in said[0]
+    assert re.search(r"does not share, 5\.\d+ s", said[0])
+
+
+def test_a_rest_that_cannot_be_told_counts_as_shared() -> None:
+    """On one step of the converter the copy is what it copies, and says nothing of it."""
+    rng = np.random.default_rng(8)
+    rough, still = 400.0 * rng.standard_normal(2000), np.zeros(4000)
+    one = of("one", "fit", 0.01, {"muscle_pressure": 2e5 + np.r_[rough, still]})
+    proof = replace(one, name="proof", role="held_out")
+    kept, said = without_copies([one, proof], SETTINGS)
+    assert kept == [one]
+    assert "is too short" not in said[0]
+
+
+def test_a_stretch_is_kept_once() -> None:
+    whole = run(duration=40.0)
+    proof = replace(whole.between(10.0, 40.0), name="proof", role="held_out")
+    again = replace(proof, name="again")
+    kept, said = without_copies([whole.between(0.0, 18.0), proof, again], SETTINGS)
+    assert [r.name for r in kept] == [whole.name, "proof"]
+    assert "again (multisine1.csv) holds the same samples as proof" in said[-1]
+    assert "it says nothing more and was left out" in said[-1]
+
+
+def leaking(duration: float) -> tuple[pamrs.Rig, Recording]:
+    """A sealed chamber, and a recording of a leak that it knows nothing of."""
     rig = pamrs.rigs.sealed_chamber()
     leaky = rig.with_effect("leak_muscle", {"conductance": 3e-11})
     made = pamrs.simulate(
-        leaky, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+        leaky, duration=duration, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
     )
     noise = np.random.default_rng(1).normal(0.0, 150.0, made.time.size)
-    hold = of("hold", "fit", 0.1, {"muscle_pressure": made["muscle_pressure"] + noise})
+    return rig, of("hold", "fit", 0.1, {"muscle_pressure": made["muscle_pressure"] + noise})
+
+
+def test_a_diagnosis_is_proved_by_what_is_not_shared() -> None:
+    rig, whole = leaking(140.0)
+    fitted = whole.between(0.0, 60.0)
+    proof = replace(whole.between(35.0, 140.0), name="proof", role="held_out")
+    found = pamrs.diagnose(pamrs.Case("windows", rig, [fitted, proof], Path()))
+    assert found.fit.held_out
+    assert [effect.id for effect in found.effects] == ["leak_muscle"]
+    assert "proof (hold.csv) holds the same samples as hold" in found.warnings[0]
+    assert "105 s are held out, the rest is no proof" in found.summary()
+
+
+def test_a_diagnosis_says_that_there_is_no_proof() -> None:
+    rig, hold = leaking(60.0)
     again = replace(hold, name="again", role="held_out")
     found = pamrs.diagnose(pamrs.Case("twice", rig, [hold, again], Path()))
     assert not found.fit.held_out

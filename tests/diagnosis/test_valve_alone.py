@@ -10,7 +10,10 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import acts_in
+from pamrs.diagnosis.next_experiment import _planning as plan
+from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks, prepare, residual
+from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig
@@ -114,3 +117,50 @@ def test_a_small_leak_behind_the_line_is_named() -> None:
     assert [e.id for e in found.effects] == ["leak_muscle"]
     assert found.effects[0].probability > 0.8
     assert found.where["block"] == "chamber"
+
+
+@pytest.fixture
+def planned(monkeypatch: pytest.MonkeyPatch):
+    """A plan with some channels, of one experiment and three effects."""
+    (triangle,) = pool = library(RIG, SETTINGS.next_experiment, only=["slow_triangle"])
+    monkeypatch.setattr(plan, "library", lambda *_: pool)
+    names = ("leak_muscle", "valve_dead_zone", "valve_centre_leakage")
+    monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in names})
+    return lambda *channels: pamrs.plan_diagnosis(RIG, channels, experiments=[triangle.name])
+
+
+def test_a_plan_knows_the_gauge_in_front_of_the_line(planned) -> None:
+    whole = planned(*CHANNELS)
+    assert [block["name"] for block in whole.blocks] == ["supply", "line", "chamber"]
+    assert whole.missing == []
+    assert whole.noise["line_pressure"] == SETTINGS.next_experiment.pressure_noise
+    assert whole.sight("valve_dead_zone").verdict == "seen"
+    assert whole.sight("leak_muscle").block == "chamber"
+    chamber = whole.blocks[-1]
+    assert "through the line" in chamber["why"]
+    assert "no pressure is measured between" not in whole.text()
+
+
+def test_a_plan_says_what_that_gauge_would_add(planned) -> None:
+    without = planned(*(name for name in CHANNELS if name != "line_pressure"))
+    assert [block["name"] for block in without.blocks] == ["supply", "chamber"]
+    (line,) = without.missing
+    assert (line["name"], line["needs"]) == ("line", ["line_pressure"])
+    (gauge,) = (a for a in without.additions if a.kind == "channel")
+    assert gauge.name == "line_pressure"
+    assert gauge.bits > 0.0
+    assert "no pressure is measured between the valve's outlet and the muscle" in without.text()
+
+
+def test_a_plan_takes_each_block_as_its_channels_drive_it(planned) -> None:
+    """Behind a gauge at the line's inlet a chamber shows no valve, whatever other channels would
+    make of it.
+    """
+    few = planned("line_pressure", "muscle_pressure")
+    (chamber,) = few.blocks
+    assert chamber["drives"] == ["line_pressure"]
+    assert few.sight("valve_dead_zone").verdict == "not seen"
+    assert few.sight("valve_dead_zone").left == 0.0
+    # what is lost makes a pressure drop along the hose, and does not add up (decision 0093)
+    lost = few.sight("leak_muscle").left
+    assert 0.0 < lost < 0.5 * planned(*CHANNELS).sight("leak_muscle").left

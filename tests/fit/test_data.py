@@ -756,13 +756,32 @@ def test_description_problems_are_named(described, old, new, match):
         load_measured_muscle(described)
 
 
+@pytest.mark.parametrize("how", ["named", "a link"])
+def test_a_table_outside_the_folder_of_its_description_is_not_opened(described, how):
+    table = described.with_name("map.csv")
+    folder = described.parent / "elsewhere"
+    folder.mkdir()
+    moved = described.rename(folder / "map.toml")
+    text = moved.read_text(encoding="utf-8")
+    assert '"map.csv"' in text
+    if how == "named":
+        moved.write_text(text.replace('"map.csv"', '"../map.csv"'), encoding="utf-8")
+    else:
+        (folder / "map.csv").symlink_to(table)
+    for load in (load_measured_muscle, load_force_map):
+        with pytest.raises(RecordingError, match=r"map.csv'?: lies outside .* --allow-outside"):
+            load(moved)
+    data = load_force_map(moved, allow_outside=True)
+    np.testing.assert_array_equal(data.force[data.used], [95.0, 130.0, 80.0])
+
+
 @needs_festo
 @pytest.mark.parametrize(
     ("name", "used", "clipped", "levels"),
     [("DMSP-20-300", 60, 66, 20), ("DMSP-10-250", 40, 45, 16)],
 )
 def test_festo_maps_leave_the_clipped_zeros_out(name, used, clipped, levels):
-    measured = load_measured_muscle(CASE / f"{name}.toml")
+    measured = load_measured_muscle(CASE / f"{name}.toml", allow_outside=True)
     assert measured.data.used.sum() == used
     assert measured.data.reason.count("clipped") == clipped
     assert len(measured.data.levels) == levels

@@ -122,3 +122,102 @@ def test_what_lies_outside_is_not_opened(tmp_path: Path) -> None:
     assert "recording[0].file = 'link.csv': lies outside the case folder" in message
     with pytest.raises(CaseError, match="it is a device"):
         load_case(home, allow_outside=True)
+
+
+def outside_rig(home: Path) -> Path:
+    """A rig beside a case folder."""
+    pamrs.rigs.sealed_chamber().to_toml(home.parent / "secret.toml")
+    return home.parent / "secret.toml"
+
+
+RECORDING = '[[recording]]\nfile = "run.csv"\n'
+
+
+@pytest.mark.parametrize("named", ["", 'rig = "rig.toml"\n', 'rig = "."\n', 'rig = "bench"\n'])
+def test_a_rig_file_that_is_a_link_out_of_the_folder_is_not_opened(
+    tmp_path: Path, named: str
+) -> None:
+    """Also where it is not named, and in a folder that is."""
+    home = tmp_path / "stand"
+    (home / "bench").mkdir(parents=True)
+    (home / "case.toml").write_text(f'schema = "pamrs.case/1"\n{named}{RECORDING}')
+    (home / "run.csv").write_text(
+        "time [s],muscle_pressure [Pa]\n" + "".join(f"{k},{1e5 + k}\n" for k in range(40))
+    )
+    there = home / ("bench/rig.toml" if "bench" in named else "rig.toml")
+    there.symlink_to(outside_rig(home))
+    with pytest.raises(CaseError, match=r"rig = .*: .*lies outside the case folder"):
+        load_case(home)
+    assert load_case(home, allow_outside=True).rig.name == "sealed_chamber"
+    there.unlink()
+    pamrs.rigs.sealed_chamber().to_toml(there)
+    assert load_case(home).rig.name == "sealed_chamber"
+
+
+def test_a_description_that_is_a_link_out_of_its_folder_is_not_opened(tmp_path: Path) -> None:
+    home = tmp_path / "stand"
+    home.mkdir()
+    outside_rig(home)
+    (home / "case.toml").symlink_to(tmp_path / "secret.toml")
+    with pytest.raises(CaseError, match=r"case.toml: lies outside the case folder"):
+        load_case(home)
+    with pytest.raises(CaseError, match=r"'pamrs.rig/1' is not allowed"):  # opened on request
+        load_case(home, allow_outside=True)
+
+
+def test_a_link_in_the_folder_of_a_bag_is_not_opened(tmp_path: Path) -> None:
+    home = tmp_path / "stand"
+    (home / "bag").mkdir(parents=True)
+    pamrs.rigs.sealed_chamber().to_toml(home / "rig.toml")
+    (home / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    (home / "bag" / "bag_0.db3").symlink_to(tmp_path / "other.db3")
+    (home / "case.toml").write_text(
+        'schema = "pamrs.case/1"\n[[recording]]\nfile = "bag"\n[recording.channels]\n'
+        'muscle_pressure = { column = "p", unit = "bar" }\n'
+    )
+    with pytest.raises(CaseError, match=r"file = 'bag': .*bag_0.db3 lies outside the case folder"):
+        load_case(home)
+
+
+def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
+    """An HDF5 file can lead to any other: by raw storage, by virtual data sets, by links."""
+    h5py = pytest.importorskip("h5py")
+    secret = np.arange(40.0)
+    secret.tofile(tmp_path / "secret.bin")
+    with h5py.File(tmp_path / "secret.h5", "w") as file:
+        file["p"] = secret
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["own"] = secret + 1.0
+        stored = [(str(tmp_path / "secret.bin"), 0, secret.nbytes)]
+        file.create_dataset("raw", secret.shape, "f8", external=stored)
+        layout = h5py.VirtualLayout(secret.shape, "f8")
+        layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
+        file.create_virtual_dataset("virtual", layout)
+        file["link"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
+        assert file["raw"][3] == file["virtual"][3] == file["link"][3] == 3.0  # they do lead there
+    log = read_log(tmp_path / "run.h5")
+    assert list(log.series) == ["own"]
+    assert log.unread["raw"] == log.unread["virtual"]
+    assert "its numbers lie in another file; copy them into this one" in log.unread["raw"]
+
+
+@pytest.mark.parametrize("how", ["raw", "virtual", "link"])
+def test_a_matlab_file_that_leads_to_another_is_refused(tmp_path: Path, how: str) -> None:
+    h5py = pytest.importorskip("h5py")
+    pytest.importorskip("matio")
+    secret = np.arange(40.0)
+    secret.tofile(tmp_path / "secret.bin")
+    with h5py.File(tmp_path / "run.mat", "w", userblock_size=512) as file:
+        group = file.create_group("daq")
+        if how == "raw":
+            stored = [(str(tmp_path / "secret.bin"), 0, secret.nbytes)]
+            made = group.create_dataset("p", secret.shape, "f8", external=stored)
+            made.attrs["MATLAB_class"] = np.bytes_("double")
+        elif how == "virtual":
+            layout = h5py.VirtualLayout(secret.shape, "f8")
+            layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
+            group.create_virtual_dataset("p", layout)
+        else:
+            group["p"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
+    with pytest.raises(RecordingError, match=r"run.mat: .*p: .* into this (file|one)"):
+        read_log(tmp_path / "run.mat")

@@ -192,7 +192,7 @@ def _plan(
     noise: dict[str, float] = {}
     if pressure_noise is not None:
         noise |= dict.fromkeys(
-            ("supply_pressure", "muscle_pressure"),
+            ("supply_pressure", "line_pressure", "muscle_pressure"),
             exact("pressure_noise", pressure_noise, "pressure"),
         )
     if angle_noise is not None:

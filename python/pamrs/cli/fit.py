@@ -59,6 +59,10 @@ _Where = Annotated[
 ]
 _Clipped = Annotated[str | None, typer.Option(help='A force that means off the scale, like "0 N".')]
 _Picture = Annotated[Path | None, typer.Option("--png", help="Write the summary picture.")]
+_Outside = Annotated[
+    bool,
+    typer.Option("--allow-outside", help="A description's table may lie outside its folder."),
+]
 
 fit_app = typer.Typer(help="Fit models to measurements.")
 
@@ -140,6 +144,7 @@ def _muscle(
     ] = None,
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
     png: _Picture = None,
+    allow_outside: _Outside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
     outputs = _Outputs(report=report, rig=rig, json=json, png=png)
@@ -151,7 +156,7 @@ def _muscle(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
         )
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    inputs = _inputs(data, muscle, sizes, where or [], clipped)
+    inputs = _inputs(data, muscle, sizes, where or [], clipped, allow_outside)
     shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
     from pamrs.fit import FitError, fit_muscle
 
@@ -198,13 +203,14 @@ def _map(
     json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {MAP_SCHEMA}).")] = (
         None
     ),
+    allow_outside: _Outside = False,
 ) -> None:
     """Make a table of forces of measurements alone, monotone in pressure and contraction: a muscle
     that no force model has to fit. Its geometry gives the volume only.
     """
     check_writable(rig, json)
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    inputs = _inputs(data, muscle, sizes, where or [], clipped)
+    inputs = _inputs(data, muscle, sizes, where or [], clipped, allow_outside)
     from pamrs.fit import fit_map
 
     with progress(f"fitting {inputs.data.label}"):
@@ -239,6 +245,7 @@ def _friction(
         Path | None, typer.Option(help=f"Write the result (schema {FRICTION_SCHEMA}).")
     ] = None,
     png: _Picture = None,
+    allow_outside: _Outside = False,
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its
     geometry, the rest length is enough.
@@ -246,7 +253,7 @@ def _friction(
     check_writable(json, png)
     check_packages("report", *(["matplotlib"] if png else []))
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    map_ = _loops(data, muscle, sizes, where or [], clipped).with_directions()
+    map_ = _loops(data, muscle, sizes, where or [], clipped, allow_outside).with_directions()
     from pamrs.fit import fit_friction
 
     with progress(f"fitting {map_.label}"):
@@ -416,6 +423,7 @@ def _inputs(
     sizes: Mapping[str, str],
     where: Sequence[str],
     clipped: str | None,
+    allow_outside: bool,
 ) -> _Inputs:
     """From a description, or from a table and the options."""
     from pamrs.errors import ParameterError
@@ -431,7 +439,7 @@ def _inputs(
             )
         from pamrs.fit import load_measured_muscle
 
-        measured = load_measured_muscle(data)
+        measured = load_measured_muscle(data, allow_outside=allow_outside)
         return _Inputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
     start, tolerance, base = _start(muscle, sizes)
     map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
@@ -456,6 +464,7 @@ def _loops(
     sizes: Mapping[str, str],
     where: Sequence[str],
     clipped: str | None,
+    allow_outside: bool,
 ) -> ForceMap:
     """The map of hysteresis loops: friction needs the rest length alone, any other size is for the
     check of the forces.
@@ -463,7 +472,7 @@ def _loops(
     from pamrs.errors import ParameterError
 
     if data.suffix.lower() == ".toml" or muscle is not None or set(sizes) - {"rest_length"}:
-        return _inputs(data, muscle, sizes, where, clipped).data
+        return _inputs(data, muscle, sizes, where, clipped, allow_outside).data
     if not sizes:
         raise ParameterError(
             "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a "

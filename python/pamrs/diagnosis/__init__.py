@@ -33,6 +33,7 @@ from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
+    at_ambient,
     available_blocks,
     averaged_to_need,
     begun_alike,
@@ -210,9 +211,8 @@ def diagnose(
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
-    held = _said_of_held(case.rig)
     suspected = suspected_units(case)
-    case = case.with_rig(without_passing(case.rig))
+    case, held = _nominal(case)
     chosen = DiagnosisSettings() if settings is None else settings
     try:
         check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
@@ -293,6 +293,14 @@ def _check_rig(case: Case) -> None:
                 f"parameters of recording {recording.name!r}: {', '.join(fixed)} cannot differ "
                 f"between recordings of a diagnosis; what can: {', '.join(sorted(varying))}"
             )
+
+
+def _nominal(case: Case) -> tuple[Case, list[str]]:
+    """The case with the rig that its recordings were made on as far as that is known before any
+    fit, and what that is, in words.
+    """
+    rig, said = at_ambient(case.rig, case.recordings)
+    return case.with_rig(without_passing(rig)), [*said, *_said_of_held(rig)]
 
 
 def _said_of_held(rig: Rig) -> list[str]:

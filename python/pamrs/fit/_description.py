@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from pamrs._files import parse_toml, read_toml
+from pamrs._files import is_inside, parse_toml, read_toml
 from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
@@ -71,13 +71,15 @@ class Description(NamedTuple):
     text: str
 
 
-def read_description(file: Path) -> Description:
+def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     """Read a ``pamrs.force_map/1`` file, but not yet its table.
 
     Parameters
     ----------
     file : Path
         The TOML file.
+    allow_outside : bool
+        Whether its table may lie outside its folder.
 
     Returns
     -------
@@ -116,6 +118,12 @@ def read_description(file: Path) -> Description:
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
     table = Path(os.path.normpath(file.parent / texts["file"]))
+    if not (allow_outside or "\0" in texts["file"] or is_inside(file.parent, table)):
+        raise RecordingError(
+            f"{file}: file = {texts['file']!r}: lies outside the folder of the description; copy "
+            "it there, or allow it with --allow-outside (in Python: load_measured_muscle(..., "
+            "allow_outside=True))"
+        )
     if not table.exists():
         advice = texts["source"] or "correct file in the description"
         raise RecordingError(

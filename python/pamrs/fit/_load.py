@@ -56,6 +56,7 @@ def load_force_map(
     delimiter: str | None = None,
     decimal: str | None = None,
     name: str | None = None,
+    allow_outside: bool = False,
 ) -> ForceMap:
     """Read a force map.
 
@@ -66,7 +67,7 @@ def load_force_map(
         contraction, pressure, force and, if known, direction (-1 or "contracting", 1 or
         "lengthening"). Units are in the headings: ``length [mm]``, ``pressure_kPa``,
         ``force (N)``. With a column ``time`` it is read as a recording of a bench. Or a ``.toml``
-        description (schema ``pamrs.force_map/1``), to which no other argument applies.
+        description (schema ``pamrs.force_map/1``), to which only `allow_outside` applies.
     rest_length : float, optional
         Length at zero contraction [m]; needed for a table.
     columns : mapping of str to str, optional
@@ -84,6 +85,8 @@ def load_force_map(
         the point.
     name : str, optional
         What to call the map; by default the file's stem, or what the description says.
+    allow_outside : bool
+        Whether the table of a description may lie outside the description's folder.
 
     Returns
     -------
@@ -112,7 +115,7 @@ def load_force_map(
         }.items():
             if value is not None:
                 raise ParameterError(f"{key} cannot be given: {file} describes its table itself")
-        return load_measured_muscle(file).data
+        return load_measured_muscle(file, allow_outside=allow_outside).data
     return read_map(
         file,
         rest_length=rest_length,
@@ -126,7 +129,9 @@ def load_force_map(
     )
 
 
-def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
+def load_measured_muscle(
+    path: str | os.PathLike[str], *, allow_outside: bool = False
+) -> MeasuredMuscle:
     """Read a ``pamrs.force_map/1`` description: where the table is, what its columns are, which
     muscle it is of.
 
@@ -137,6 +142,8 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
         headings to headings with units; ``where`` picks rows; ``clipped_force``,
         ``level_tolerance`` and ``noise`` are quantities; ``[muscle]`` is as in a rig file, with
         ``tol`` as the standard deviation of what is known.
+    allow_outside : bool
+        Whether the table may lie outside the file's folder (``../map.csv``, or links).
 
     Returns
     -------
@@ -147,7 +154,7 @@ def load_measured_muscle(path: str | os.PathLike[str]) -> MeasuredMuscle:
     RecordingError
         With every problem found in the description, or if the table cannot be read.
     """
-    found = read_description(Path(path))
+    found = read_description(Path(path), allow_outside=allow_outside)
     data = load_force_map(found.table, **found.options)
     return MeasuredMuscle(
         data.checked_against(found.muscle), found.muscle, found.tolerance, found.noise, found.text

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._files import is_inside, parse_toml, read_toml
+from pamrs._files import found_outside, parse_toml, read_toml
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._recording import OwnValue, Recording, load_recording
@@ -30,6 +30,11 @@ _DIALECT: Final = ("delimiter", "decimal", "thousands", "header")
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
 _ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
 _ERRORS: Final = ("same", "proportional", "none")
+_RIG: Final = "rig.toml"
+_LIES_OUTSIDE: Final = (
+    "lies outside the case folder; copy it there, or allow it with "
+    "--allow-outside (in Python: load_case(..., allow_outside=True))"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,7 +104,8 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
         file that a diagnosis wrote and that says from which case, which then is that case with this
         rig. File names in it are relative to the folder.
     allow_outside : bool
-        Whether the rig file and recordings may lie outside the folder (``../run.csv``, or links).
+        Whether ``case.toml``, the rig file and recordings may lie outside the folder
+        (``../run.csv``, or links, those in the folder of a bag too).
 
     Returns
     -------
@@ -118,6 +124,8 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
         return load_case(case, allow_outside=allow_outside).with_rig(model)
     file = given if given.name == "case.toml" else given / "case.toml"
     home = file.parent
+    if file != given and not allow_outside and found_outside(home, file) is not None:
+        raise CaseError(f"{file}: {_LIES_OUTSIDE}")
     document = _document(file, given)
     problems: list[str] = []
     _unknown(problems, "", document, _TOP)
@@ -129,7 +137,7 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     outside = [] if allow_outside else _outside(home, document)
     if outside:  # nothing there is opened
         raise CaseError(joined(str(file), [*problems, *outside]))
-    rig = _rig(problems, home, _text(problems, document, "rig", "rig.toml"))
+    rig = _rig(problems, home, _text(problems, document, "rig", _RIG))
     recordings = _recordings(problems, home, document.get("recording"), source, rig)
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
@@ -202,16 +210,17 @@ def _text(problems: list[str], document: Mapping[str, Any], key: str, default: s
 def _outside(home: Path, document: Mapping[str, Any]) -> list[str]:
     """Files that lie outside the case folder."""
     entries = document.get("recording")
-    named = [("rig", document.get("rig"))] + [
+    named = [("rig", document.get("rig", _RIG))] + [
         (f"recording[{index}].file", entry.get("file"))
         for index, entry in enumerate(entries if isinstance(entries, list) else [])
         if isinstance(entry, Mapping)
     ]
     return [
-        f"{key} = {name!r}: lies outside the case folder; copy it there, or allow it with "
-        "--allow-outside (in Python: load_case(..., allow_outside=True))"
+        f"{key} = {name!r}: {'' if there == home / name else f'{there} '}{_LIES_OUTSIDE}"
         for key, name in named
-        if isinstance(name, str) and "\0" not in name and not is_inside(home, home / name)
+        if isinstance(name, str)
+        and "\0" not in name
+        and (there := found_outside(home, home / name)) is not None
     ]
 
 

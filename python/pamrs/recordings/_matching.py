@@ -40,6 +40,11 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
         ("force", "force kraft loadcell", "load cell f fz"),
         ("joint_torque", "torque moment drehmoment", "m mz joint"),
         ("temperature", "temperature temp temperatur", "thermo tc air"),
+        (
+            "ambient_temperature",
+            "ambient umgebung room raum raumtemperatur tamb troom",
+            "temperature temp temperatur thermo tc air",
+        ),
         ("reference", "reference ref desired target sollwert", "soll wanted"),
     )
 }
@@ -274,7 +279,7 @@ def _unit_for(name: str, series: Series, rig: Rig | None) -> tuple[str, str]:
         return ("rad" if max(abs(low), abs(high)) <= 6.3 else "deg"), numbers
     if channel == "length":
         return ("m" if max(abs(low), abs(high)) <= 3.0 else "mm"), numbers
-    if channel == "temperature":
+    if channel in ("temperature", "ambient_temperature"):
         return ("K" if low > 200.0 else "degC"), numbers
     return CHANNELS[channel].unit.replace("N m", "Nm"), numbers
 

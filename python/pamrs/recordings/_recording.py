@@ -69,6 +69,7 @@ CHANNELS: Final[dict[str, _Channel]] = {
         ("force", -1e7, 1e7),
         ("joint_torque", -1e7, 1e7),
         ("temperature", 50.0, 2000.0),
+        ("ambient_temperature", 50.0, 2000.0),
         ("reference", -1e9, 1e9),
     )
 }

@@ -18,7 +18,9 @@ from pamrs.recordings._recording import Issue, Recording, judged
 __all__ = ["UNTOLD", "Sampled", "on_one_clock"]
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
-SLOW: Final = frozenset({"temperature"})  # need not last as long as the others
+SLOW: Final = frozenset(
+    {"temperature", "ambient_temperature"}
+)  # need not last as long as the others
 #: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
 UNTOLD: Final = SLOW | COMMANDS
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most

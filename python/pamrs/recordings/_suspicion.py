@@ -116,7 +116,7 @@ def suspicions(
             continue
         if kind in PRESSURES:
             found += _pressure(name, unit, channels, rig)
-        elif kind == "temperature":
+        elif kind in ("temperature", "ambient_temperature"):
             found += _temperature(name, unit, values)
         elif kind in ("joint_angle", "length"):
             found += _range(name, unit, values, rig)

@@ -8,7 +8,7 @@ import numpy as np
 
 from pamrs import _core
 from pamrs.channels import channel_of
-from pamrs.diagnosis.prepare import Block
+from pamrs.diagnosis.prepare import AMBIENT, Block
 from pamrs.findings import RecordingUsed
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -24,6 +24,15 @@ _BELONGS = {
     "length": "load",
 }
 """Block of a rig that a channel is of."""
+
+
+_SHOWN = {
+    "temperature": (
+        "it is that of the gas, and a block predicts pressure, motion or force; pamrs replay "
+        "compares it with the simulated one. That of the room is ambient_temperature"
+    ),
+}
+"""Channels that a simulation has and no block predicts, in words."""
 
 
 def data_used(
@@ -63,7 +72,7 @@ def data_used(
         unused = {
             name: _why(name, rig, core, left_out)
             for name in recording.channels
-            if name not in needed
+            if name not in needed and channel_of(name) != AMBIENT
         }
         found.append(
             RecordingUsed(
@@ -89,6 +98,8 @@ def data_used(
 def _why(name: str, rig: Rig, core: _core.Rig, thinned: bool) -> str:
     """Why a channel is not used."""
     kind, _, block = name.partition(".")
+    if kind in _SHOWN:
+        return _SHOWN[kind]
     table = _BELONGS.get(channel_of(name), "")
     if name in core.channels or name in core.inputs:
         after = " or its block was left out" if thinned else ""

@@ -4,8 +4,8 @@ Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `apart`, `in
 `entropy`, `experiments_of`, `protocol_of`, `spoken` (experiments compared); `Experiment`, `Range`,
 `library`, `pressure_range`, `trial_of`, `is_sealed` (what a person can record); `Plan`, `Sight`,
 `Addition`, `plan_diagnosis` (before there are data); `MEASURABLE`, `Left`, `Linear`,
-`checked_channels`, `difference`, `linear`, `misfit`, `problem_of`, `taken`, `usual_noise`,
-`weights_of` (how far two models differ).
+`checked_channels`, `counted`, `difference`, `linear`, `misfit`, `problem_of`, `taken`,
+`usual_noise`, `weights_of` (how far two models differ).
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     Left,
     Linear,
     checked_channels,
+    counted,
     difference,
     linear,
     misfit,
@@ -60,6 +61,7 @@ __all__ = [
     "Sight",
     "apart",
     "checked_channels",
+    "counted",
     "difference",
     "entropy",
     "experiments_of",

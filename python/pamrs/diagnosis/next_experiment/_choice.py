@@ -22,10 +22,11 @@ from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     Left,
-    Linear,
     checked_channels,
+    counted,
     difference,
     elsewhere,
+    judged_alike,
     linear,
     problem_of,
     taken,
@@ -186,13 +187,13 @@ def outcome_of(
     measured = (*channels, *((sensor,) if sensor else ()))
     heard = {c: v for c, v in noise.items() if c in measured}
 
-    def cut(one: tuple[Rig, Simulation]) -> tuple[Problem, Linear]:
+    def cut(one: tuple[Rig, Simulation]) -> Problem:
         rig, run = one
         recording = taken(run, rig, experiment.name, heard, settings)
-        problem = _telling(problem_of(rig, [recording], measured, settings), rigs)
-        return problem, linear(problem, rig)
+        return _telling(problem_of(rig, [recording], measured, settings), rigs)
 
-    problems, own = zip(*two_at_a_time(cut, zip(rigs, runs, strict=True)), strict=True)
+    problems = judged_alike(two_at_a_time(cut, zip(rigs, runs, strict=True)))
+    own = two_at_a_time(lambda one: linear(*one), zip(problems, rigs, strict=True))
     weights = weights_of(problems[0], rigs[0])
 
     def missed(pair: tuple[int, int]) -> Left:
@@ -473,9 +474,12 @@ def _channels(
 
 
 def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> list[str]:
-    """Channels that the rig could have and that are not measured."""
+    """Channels that the rig could have and that are not measured; a gauge between valve and line,
+    for which the line has to be cut, is offered by a plan alone.
+    """
     has = core_rig(rig).channels
-    return [name for name in sensors if name in has and name not in own]
+    found = [name for name in sensors if name in has and name not in own]
+    return [name for name in found if name != "line_pressure"]
 
 
 def experiments_of(
@@ -554,7 +558,8 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
     """
     others = range(1, len(hypotheses))
     key = max(best.left[0, 1].rms, key=lambda k: max(best.left[0, j].rms[k] for j in others))
-    channel = next(b.channel for b in best.problem.blocks if b.name == key[0])
+    block = next(b for b in best.problem.blocks if b.name == key[0])
+    channel = block.channel
     labels = [label for label, _, _ in hypotheses]
     prepared = best.problem.recordings[0]
     settings = best.problem.settings
@@ -573,5 +578,5 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
         left={labels[j]: best.left[0, j].rows[key] for j in others},
         noise=prepared.noise[channel] / math.sqrt(width) * best.weights[key],
         command=best.experiment.command,
-        samples_counted=settings.next_experiment.effective_samples,
+        samples_counted=counted(prepared, block, settings.next_experiment),
     )

@@ -11,7 +11,7 @@ parameters inside what is known of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +19,15 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels
-from pamrs.diagnosis.prepare import Prepared, Residual, available_blocks, binned, prepare
+from pamrs.diagnosis.prepare import (
+    Block,
+    Prepared,
+    Residual,
+    available_blocks,
+    begun_alike,
+    binned,
+    prepare,
+)
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
@@ -32,7 +40,9 @@ __all__ = [
     "Left",
     "Linear",
     "checked_channels",
+    "counted",
     "difference",
+    "judged_alike",
     "linear",
     "misfit",
     "problem_of",
@@ -45,13 +55,14 @@ Array = NDArray[np.float64]
 
 COMMANDS = ("valve_command", "supply_command")
 """Channels that a person sends."""
-MEASURABLE = (*COMMANDS, "supply_pressure", "muscle_pressure", "joint_angle", "length")
+_PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
+MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length")
 """Channels that the cut chain uses."""
 
 
 def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
     """Sample noise of usual transducers by channel [SI]."""
-    pressures = dict.fromkeys(("supply_pressure", "muscle_pressure"), settings.pressure_noise)
+    pressures = dict.fromkeys(_PRESSURES, settings.pressure_noise)
     return pressures | {"joint_angle": settings.angle_noise, "length": settings.length_noise}
 
 
@@ -149,7 +160,32 @@ def problem_of(
             f"{rig.name!r} ({', '.join(rig.blocks)}); measure muscle_pressure, and supply_pressure "
             "and joint_angle where the rig has them"
         )
-    return Problem(blocks, recordings, core_rig(rig), settings)
+    core = core_rig(rig)
+    return Problem(blocks, [begun_alike(blocks, core, p) for p in recordings], core, settings)
+
+
+def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
+    """The same problems, whose recordings of one experiment are judged from the same sample on: the
+    last one at which any of them still depends on a beginning that nobody measured.
+    """
+    latest: dict[str, int] = {}
+    for prepared in (p for problem in problems for p in problem.recordings):
+        for channel, count in prepared.unsettled.items():
+            latest[channel] = max(count, latest.get(channel, 0))
+    if not latest:
+        return list(problems)
+    return [
+        replace(problem, recordings=[replace(p, unsettled=latest) for p in problem.recordings])
+        for problem in problems
+    ]
+
+
+def counted(prepared: Prepared, block: Block, settings: NextExperimentSettings) -> float:
+    """Independent samples that a recording counts as in a block: fewer where its beginning is not
+    judged.
+    """
+    dropped = min(prepared.n, prepared.unsettled.get(block.channel, 0))
+    return settings.effective_samples * (1.0 - dropped / prepared.n)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,9 +312,10 @@ def _left(
     problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
 ) -> Left:
     spread = np.array(list(model.free.values()))
-    effective = problem.settings.next_experiment.effective_samples
+    own_settings = problem.settings.next_experiment
     rows, slopes, scales = [], [], []
     keys: list[Key] = []
+    sizes: dict[Key, float] = {}
     for prepared in problem.recordings:
         width = bin_width(prepared, problem.settings.noise.fit_bin_time)
         for block in problem.blocks:
@@ -293,7 +330,8 @@ def _left(
             )
             # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in
             # coarse ones
-            scale = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
+            sizes[key] = counted(prepared, block, own_settings)
+            scale = math.sqrt(sizes[key] / max(1, int((counts > 0).sum()))) / noise_level
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)
@@ -309,6 +347,7 @@ def _left(
     for key, part, scale in zip(keys, rows, scales, strict=True):
         own = left[start : start + part.size]
         start += part.size
-        rms[key] = math.sqrt(float(own @ own) / effective)
-        kept[key] = own / scale
+        # nothing is left of a recording that ends before its beginning is forgotten
+        rms[key] = math.sqrt(float(own @ own) / sizes[key]) if sizes[key] > 0.0 else 0.0
+        kept[key] = own / scale if scale > 0.0 else own
     return Left(rms, kept, float(left @ left + moved @ moved))

@@ -35,6 +35,7 @@ from pamrs.diagnosis.fit import (
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     checked_channels,
+    counted,
     taken,
     usual_noise,
     weights_of,
@@ -42,7 +43,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._protocols import Experiment, library
 from pamrs.diagnosis.noise import bins_of
-from pamrs.diagnosis.prepare import Block, available_blocks, binned
+from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
 from pamrs.effects import CATALOGUE
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -66,6 +67,14 @@ _LUMPED = {
     ),
     "arm": "neither force nor torque is measured between the muscle and the arm",
 }
+
+
+_BEHIND_LINE = (
+    "it is predicted from the command, through the line; what shows here and not at the line's "
+    "inlet lies behind the valve"
+)
+_Place = tuple[Block, str]
+"""A block, and the name of an experiment."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +124,8 @@ def plan_diagnosis(
         Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and
         arm without names, or a part.
     channels : iterable of str
-        Channels at hand, of ``valve_command``, ``supply_pressure``, ``muscle_pressure`` and
-        ``joint_angle``.
+        Channels at hand, of ``valve_command``, ``supply_pressure``, ``line_pressure`` (of a line
+        with an inlet), ``muscle_pressure`` and ``joint_angle`` or ``length``.
     noise : mapping of str to float, optional
         Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of
         the settings).
@@ -168,7 +177,8 @@ def plan_diagnosis(
         if _applies(rig, e, whole)
         for s in starts_of(e, sealed=rig.model["valve"] is None)
     ]
-    parts: dict[Key, _Part] = {}
+    parts: dict[_Place, _Part] = {}
+    layers = _layers(rig, every, whole, settings)
     usable = {}
     for name, experiment in pool.items():
         say(
@@ -176,10 +186,11 @@ def plan_diagnosis(
             f"{len({s.effect for s in starts})} effects"
         )
         try:
-            parts |= _parts(rig, whole, experiment, starts, sound, settings)
-            usable[name] = experiment
+            for layer in layers:
+                parts |= _parts(rig, layer, experiment, starts, sound, settings)
         except SimulationError:
             continue  # the cut chain leaves the range of the model there
+        usable[name] = experiment
     chosen = [name for name in chosen if name in usable]
     blocks = available_blocks(rig, own, settings.prepare)
     assumed = _Assumed(rig, parts, starts, settings)
@@ -191,7 +202,7 @@ def plan_diagnosis(
         rig=rig.name,
         channels=own,
         noise={c: sound[c] for c in own if c in sound},
-        blocks=[_described(block) for block in blocks],
+        blocks=[_described(block, blocks) for block in blocks],
         missing=[
             {"name": b.name, "covers": b.covers, "needs": assumed.needed(b.name, own, every)}
             for b in whole
@@ -214,7 +225,7 @@ class _Assumed:
     """
 
     rig: Rig
-    parts: dict[Key, _Part]
+    parts: dict[_Place, _Part]
     starts: list[Start]
     settings: DiagnosisSettings
 
@@ -315,14 +326,40 @@ def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
     return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
 
 
-def _described(block: Block) -> dict[str, Any]:
+def _layers(
+    rig: Rig, every: tuple[str, ...], whole: list[Block], settings: DiagnosisSettings
+) -> list[list[Block]]:
+    """Every block that some of the channels surround, in lists in which each name stands once: with
+    a gauge less, a block may be driven by other channels. All channels come first.
+    """
+    layers = [whole]
+    for count in range(len(every) - 1, 0, -1):
+        for several in itertools.combinations(every, count):
+            for block in available_blocks(rig, several, settings.prepare):
+                if any(block in layer for layer in layers):
+                    continue
+                free = (own for own in layers[1:] if all(b.name != block.name for b in own))
+                layer = next(free, None)
+                if layer is None:
+                    layers.append([block])
+                else:
+                    layer.append(block)
+    return layers
+
+
+def _described(block: Block, blocks: list[Block]) -> dict[str, Any]:
     lumped = block.covers != block.name
+    inside = "valve" in block.covers and any(b.name == "line" for b in blocks)
     return {
         "name": block.name,
         "channel": block.channel,
         "drives": list(block.drives),
         "covers": block.covers,
-        "why": _LUMPED.get(block.name, "") if lumped else "",
+        "why": _BEHIND_LINE
+        if inside and block.name == "chamber"
+        else _LUMPED.get(block.name, "")
+        if lumped
+        else "",
     }
 
 
@@ -333,19 +370,17 @@ def _parts(
     starts: list[Start],
     noise: Mapping[str, float],
     settings: DiagnosisSettings,
-) -> dict[Key, _Part]:
+) -> dict[_Place, _Part]:
     """Products of everything that one experiment shows, by block."""
     stands = experiment.changed(rig)
     prepared = taken(experiment.simulate(rig), stands, experiment.name, noise, settings)
+    prepared = begun_alike(blocks, core_rig(stands), prepared)
     problem = Problem(blocks, [prepared], core_rig(stands), settings)
     baseline = free_baseline(problem, stands)
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
     spread = np.array([stands.parameter(name).tol for name in baseline])
-    width, effective = (
-        bin_width(prepared, settings.noise.fit_bin_time),
-        settings.next_experiment.effective_samples,
-    )
+    width = bin_width(prepared, settings.noise.fit_bin_time)
     scale, slopes, moved = {}, {}, {}
     for block in blocks:
         key = (block.name, experiment.name)
@@ -354,6 +389,7 @@ def _parts(
             np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
         )
         noise_level = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
+        effective = counted(prepared, block, settings.next_experiment)
         scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
@@ -369,24 +405,27 @@ def _parts(
             key = (block.name, experiment.name)
             mean, _ = binned(found[key].value - base[key].value, base[key].rows, width)
             moved[key][:, index] = mean * scale[key]
-    return {
-        k: _Part(slopes[k].T @ slopes[k], slopes[k].T @ moved[k], moved[k].T @ moved[k])
-        for k in slopes
-    }
+    products: dict[_Place, _Part] = {}
+    for block in blocks:
+        slope, change = (part[block.name, experiment.name] for part in (slopes, moved))
+        products[block, experiment.name] = _Part(
+            slope.T @ slope, slope.T @ change, change.T @ change
+        )
+    return products
 
 
 def _picture(
-    parts: Mapping[Key, _Part],
+    parts: Mapping[_Place, _Part],
     blocks: list[Block],
     experiments: Sequence[str],
     starts: list[Start],
     settings: DiagnosisSettings,
 ) -> _Picture:
     """What some blocks over some experiments show."""
-    used = {
-        key: part
-        for key, part in parts.items()
-        if key[0] in {b.name for b in blocks} and key[1] in experiments
+    used: dict[Key, _Part] = {
+        (block.name, name): part
+        for (block, name), part in parts.items()
+        if block in blocks and name in experiments
     }
     effects = list(dict.fromkeys(s.effect for s in starts))
     own_settings = settings.plan

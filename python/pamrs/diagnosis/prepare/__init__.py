@@ -1,7 +1,8 @@
 """Recordings made ready for the cut chain: checked, smoothed, cut into blocks that are predicted
 from their measured neighbours.
 
-Public: `averaged`, `averaged_to_need` (long recordings), `overlap`, `without_copies`, `Overlap`
+Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
+(long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
 recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed` (signals),
@@ -11,6 +12,7 @@ their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody me
 
 from __future__ import annotations
 
+from pamrs.diagnosis.prepare._ambient import AMBIENT, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings
 from pamrs.diagnosis.prepare._blocks import (
@@ -33,10 +35,12 @@ from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prep
 from pamrs.diagnosis.prepare._units import suspected_units
 
 __all__ = [
+    "AMBIENT",
     "Block",
     "Overlap",
     "Prepared",
     "Residual",
+    "at_ambient",
     "available_blocks",
     "averaged",
     "averaged_to_need",

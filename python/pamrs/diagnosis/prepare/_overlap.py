@@ -8,8 +8,8 @@ noise is the same, and not its command alone.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,15 @@ class Overlap:
         From when to when in the recording and in the other one [s].
     share : float
         Share of the recording's time.
+    free : tuple of (start, stop)
+        Stretches of the recording that are not in the other one [s]: beyond its ends, or with noise
+        that it does not tell. Where nothing can be told, the samples count as shared.
     """
 
     own: tuple[float, float]
     other: tuple[float, float]
     share: float
+    free: tuple[tuple[float, float], ...] = field(default=(), repr=False)
 
 
 def without_copies(
@@ -49,45 +53,93 @@ def without_copies(
 ) -> tuple[list[Recording], list[str]]:
     """Recordings that prove something, and what was left out, in words.
 
-    A held-out recording that shares samples with a fitted one is left out of the proof; so is one
-    of two recordings of the same role most of which is a copy.
+    Of a held-out recording that shares samples with a fitted one only the stretches are kept that
+    it does not share, some time away from what it does; none where they are short. Of two
+    recordings of the same role the second is left out where most of it is a copy.
 
     Parameters
     ----------
     recordings : sequence of Recording
         All of a case.
     settings : OverlapSettings
-        What counts as the same.
+        What counts as the same, and what is long enough to be kept.
 
     Returns
     -------
     kept : list of Recording
+        In their order; a stretch has the name of its recording, one of several its times too.
     said : list of str
-        A sentence for each that was left out.
+        A sentence for each of which something was left out.
     """
-    fitted = [r for r in recordings if r.role == "fit"]
-    kept: list[Recording] = []
+    order = [r for r in recordings if r.role == "fit"]
+    kept: dict[int, list[Recording]] = {}
     said: list[str] = []
-    for recording in [*fitted, *(r for r in recordings if r.role != "fit")]:
-        for other in kept:
-            found = overlap(recording, other, settings)
-            across = recording.role != other.role
-            if found is None or not (across or found.share > settings.copy_share):
-                continue
-            why = (
-                "it is no held-out proof and was left out of it"
-                if across
-                else "it says nothing more and was left out"
-            )
-            said.append(
-                f"{_called(recording)} holds the same samples as {_called(other)}, noise included "
-                f"({found.own[0]:.4g} to {found.own[1]:.4g} s are its {found.other[0]:.4g} to "
-                f"{found.other[1]:.4g} s): {why}"
-            )
-            break
-        else:
-            kept.append(recording)
-    return [r for r in recordings if any(r is own for own in kept)], said
+    for recording in [*order, *(r for r in recordings if r.role != "fit")]:
+        before = [one for parts in kept.values() for one in parts]
+        kept[id(recording)], told = _new_in(recording, before, settings)
+        said += told
+    return [one for r in recordings for one in kept[id(r)]], said
+
+
+def _new_in(
+    recording: Recording, before: Sequence[Recording], settings: OverlapSettings
+) -> tuple[list[Recording], list[str]]:
+    """What of a recording is not in others, and a sentence where that is not all of it."""
+    for other in before:
+        found = overlap(recording, other, settings)
+        across = recording.role != other.role
+        if found is None or not (across or found.share > settings.copy_share):
+            continue
+        same = (
+            f"{_called(recording)} holds the same samples as {_called(other)}, noise included "
+            f"({found.own[0]:.4g} to {found.own[1]:.4g} s are its {found.other[0]:.4g} to "
+            f"{found.other[1]:.4g} s): "
+        )
+        if not across:
+            return [], [same + "it says nothing more and was left out"]
+        left = _left_of(recording, found.free, before, settings)
+        if not left:
+            spent = max((stop - start for start, stop in found.free), default=0.0)
+            short = f"; the longest stretch that it does not share, {spent:.3g} s, is too short"
+            why = "it is no held-out proof and was left out of it"
+            return [], [same + why + (short if spent > 0.0 else "")]
+        parts = " and ".join(f"{start:.4g} to {stop:.4g} s" for start, stop in left)
+        cut = [recording.between(*part) for part in left]
+        if len(cut) > 1:
+            cut = [
+                replace(one, name=f"{one.name}, {part[0]:.4g} to {part[1]:.4g} s")
+                for one, part in zip(cut, left, strict=True)
+            ]
+        said = [same + f"of it {parts} are held out, the rest is no proof"]
+        once = [_new_in(one, before, settings) for one in cut]
+        return [one for kept, _ in once for one in kept], [
+            *said,
+            *(s for _, told in once for s in told),
+        ]
+    return [recording], []
+
+
+def _left_of(
+    recording: Recording,
+    free: Sequence[tuple[float, float]],
+    before: Sequence[Recording],
+    settings: OverlapSettings,
+) -> list[tuple[float, float]]:
+    """Stretches that share nothing with any recording of another role, long enough for a proof."""
+    least = max(settings.least_left, settings.least_samples * recording.sample_time)
+    found: list[tuple[float, float]] = []
+    for start, stop in free:
+        if stop - start < least:
+            continue
+        part = recording.between(start, stop)
+        shared = (overlap(part, o, settings) for o in before if o.role != recording.role)
+        again = next((one for one in shared if one is not None), None)
+        if again is None:
+            found.append((start, stop))
+        elif again.free != ((0.0, part.duration),):  # shorter than before: this comes to an end
+            inner = [(start + a, start + b) for a, b in again.free if b - a < stop - start]
+            found += _left_of(recording, inner, before, settings)
+    return found
 
 
 def _called(recording: Recording) -> str:
@@ -119,17 +171,79 @@ def overlap(one: Recording, other: Recording, settings: OverlapSettings) -> Over
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
     if slow.sample_time > settings.most_rate_ratio * fast.sample_time:
         return None
-    found = [
-        (lag, *_same(slow, fast, names, lag, settings))
-        for lag in _lags(slow, fast, names, settings)
+    tried = [
+        (lag, _same(slow, fast, names, lag, settings)) for lag in _lags(slow, fast, names, settings)
     ]
-    lag, rows, count = max(found, key=lambda one: one[1].size)
+    lag, seen = max(tried, key=lambda one: one[1].same.sum())
+    rows = seen.rows[seen.same]
     if rows.size < settings.least_samples:
         return None
     at = float(slow.time[rows[0]]), float(slow.time[rows[-1]])
     shifted = at[0] + lag, at[1] + lag
     own, away = (at, shifted) if slow is one else (shifted, at)
-    return Overlap(own, away, min(1.0, count * slow.sample_time / max(one.duration, 1e-300)))
+    both = min(slow.duration, fast.duration - lag) - max(0.0, -lag)
+    share = min(1.0, both * float(seen.same.mean()) / max(one.duration, 1e-300))
+    taken = _taken(slow, fast, names, lag, settings)
+    shift = 0.0 if slow is one else lag
+    margin = settings.gap + _unsure(slow, settings) * slow.sample_time
+    taken = [(a + shift, b + shift) for a, b in taken]
+    return Overlap(own, away, share, _gaps(one.duration, taken, margin))
+
+
+def _unsure(slow: Recording, settings: OverlapSettings) -> int:
+    """Samples at the end of what is shared that may not be told as such: those of a window, and of
+    a whole block where blocks do not lie side by side.
+    """
+    whole = len(slow) <= settings.most_blocks * settings.block_samples
+    return settings.window_samples if whole else settings.block_samples
+
+
+def _taken(
+    slow: Recording,
+    fast: Recording,
+    names: list[str],
+    lag: float,
+    settings: OverlapSettings,
+) -> list[tuple[float, float]]:
+    """Stretches that two recordings share at a lag, in times of the slow one [s]: rows that are
+    told, and all beside them that are not denied over three windows or more.
+    """
+    at = slow.time + lag
+    free = (at < 0.0) | (at > fast.duration)
+    shared, denied = np.zeros(free.size, dtype=bool), np.zeros(free.size, dtype=bool)
+    # a block that is shared in part may deny all of it, so blocks begin at each of its windows
+    for phase in range(0, settings.block_samples, _unsure(slow, settings)):
+        seen = _same(slow, fast, names, lag, settings, phase)
+        shared[seen.rows[seen.same]] = True
+        denied[seen.rows] = seen.denied & (denied[seen.rows] | (phase == 0))
+    denied = np.flatnonzero(denied & ~shared)
+    own = np.zeros(free.size, dtype=bool)
+    for run in np.split(denied, np.flatnonzero(np.diff(denied) != 1) + 1):
+        own[run] = run.size >= settings.least_samples
+    for first, last in _runs(~free & ~own & ~shared):
+        beside = own[[k for k in (first - 1, last) if 0 <= k < own.size]]
+        # what cannot be told is new where noise of its own is on both sides; so is part of a window
+        part = last - first < settings.window_samples
+        new = beside.any() if part else beside.size == 2 and beside.all()
+        shared[first:last] = not new
+    return [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in _runs(shared)]
+
+
+def _runs(of: Mask) -> list[tuple[int, int]]:
+    """First and one past the last row of each run."""
+    edges = np.flatnonzero(np.diff(np.r_[False, of, False].astype(int))).tolist()
+    return list(zip(edges[::2], edges[1::2], strict=True))
+
+
+def _gaps(
+    duration: float, taken: Sequence[tuple[float, float]], margin: float
+) -> tuple[tuple[float, float], ...]:
+    """What a recording has beside stretches of it, with a margin on either side [s]."""
+    found, start = [], 0.0
+    for a, b in taken:
+        found.append((start, a - margin))
+        start = max(start, b + margin)
+    return tuple((a, b) for a, b in [*found, (start, duration)] if b > a)
 
 
 def _filled(recording: Recording, name: str) -> Array:
@@ -164,17 +278,32 @@ def _lags(
     return [float(p if p < grid.size else p - size) * dt for p in peaks]
 
 
+class _Seen(NamedTuple):
+    """Which rows of the slow recording were looked at, which of them the fast one tells in every
+    channel that says anything, and which it does not tell in one.
+    """
+
+    rows: NDArray[np.intp]
+    same: Mask
+    denied: Mask
+
+
 def _same(
-    slow: Recording, fast: Recording, names: list[str], lag: float, settings: OverlapSettings
-) -> tuple[NDArray[np.intp], float]:
-    """Which of the slow recording's samples are told by those of the fast one at a lag, and how
-    many that makes of all.
+    slow: Recording,
+    fast: Recording,
+    names: list[str],
+    lag: float,
+    settings: OverlapSettings,
+    phase: int = 0,
+) -> _Seen:
+    """What the samples of the fast recording tell at a lag of those of the slow one; blocks and
+    windows begin after the first `phase` rows.
     """
     ratio = slow.sample_time / fast.sample_time
     reach = min(settings.most_reach, round(settings.reach * ratio))
     at = slow.time + lag
     inside = (at > -0.5 * slow.sample_time) & (at < fast.duration + 0.5 * slow.sample_time)
-    rows, beside = _looked_at(inside, settings), settings.beside_samples
+    rows, beside = _looked_at(inside, settings)[phase:], settings.beside_samples
     told, denied = np.zeros(rows.size, dtype=bool), np.zeros(rows.size, dtype=bool)
     for name in names:
         if np.count_nonzero(~denied) < settings.least_samples:
@@ -194,8 +323,7 @@ def _same(
         judged, alike = _by_window(values, filled[rows], good, alone, left, settings)
         told |= judged & alike
         denied |= judged & ~alike
-    same = told & ~denied
-    return rows[same], float(same.sum()) * float(inside.sum()) / max(rows.size, 1)
+    return _Seen(rows, told & ~denied, denied)
 
 
 def _by_window(

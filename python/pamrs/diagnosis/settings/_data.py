@@ -292,6 +292,22 @@ class OverlapSettings(SettingsGroup):
         reason="share of a recording that is in another one of its role before it is left out",
         origin="judgement",
     )
+    gap: float = setting(
+        2.5,
+        unit="s",
+        least=0.0,
+        reason="time between what is shared and what is kept of a held-out recording: within a "
+        "joint's window what was there before has faded, noise and mismatch are no longer alike",
+        origin="docs/decisions/0111",
+    )
+    least_left: float = setting(
+        8.0,
+        unit="s",
+        above=0.0,
+        reason="the least of a held-out recording that is kept as a proof where the rest is a "
+        "copy: two of the longest windows; least_samples at the least",
+        origin="docs/decisions/0111",
+    )
     lags: int = setting(
         8, unit="count", least=1, reason="shifts in time that are looked at", origin="judgement"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -10,7 +11,7 @@ import numpy as np
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 from pamrs.recordings.logs._tables import series_of_matrix
 
-__all__ = ["read_hdf"]
+__all__ = ["leads_elsewhere", "read_hdf"]
 
 _UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")
 _RATES: Final = ("sample_rate", "sampling_rate", "fs", "rate", "SampleRate")  # [Hz]
@@ -42,6 +43,9 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
     def take(name: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset):
             return
+        if there := _elsewhere(item):
+            unread[name] = there
+            return
         if item.ndim > 2 or item.dtype.kind not in "biufV" or item.size < 2:
             unread[name] = f"it has the shape {item.shape} and the type {item.dtype}"
             return
@@ -55,6 +59,51 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
     with h5py.File(path, "r") as file:
         file.visititems(take)
     return collected(path, found, unread)
+
+
+def _elsewhere(item: Any) -> str:
+    """Why a data set is not read whose numbers another file holds.
+
+    Parameters
+    ----------
+    item : h5py.Dataset
+        The data set.
+
+    Returns
+    -------
+    str
+        ``""`` where it has its own.
+    """
+    if item.external or item.is_virtual:
+        return "its numbers lie in another file; copy them into this one"
+    return ""
+
+
+def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
+    """What in a group, or below it, leads to other files.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        Links to other files are not followed.
+
+    Yields
+    ------
+    name, why : str
+    """
+    import h5py
+
+    for name in group:
+        link = group.get(name, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            yield name, f"it is a link to {link.filename!r}; copy what that holds into this file"
+        elif isinstance(link, h5py.HardLink):
+            item = group[name]
+            if isinstance(item, h5py.Dataset):
+                why = _elsewhere(item)
+                yield from [(item.name, why)] if why else []
+            elif isinstance(item, h5py.Group):
+                yield from leads_elsewhere(item)
 
 
 def _unit(item: Any) -> str:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from pamrs.errors import RecordingError
+from pamrs.recordings.logs._hdf import leads_elsewhere
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._tables import series_of_matrix
 from pamrs.recordings.logs._words import understood_unit
@@ -38,12 +39,25 @@ def read_matlab(path: Path, form: TextFormat) -> Log:
     with warnings.catch_warnings():  # its import sets an option that pandas 3 no longer needs
         warnings.simplefilter("ignore", DeprecationWarning)
         from matio import load_from_mat
+    _check_own_numbers(path)
     content = load_from_mat(str(path))
     reader = _Reader(path, form.columns)
     for name, value in content.items():
         if not name.startswith("__"):
             reader.take(name, value, 0)
     return collected(path, reader.found, reader.unread)
+
+
+def _check_own_numbers(path: Path) -> None:
+    """Refuse a file of version 7.3, which is HDF5, that leads to other files."""
+    import h5py
+
+    if not h5py.is_hdf5(path):
+        return
+
+    with h5py.File(path, "r") as file:
+        for name, why in leads_elsewhere(file):
+            raise RecordingError(f"{path}: {name}: {why}")
 
 
 class _Reader:
