@@ -9,6 +9,7 @@ distances of all pairs say how much of the present uncertainty the experiment re
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
@@ -22,6 +23,7 @@ from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.next_experiment._differences import (
     MEASURABLE,
     Left,
+    Linear,
     checked_channels,
     counted,
     difference,
@@ -112,8 +114,10 @@ class Outcome:
         What hypothesis j leaves of the outcome of hypothesis i.
     distance : (h, h) array
         Its sum of squares on the effective number of samples.
-    problem : Problem
-        Blocks, and the recording of the leading hypothesis.
+    problems : list of Problem
+        Blocks, and the recording of each hypothesis.
+    models : list of Linear
+        Each hypothesis on its own recording.
     weights : dict
         As :func:`pamrs.diagnosis.next_experiment.weights_of`.
     effort : float
@@ -126,9 +130,32 @@ class Outcome:
     runs: list[Simulation]
     left: dict[tuple[int, int], Left]
     distance: Array
-    problem: Problem
+    problems: list[Problem]
+    models: list[Linear]
     weights: dict[Key, float]
     effort: float
+
+    @property
+    def problem(self) -> Problem:
+        """Blocks, and the recording of the leading hypothesis."""
+        return self.problems[0]
+
+    def exactly(self, pairs: Sequence[tuple[int, int]], probabilities: Sequence[float]) -> Outcome:
+        """The same, what j leaves of the outcome of i worked out with the sensitivities that j has
+        there, for some pairs of hypotheses (i, j) with these probabilities.
+        """
+
+        def missed(pair: tuple[int, int]) -> Left:
+            i, j = pair
+            there = linear(self.problems[i], self.models[j].rig)
+            return difference(self.problems[i], self.models[i].found, there, self.weights)
+
+        left = self.left | dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
+        distance = self.distance.copy()
+        for pair in pairs:
+            distance[pair] = left[pair].total
+        bits = information(probabilities, distance)
+        return replace(self, left=left, distance=distance, bits=bits)
 
 
 def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
@@ -151,11 +178,12 @@ def outcome_of(
     settings: DiagnosisSettings,
     sensor: str = "",
     runs: Sequence[Simulation] | None = None,
+    ranking: bool = False,
 ) -> Outcome:
     """Simulate an experiment with every hypothesis, and compare every pair.
 
-    Of more than two hypotheses each has the sensitivities that it has on its own recordings, which
-    are worked out once.
+    Where experiments are only ranked, each hypothesis has the sensitivities that it has on its own
+    recordings, which are worked out once; :meth:`Outcome.exactly` gives what is told.
 
     Parameters
     ----------
@@ -173,6 +201,8 @@ def outcome_of(
         One more.
     runs : sequence of Simulation, optional
         The experiment with every hypothesis, where it was simulated before.
+    ranking : bool
+        Whether it is only ranked among others.
 
     Raises
     ------
@@ -198,20 +228,20 @@ def outcome_of(
 
     def missed(pair: tuple[int, int]) -> Left:
         i, j = pair
-        few = len(rigs) == 2
-        other = linear(problems[i], rigs[j]) if few else elsewhere(problems[i], own[j])
-        return difference(problems[i], own[i].found, other, weights)
+        return difference(problems[i], own[i].found, elsewhere(problems[i], own[j]), weights)
 
     pairs = list(itertools.permutations(range(len(rigs)), 2))
-    left = dict(zip(pairs, two_at_a_time(missed, pairs), strict=True))
+    left = dict(zip(pairs, two_at_a_time(missed, pairs), strict=True)) if ranking else {}
     distance = np.zeros((len(rigs), len(rigs)))
     for pair, found in left.items():
         distance[pair] = found.total
-    bits = information([p for _, _, p in hypotheses], distance)
+    probabilities = [p for _, _, p in hypotheses]
+    bits = information(probabilities, distance)
     effort = experiment.effort + (settings.next_experiment.sensor_effort if sensor else 0.0)
-    return Outcome(
-        experiment, sensor, bits, list(runs), left, distance, problems[0], weights, effort
+    outcome = Outcome(
+        experiment, sensor, bits, list(runs), left, distance, problems, own, weights, effort
     )
+    return outcome if ranking else outcome.exactly(pairs, probabilities)
 
 
 def ranked(
@@ -312,28 +342,32 @@ def propose(
     if experiments is None:
         pool = experiments_of(nominal, records, own_settings)
     found: list[Outcome] = []
-    known: dict[Experiment, list[Simulation]] = {}
+    known: dict[Experiment, list[Simulation] | None] = {}
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
-            try:
-                before = known.get(experiment)
-                outcome = outcome_of(experiment, chosen, sound, own, settings, sensor, before)
-                found.append(outcome)
-                known[experiment] = outcome.runs
-            except (SimulationError, DiagnosisError):
-                # a hypothesis cannot be run there, or nothing is measured on both sides of a block
+            if experiment not in known:
+                known[experiment] = _simulated(experiment, chosen)
+            runs = known[experiment]
+            if runs is None:
                 continue
+            # a hypothesis cannot be run there, or nothing is measured on both sides of a block
+            with contextlib.suppress(SimulationError, DiagnosisError):
+                found.append(
+                    outcome_of(experiment, chosen, sound, own, settings, sensor, runs, ranking=True)
+                )
     if not found:
         raise DiagnosisError(
             f"no experiment of rig {nominal.name!r} can be simulated with all of "
             f"{', '.join(label for label, _, _ in chosen)} and measured by "
             f"{', '.join(own) or 'no channel'}"
         )
-    best_first = ranked(found, [p for _, _, p in chosen], own_settings.resolution)
-    best = best_first[0]
+    probabilities = [p for _, _, p in chosen]
+    best_first = ranked(found, probabilities, own_settings.resolution)
+    pairs = list(itertools.permutations(range(len(chosen)), 2))
+    best = best_first[0] = best_first[0].exactly(pairs, probabilities)
     return NextExperiment(
         text=_text(best, chosen, uncertainty, own_settings.hopeless_share)
         + _with_more(best, best_first, own_settings.resolution),
@@ -352,6 +386,14 @@ def propose(
         pairs=_pairs(best_first, chosen, own_settings.resolution),
         protocol=protocol_of(best.experiment),
     )
+
+
+def _simulated(experiment: Experiment, hypotheses: Sequence[Hypothesis]) -> list[Simulation] | None:
+    """An experiment with every hypothesis; None where one of them cannot be run there."""
+    try:
+        return two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
+    except SimulationError:
+        return None
 
 
 def protocol_of(experiment: Experiment) -> Protocol | None:
@@ -396,7 +438,10 @@ def _pairs(
     found = []
     for i, j in itertools.combinations(range(len(hypotheses)), 2):
         alone = [replace(o, distance=o.distance[np.ix_([i, j], [i, j])]) for o in there]
-        outcome = ranked(alone, [0.5, 0.5], resolution)[0]
+        chosen = ranked(alone, [0.5, 0.5], resolution)[0]
+        outcome = there[alone.index(chosen)]
+        if outcome is not outcomes[0]:
+            outcome = outcome.exactly([(i, j), (j, i)], [p for _, _, p in hypotheses])
         (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
         _, size = apart(outcome, i, j, nested=_nested(first, second))
         text = (
