@@ -35,11 +35,13 @@ ROUNDING, RANGES = 1e-12, 50.0
 COMMAND = "make convergence"
 DEGREE = math.pi / 180.0
 GROUPS = {
-    "pressures": ("muscle_pressure", "supply_pressure", "line_pressure"),
+    "pressures": ("muscle_pressure", "supply_pressure", "line_pressure", "segment_pressure"),
     "motion": ("joint_angle", "joint_rate", "length", "length_rate"),
     "masses, works": (
         "air_mass",
         "line_mass",
+        "segment_mass",
+        "segment_flow",
         "mass_supplied",
         "mass_vented",
         "energy_supplied",
@@ -76,10 +78,22 @@ def steady(
 
 
 MOVING = {"joint_angle": 45.0 * DEGREE, "joint_rate": 0.5}
+#: The gas of a long tube as a smooth wave, without a front.
+STANDING = {
+    "muscle_pressure.left": 2e5,
+    "muscle_pressure.right": 1e5,
+    **{f"segment_pressure.{k}": 1.5e5 + 5e4 * math.cos(math.pi * k / 16) for k in range(1, 16)},
+}
 BENT = {"joint_angle.elbow": 40.0 * DEGREE, "joint_rate.elbow": 0.5}
 
 SMOOTH: dict[str, Run] = {
     "shoulder": steady("shoulder", 41, {**MOVING, "muscle_pressure": 2.6e5}, valve=6.0),
+    "throttled_supply": steady(
+        "throttled_supply",
+        41,
+        {**MOVING, "muscle_pressure.muscle": 2.6e5, "muscle_pressure.feed": 12e5},
+        valve=6.0,
+    ),
     "elbow": steady("elbow", 41, {**MOVING, "muscle_pressure": 5.5e5}, valve=6.0),
     "antagonistic_joint": steady("antagonistic_joint", 21, BENT, flexor=8.0, extensor=3.0),
     "antagonistic_joint without friction": steady(
@@ -125,6 +139,7 @@ SMOOTH: dict[str, Run] = {
     ),
     "bench": bench(21),
     "tube": Run("tube", 0.005, 7, {"muscle_pressure.left": 5e5, "muscle_pressure.right": 3e5}),
+    "long_tube": Run("long_tube", 0.002, 26, STANDING),
     "blow_down_tank": Run("blow_down_tank", 0.2, 31, {"muscle_pressure": 8.5e4}),
 }
 

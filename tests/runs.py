@@ -221,6 +221,7 @@ RUNS: dict[str, Run] = {
     "sealed_chamber": Run("sealed_chamber", 0.1, 11, {"muscle_pressure": 4e5}),
     "blow_down_tank": Run("blow_down_tank", 0.1, 401),
     "tube": Run("tube", 0.005, 101),
+    "long_tube": Run("long_tube", 0.002, 61),
     "regulated_joint": Run(
         "regulated_joint",
         0.005,

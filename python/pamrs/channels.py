@@ -8,7 +8,8 @@ from typing import Final
 __all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "unit_of"]
 
 #: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
-#: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``.
+#: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``; behind that
+#: the number of a tube's segment: ``segment_flow.flexor.1``.
 UNITS: Final[dict[str, str]] = {
     "time": "s",
     "valve_command": "V",
@@ -30,6 +31,9 @@ UNITS: Final[dict[str, str]] = {
     "air_volume": "m3",
     "air_mass": "kg",
     "line_mass": "kg",
+    "segment_pressure": "Pa",
+    "segment_flow": "kg/s",
+    "segment_mass": "kg",
     "mass_supplied": "kg",
     "mass_vented": "kg",
     "energy_supplied": "J",

@@ -7,7 +7,8 @@ inside are absolute, channels are gauge. Every book (masses, energies, works) is
 the integrator, not a sum over samples; the positive work at the joints, with a kink at every
 reversal, is read off the signed work of each.
 
-Flows run down the pressure in either direction, through a valve too. What the reference has no
+Flows run down the pressure in either direction, through a valve too; in a tube of segments each has
+its own inertia and is a state. What the reference has no
 equation for (effects, sensor errors, hysteresis, load frames) is refused.
 """
 
@@ -145,6 +146,48 @@ class Tube:
             * math.sqrt(STANDARD_TEMPERATURE / self.gas.temperature)
         )
         return math.copysign(choked * self.flow_function(low / high), first - second)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One of equal segments of a tube with waves: inertia between two nodes of gas.
+
+    In the steady state ``f(y) = y^2 + 2 (h - b^2) ln y + h b^2/y^2`` falls by ``k`` from end to end
+    of the whole tube, ``y`` being the pressure over that which would drive the flow into a vacuum;
+    ``f'(b) = 0`` is where it chokes. A flow that is not steady is driven by what is left.
+    """
+
+    tube: Tube
+    count: int
+
+    @property
+    def bend(self) -> float:
+        """``h``: with it the choked flow and the slope next to equal pressures are the tube's."""
+        b = self.tube.critical_ratio
+        fall = math.log(1.0 / b)
+        told = (2.0 * b * b * fall - b * (1.0 - b)) / (2.0 * fall - (1.0 - b * b))
+        return max(told, -b * b)
+
+    def beside(self, y: float) -> float:
+        """``f - y^2``: what the flow takes along."""
+        b, h = self.tube.critical_ratio, self.bend
+        return 2.0 * (h - b * b) * math.log(y) + h * b * b / (y * y)
+
+    def acceleration(self, first: float, second: float, flow: float) -> float:
+        """Rate of the mass flow from the first to the second, kg/s^2."""
+        tube, b = self.tube, self.tube.critical_ratio
+        per_length = math.pi / 4.0 * tube.diameter**2 * self.count / tube.length
+        if abs(flow) < 1e-30:
+            return per_length * (first - second)
+        if flow < 0.0:
+            first, second = second, first
+        drive = abs(flow) / tube(1.0, 0.0)  # choked, per pressure
+        high, low = max(first, b * drive), max(second, b * drive)
+        loss = (1.0 - b * b + self.beside(1.0) - self.beside(b)) / self.count
+        edge = tube.flow_function(LAMINAR_RATIO) * 0.5 * (high + low)
+        taken = self.beside(high / drive) - self.beside(low / drive)
+        left = high - low + drive * (drive * taken - loss * max(drive, edge)) / (high + low)
+        return math.copysign(1.0, flow) * per_length * left
 
 
 # ------------------------------------------------------------------ transmissions
@@ -362,6 +405,16 @@ def _held(q: Sequence[float], v: Sequence[float], f: Sequence[float]) -> list[fl
 # ------------------------------------------------------------------ the rig
 
 
+def _alike(alpha: float) -> dict[str, float]:
+    """One coefficient for all that happens to a gas."""
+    return dict.fromkeys(("alpha_in", "alpha_out", "alpha"), alpha)
+
+
+def _numbered(name: str, k: int) -> str:
+    """A part of a line."""
+    return f"{name}.{k}" if name else str(k)
+
+
 class Network:
     """A rig made ready to integrate.
 
@@ -380,6 +433,7 @@ class Network:
         self.index: dict[str, int] = {}
         self.pipes: list[tuple[Flow, int, int]] = []
         self.valves: list[tuple[Valve, str, int, int]] = []
+        self.segments: list[tuple[Segment, str, int, int]] = []
         self._build_gas(model)
         self.rest_length = math.nan
         self.coordinates, self.body = self._build_body(model)
@@ -401,8 +455,9 @@ class Network:
                 )
             if line["kind"] == "tube":
                 tubes[own] = Tube(line["length"], line["diameter"], gas)
+                share = tubes[own].half_volume / max(line.get("segments", 0), 1)
                 for end in (line["from"] or own, line["to"]):
-                    halves[end] = halves.get(end, 0.0) + tubes[own].half_volume
+                    halves[end] = halves.get(end, 0.0) + share
         for supply in model["supplies"]:
             numbers = {
                 key: supply[key]
@@ -441,15 +496,29 @@ class Network:
         for line in model["lines"]:
             if not line["from"]:
                 own = _port("line", line["name"])
-                self._add(
-                    own, Node("inlet", line["name"], line["inlet_volume"] + halves.get(own, 0.0))
-                )
+                law = _alike(line["alpha"]) if line.get("segments") else {}
+                volume = line["inlet_volume"] + halves.get(own, 0.0)
+                self._add(own, Node("inlet", line["name"], volume, **law))
         self.inlet_ends = {
             _port("line", line["name"]): line["to"] for line in model["lines"] if not line["from"]
         }
+        for line in model["lines"]:
+            own = _port("line", line["name"])
+            for k in range(1, line.get("segments", 0)):
+                name, volume = _numbered(line["name"], k), 2.0 * tubes[own].half_volume
+                node = Node("segment", name, volume / line["segments"], **_alike(line["alpha"]))
+                self._add(_numbered(own, k), node)
+                self.inlet_ends[_numbered(own, k)] = line["to"]
         self._add("ambient", Node("ambient", "", start=ambient))
         for line in model["lines"]:
             own = _port("line", line["name"])
+            if count := line.get("segments", 0):
+                ports = [line["from"] or own, *(_numbered(own, k) for k in range(1, count))]
+                nodes = [self.index[port] for port in (*ports, line["to"])]
+                for k, ends in enumerate(pairwise(nodes)):
+                    part = Segment(tubes[own], count)
+                    self.segments.append((part, _numbered(line["name"], k + 1), *ends))
+                continue
             flow: Flow = tubes[own] if own in tubes else Orifice(line["discharge_area"], gas)
             self.pipes.append((flow, self.index[line["from"] or own], self.index[line["to"]]))
         for part in model["valves"]:
@@ -523,6 +592,7 @@ class Network:
         words = {
             "chamber": "muscle_pressure",
             "inlet": "line_pressure",
+            "segment": "segment_pressure",
             **dict.fromkeys(SUPPLIES, "supply_pressure"),
         }
         pressure = [node.start for node in self.nodes]
@@ -543,6 +613,7 @@ class Network:
             else:
                 position.append(self.rest_length - left.pop("length", self.rest_length))
                 rate.append(-left.pop("length_rate", 0.0))
+        through = [left.pop(f"segment_flow.{name}", 0.0) for _, name, _, _ in self.segments]
         if left:
             raise ValueError(f"initial values of nothing in this rig: {', '.join(left)}")
         volume = self.volumes(position)
@@ -556,6 +627,7 @@ class Network:
                 *(0.0 for _ in BOOKS[:-1]),
                 *(0.0 for _ in position),
                 *(0.0 for _ in HEAT_BOOKS),
+                *through,
             ]
         )
 
@@ -573,16 +645,17 @@ class Network:
         return volume
 
     def split(self, state: Array) -> tuple[Array, ...]:
-        """Pressures (absolute), positions, rates, masses, books and heat books of states (..., m),
-        the last of the books the work at each joint.
+        """Pressures (absolute), positions, rates, masses, books, heat books and flows of segments
+        of states (..., m), the last of the books the work at each joint.
         """
         n, c = len(self.nodes) - 1, len(self.coordinates)
-        parts = np.split(state, np.cumsum([n, c, c, n, len(BOOKS) - 1 + c]), axis=-1)
+        sizes = [n, c, c, n, len(BOOKS) - 1 + c, len(HEAT_BOOKS)]
+        parts = np.split(state, np.cumsum(sizes), axis=-1)
         return tuple(parts)
 
     def tolerances(self, state: Array, rtol: float) -> Array:
         """Absolute tolerances of a state."""
-        pressure, position, rate, mass, books, heat = self.split(state)
+        pressure, position, rate, mass, books, heat, through = self.split(state)
         air = max(
             self.gas.ambient_pressure * sum(self.volumes(position.tolist())[:-1]) / self.rt, 1e-9
         )
@@ -593,6 +666,7 @@ class Network:
                 *(1.0,) * (position.size + rate.size),
                 *(air,) * mass.size,
                 *works,
+                *(1e-3,) * through.size,
             ]
         )
 
@@ -656,6 +730,14 @@ class Network:
             outflow[source] += moved
             inflow[target] += moved
             carried[target] += moved * warmth[source]
+        faster = []
+        through = values[len(values) - len(self.segments) :]
+        for (part, _, i, j), mass_flow in zip(self.segments, through, strict=True):
+            source, target = (i, j) if mass_flow > 0.0 else (j, i)
+            outflow[source] += abs(mass_flow)
+            inflow[target] += abs(mass_flow)
+            carried[target] += abs(mass_flow) * warmth[source]
+            faster.append(part.acceleration(pressure[i], pressure[j], mass_flow))
         supplied = exergy = relieved = 0.0
         heats = [0.0, 0.0, 0.0]
         pressure_rate = []
@@ -699,25 +781,28 @@ class Network:
             *(inflow[i] - outflow[i] for i in range(count - 1)),
             supplied, inflow[-1] - outflow[-1] + relieved, self.rt * supplied, exergy, work,
             *(f * v for f, v in zip(force, rate, strict=True)),
-            *heats,
+            *heats, *faster,
         ]  # fmt: skip
 
     def channels(self, states: Array) -> dict[str, Array]:
         """Channels of states (n, m): gauge pressures, positions, rates and books but the positive
         work at the joints.
         """
-        pressure, position, rate, mass, books, heat = self.split(states)
+        pressure, position, rate, mass, books, heat, through = self.split(states)
         ambient = self.gas.ambient_pressure
         words = {
             "chamber": ("muscle_pressure", "air_mass"),
             "inlet": ("line_pressure", "line_air_mass"),
+            "segment": ("segment_pressure", "segment_mass"),
         }
         out: dict[str, Array] = {}
         for i, node in enumerate(self.nodes[:-1]):
             of_pressure, of_mass = words.get(node.kind, ("supply_pressure", "supply_air_mass"))
             out[suffix(of_pressure, node.name)] = pressure[:, i] - ambient
-            if node.kind in ("tank", "chamber", "inlet"):
+            if node.kind in ("tank", "chamber", "inlet", "segment"):
                 out[suffix(of_mass, node.name)] = mass[:, i]
+        for k, (_, name, _, _) in enumerate(self.segments):
+            out[f"segment_flow.{name}"] = through[:, k]
         for k, coordinate in enumerate(self.coordinates):
             if math.isnan(self.rest_length):
                 out[suffix("joint_angle", coordinate.name)] = position[:, k]
@@ -780,7 +865,8 @@ def simulate(
     sample_time : float
         Seconds between samples.
     initial : mapping, optional
-        ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` (Pa, gauge), ``joint_angle``,
+        ``muscle_pressure``, ``supply_pressure``, ``line_pressure``, ``segment_pressure`` (Pa,
+        gauge), ``segment_flow`` (kg/s), ``joint_angle``,
         ``joint_rate`` (rad, rad/s), ``length``, ``length_rate`` (m, m/s), each with ``.name`` for a
         named block.
     rtol : float
@@ -844,7 +930,7 @@ def simulate(
                     f"integration failed in sample {k}: {'; '.join([solution.message, *left])}"
                 )
             state = solution.y[:, -1]
-            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[-2][:, len(BOOKS) - 1 :]
+            work = rig.split(solution.sol(np.linspace(begin, end, 1001)).T)[4][:, len(BOOKS) - 1 :]
             positive[k + 1] += np.maximum(np.diff(work, axis=0), 0.0).sum()
             first = min(float(np.diff(solution.t).max()), sample_time)
         states[k + 1] = state

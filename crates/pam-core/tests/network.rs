@@ -44,6 +44,8 @@ fn tube(from: &str, to: &str, length: f64, diameter: f64) -> LineSpec {
         diameter,
         discharge_area: 0.0,
         inlet_volume: 0.0,
+        segments: 0,
+        alpha: 1.4,
     }
 }
 

@@ -17,7 +17,7 @@ from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.simulation import Simulator, core_rig
+from pamrs.simulation import Simulator, core_rig, initial_names
 
 if TYPE_CHECKING:
     import control  # type: ignore[import-untyped]
@@ -379,4 +379,6 @@ def _filled(
     filled = {**start, dotted("muscle_pressure", chamber): pressure}
     if len(rig.tables("chamber")) == 1:
         filled.update({dotted("line_pressure", name): pressure for name in rig.tables("line")})
+        between = (name for name in initial_names(rig) if channel_of(name) == "segment_pressure")
+        filled.update(dict.fromkeys(between, pressure))
     return filled

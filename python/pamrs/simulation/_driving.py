@@ -41,11 +41,15 @@ _INITIAL = {
     "muscle_pressure": "chamber",
     "supply_pressure": "supply",
     "line_pressure": "line",
+    "segment_pressure": "line",
+    "segment_flow": "line",
     "joint_angle": "joint",
     "joint_rate": "joint",
     "length": "load",
     "length_rate": "load",
 }
+#: States along a tube that carries waves, and how many there are less than segments.
+_BETWEEN = {"segment_pressure": 1, "segment_flow": 0}
 _LEAST_PRESSURE = 1.0  # Pa, absolute
 _MOST_PRESSURE = 1e8  # Pa, gauge
 
@@ -284,7 +288,19 @@ def initial_names(rig: Rig) -> list[str]:
     list of str
         ``muscle_pressure.flexor``, ``joint_angle.elbow``.
     """
-    return [dotted(state, name) for state, block in _INITIAL.items() for name in rig.tables(block)]
+    return [dotted(state, name) for state in _INITIAL for name in _having(rig, state)]
+
+
+def _having(rig: Rig, state: str) -> list[str]:
+    """What of a rig has a state: names of blocks, behind that of a tube the number of a segment."""
+    tables = rig.tables(_INITIAL[state])
+    if state not in _BETWEEN:
+        return list(tables)
+    return [
+        dotted(name, str(k)) if name else str(k)
+        for name, table in tables.items()
+        for k in range(1, int(table.get("segments", 0)) + 1 - _BETWEEN[state])
+    ]
 
 
 def keywords(answer: Any) -> dict[str, Any]:
@@ -306,15 +322,19 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
         channel, _, block = name.partition(".")
         if channel not in _INITIAL:
             raise ParameterError(f"initial has the unknown entry {name!r}; {meant(name, _INITIAL)}")
-        tables = rig.tables(_INITIAL[channel])
-        if not tables:
+        known = _having(rig, channel)
+        if not rig.tables(_INITIAL[channel]):
             raise ParameterError(
                 f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[channel]}]"
             )
-        if block not in tables:
+        if channel in _BETWEEN and not known:
+            raise ParameterError(
+                f"initial has {name!r}, but no tube of the rig {rig.name!r} has the segments for it"
+            )
+        if block not in known:
             raise ParameterError(
                 f"initial has {name!r}, which the rig {rig.name!r} does not have; "
-                f"{meant(name, [dotted(channel, other) for other in tables])}"
+                f"{meant(name, [dotted(channel, other) for other in known])}"
             )
         try:
             start[name] = float(value)

@@ -272,7 +272,8 @@ class Simulation(Mapping[str, Array]):
         channels = self._channels
         self._check_whole("balance")
         gain = {name: float(channels[name][-1] - channels[name][0]) for name in _BALANCES}
-        masses = [m for channel in ("air_mass", "line_mass") for m in self.under(channel).values()]
+        held = ("air_mass", "line_mass", "segment_mass")
+        masses = [mass for channel in held for mass in self.under(channel).values()]
         return Balance(
             supplied=gain["mass_supplied"],
             vented=gain["mass_vented"],
@@ -293,6 +294,16 @@ class Simulation(Mapping[str, Array]):
         """Gain of mass by the gas law at the rest temperature [kg]."""
         gas = self.rig.tables("gas")[""]
         total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
+        for line, table in self.rig.tables("line").items():
+            if count := int(table.get("segments", 0)):
+                volume = math.pi / 4.0 * table["diameter"] ** 2 * table["length"] / count
+                for k in range(1, count):
+                    inside = self._channels[dotted(dotted("segment_pressure", line), str(k))]
+                    total += (
+                        float(inside[-1] - inside[0])
+                        * volume
+                        / (gas["gas_constant"] * gas["temperature"])
+                    )
         for name, volume in self.under("air_volume").items():
             zero = sensor_zero(self.rig, "pressure_zero", name)
             absolute = (
@@ -516,11 +527,11 @@ def simulate(
         Where the rig is stiffer (small volumes behind large openings, hard stops, a small mass),
         each step is divided until it is stable.
     initial : mapping of str to float, optional
-        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure`` [Pa, gauge],
-        ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with a linear load ``length`` [m],
-        ``length_rate`` [m/s]; of a block with a name, ``muscle_pressure.flexor``. What is left out
-        is at rest: pressures as the rig file has them, joint at its rest angle, muscle at its rest
-        length.
+        Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure``, ``segment_pressure``
+        [Pa, gauge], ``segment_flow`` [kg/s], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with
+        a linear load ``length`` [m], ``length_rate`` [m/s]; of a block with a name,
+        ``muscle_pressure.flexor``. What is left out is at rest: pressures as the rig file has them,
+        joint at its rest angle, muscle at its rest length.
     duration : float, optional
         Simulated time [s], where no signal has a length.
     supply_command : array_like, shape (n,), or mapping of str to array_like, optional

@@ -9,3 +9,4 @@ pub mod pipe;
 pub mod supply;
 pub mod tube;
 pub mod valve;
+pub mod wave;

@@ -19,9 +19,9 @@ pub const MOST_TOLD: f64 = 0.99;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tube<S> {
     /// Choked mass flow per upstream pressure [kg/(s Pa)].
-    flow_factor: S,
+    pub(super) flow_factor: S,
     /// Critical pressure ratio [1].
-    critical_ratio: S,
+    pub(super) critical_ratio: S,
 }
 
 impl<S: Scalar> Tube<S> {
@@ -67,7 +67,7 @@ impl<S: Scalar> Tube<S> {
     }
 
     #[inline]
-    fn psi(&self, ratio: S) -> S {
+    pub(super) fn psi(&self, ratio: S) -> S {
         let elliptic = |r: S| {
             let x = (r - self.critical_ratio) / (-self.critical_ratio + 1.0);
             (-x * x + 1.0).sqrt()

@@ -104,7 +104,7 @@ impl Block {
         }
     }
 
-    /// States that are integrated: the block's, and those of line inlets, which nobody measures.
+    /// States that are integrated: the block's, and those inside lines, which nobody measures.
     pub(super) fn simulated(self, rig: &Rig, measured: &Measured<'_>) -> Simulated {
         let layout = rig.layout();
         let mut places = self.initial_states(layout);
@@ -133,6 +133,7 @@ impl Block {
         }
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
+            places.extend(layout.flow(0)..layout.angle(0));
         }
         Simulated::only(rig, &places)
     }
@@ -150,7 +151,7 @@ fn own_states(layout: &Layout, acting: &Acting) -> Range<usize> {
     first..first + acting.count
 }
 
-/// Pressures of line inlets that were not measured.
+/// Pressures inside lines that were not measured.
 pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     let inlets = (layout.chambers..layout.gases).map(|k| layout.pressure(k));
     inlets.filter(|place| measured.signal(*place).is_none()).collect()

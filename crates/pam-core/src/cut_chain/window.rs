@@ -139,7 +139,7 @@ impl<'a, S: Number> Cut<'a, S> {
         }
     }
 
-    /// What nobody measures begins at rest, and stays there unless it is a line's inlet.
+    /// What nobody measures begins at rest, and stays there unless it is inside a line.
     fn at_rest(&self) -> Course<S> {
         let plant = &self.stepper.plant;
         let (rig, layout) = (plant.rig(), plant.rig().layout());
@@ -194,8 +194,8 @@ impl<'a, S: Number> Cut<'a, S> {
     fn start_recording(&self, state: &mut [S]) {
         let plant = &self.stepper.plant;
         let (rig, layout) = (plant.rig(), plant.rig().layout());
-        for (inlet, (_, end)) in rig.wiring.inlets.iter().enumerate() {
-            let place = layout.pressure(rig.wiring.chambers + inlet);
+        for (gas, end) in rig.wiring.beginnings() {
+            let place = layout.pressure(gas);
             if let (None, Some(end)) = (self.measured.signal(place), end.place(layout)) {
                 state[place] = state[end];
             }

@@ -7,6 +7,9 @@ use crate::blocks::joint::Joint;
 use crate::error::check_range;
 use crate::{Error, Result};
 
+/// Most segments of a tube.
+const MOST_SEGMENTS: usize = 256;
+
 /// Checks one block's keys; names them in full only when there is something wrong.
 struct Block<'a> {
     kind: &'a str,
@@ -83,6 +86,8 @@ impl RigSpec {
         for line in &self.lines {
             let block = Block { kind: "line", name: &line.name };
             block.choice("kind", &line.kind, &["tube", "orifice"])?;
+            let most = if line.kind == "tube" { MOST_SEGMENTS } else { 0 };
+            block.range("segments", line.segments as f64, 0.0, most as f64, "")?;
         }
         for chamber in &self.chambers {
             let block = Block { kind: "chamber", name: &chamber.name };

@@ -84,7 +84,8 @@ fn default_flow() -> String {
     "orifice".into()
 }
 
-/// Tube or orifice; an empty `from` means that valves feed an inlet node of its own.
+/// Tube or orifice; an empty `from` means that valves feed an inlet node of its own. A tube of some
+/// segments holds gas and carries waves: [`crate::blocks::wave`].
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -104,6 +105,10 @@ pub struct LineSpec {
     pub discharge_area: f64,
     #[serde(default)]
     pub inlet_volume: f64,
+    #[serde(default)]
+    pub segments: usize,
+    #[serde(default = "one")]
+    pub alpha: f64,
 }
 
 /// Chamber: dead (or, without a muscle, total) volume; polytropic coefficients, or an energy balance

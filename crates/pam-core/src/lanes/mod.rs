@@ -58,7 +58,7 @@ impl Plan {
                 .all(|g| !g.direction && !g.muscle.buckles() && !g.muscle.mapped());
         let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
         let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
-        if !(body && plain && one_joint && areas) || wiring.heated() {
+        if !(body && plain && one_joint && areas) || wiring.heated() || !wiring.waves.is_empty() {
             return None;
         }
         let curves = wiring.groups.iter().map(|group| curves(rig, group));

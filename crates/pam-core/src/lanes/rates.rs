@@ -50,6 +50,7 @@ impl Shape {
             layout: Layout {
                 supplies: 1,
                 gases: 1,
+                flows: 0,
                 coordinates: 1,
                 chambers: 1,
                 effects: 0,

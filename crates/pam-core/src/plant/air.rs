@@ -96,6 +96,9 @@ impl<S: Scalar> Plant<'_, S> {
             }
         }
         for (unit, line) in self.wiring.lines.iter().zip(&self.lines) {
+            if unit.segments > 0 {
+                continue;
+            }
             let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
             let flow = match line {
                 Line::Orifice(area) => gas.mass_flow(*area, from, to),
@@ -103,8 +106,38 @@ impl<S: Scalar> Plant<'_, S> {
             };
             here.pass(unit.from, unit.to, flow);
         }
+        if self.altered.waves {
+            self.wave_flows(state, here);
+        }
         if self.altered.flows {
             self.effect_flows(state, controls, here);
+        }
+    }
+
+    /// What flows through the segments of tubes, written to the scratch.
+    #[inline(never)]
+    fn wave_flows(&self, state: &[S], here: &mut Scratch<S>) {
+        let lines = &self.wiring.lines;
+        for unit in &self.wiring.waves {
+            for k in 0..unit.segments {
+                let flow = state[self.layout.flow(unit.flow + k)];
+                here.carry(unit.node(lines, k), unit.node(lines, k + 1), flow);
+            }
+        }
+    }
+
+    /// Rates of these flows.
+    #[inline(never)]
+    fn wave_rates(&self, state: &[S], out: &mut [S]) {
+        let lines = &self.wiring.lines;
+        for (unit, wave) in self.wiring.waves.iter().zip(&self.waves) {
+            let mut from = self.pressure_at(unit.node(lines, 0), state);
+            for k in 0..unit.segments {
+                let to = self.pressure_at(unit.node(lines, k + 1), state);
+                let place = self.layout.flow(unit.flow + k);
+                out[place] = wave.flow_rate(from, to, state[place]);
+                from = to;
+            }
         }
     }
 
@@ -218,6 +251,9 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         let (gas, layout) = (&self.rig.gas, &self.layout);
         let rt = gas.gas_constant * gas.temperature;
+        if self.altered.waves {
+            self.wave_rates(state, out);
+        }
         for (k, supply) in self.supplies.iter().enumerate() {
             let set = &controls.set_pressure[k];
             out[layout.supply(k)] = if self.altered.supplies {
@@ -264,8 +300,20 @@ impl<S: Scalar> Scratch<S> {
     /// beginning.
     #[inline]
     pub(super) fn pass(&mut self, from: Node, to: Node, flow: S) {
-        let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
-        let (giver, taker, flow) = if along { (from, to, flow) } else { (to, from, -flow) };
+        let (giver, taker, flow) = self.along(from, to, flow);
+        if self.warm.is_empty() {
+            self.take(giver, flow);
+            self.give(taker, flow);
+        } else {
+            let flow = self.of_temperature(giver, flow);
+            self.pass_heat(giver, taker, flow);
+        }
+    }
+
+    /// The same of a flow that is a state, whatever its temperature.
+    #[inline]
+    fn carry(&mut self, from: Node, to: Node, flow: S) {
+        let (giver, taker, flow) = self.along(from, to, flow);
         if self.warm.is_empty() {
             self.take(giver, flow);
             self.give(taker, flow);
@@ -274,10 +322,20 @@ impl<S: Scalar> Scratch<S> {
         }
     }
 
-    /// The same with the temperature of what flows.
+    /// Where a flow begins, where it goes, and how much it is that way.
+    #[inline(always)]
+    fn along(&self, from: Node, to: Node, flow: S) -> (Node, Node, S) {
+        let along = flow.re() > 0.0 || (flow.re() == 0.0 && !self.backwards);
+        if along {
+            (from, to, flow)
+        } else {
+            (to, from, -flow)
+        }
+    }
+
+    /// A flow with its temperature.
     #[inline(never)]
     fn pass_heat(&mut self, giver: Node, taker: Node, flow: S) {
-        let flow = self.of_temperature(giver, flow);
         self.take(giver, flow);
         self.give(taker, flow);
         if let Node::Gas(k) = taker {
@@ -373,7 +431,7 @@ impl Plant<'_, f64> {
             add(Node::Gas(unit.to), unit.from, slope);
             add(unit.from, Node::Gas(unit.to), slope);
         }
-        for (unit, line) in wiring.lines.iter().zip(&self.lines) {
+        for (unit, line) in wiring.lines.iter().zip(&self.lines).filter(|(u, _)| u.segments == 0) {
             let slope = match line {
                 Line::Orifice(area) => gas.steepest(*area),
                 Line::Tube(tube) => tube.steepest(),
@@ -390,12 +448,25 @@ impl Plant<'_, f64> {
                 add(Node::Gas(unit.to), Node::Ambient, slope);
             }
         }
+        for (unit, wave) in wiring.waves.iter().zip(&self.waves) {
+            // a flow is no pressure: with `A/c` as its measure both have the rates of the wave
+            for k in 0..unit.segments {
+                for node in [unit.node(&wiring.lines, k), unit.node(&wiring.lines, k + 1)] {
+                    match node {
+                        Node::Gas(k) => steepest[k] += wave.admittance(),
+                        Node::Supply(k) => drawn[k] += wave.admittance(),
+                        Node::Ambient => {}
+                    }
+                }
+            }
+        }
         let of_effects = self.fastest_effect(|place| match place {
             Place::Supply(k) => moves(Node::Supply(k)),
             Place::Gas(k) => moves(Node::Gas(k)),
             _ => false,
         });
-        let mut worst = (of_effects, None);
+        let of_waves = self.fastest_wave().map_or(0.0, |(rate, _)| rate);
+        let mut worst = (of_effects.max(of_waves), None);
         for (k, slope) in steepest.iter().enumerate().filter(|(k, _)| moves(Node::Gas(*k))) {
             let alpha = self.alphas[k].inflow.max(self.alphas[k].outflow).max(gas.gamma);
             let (volume, wall) = self.least_volume(k);
@@ -413,6 +484,13 @@ impl Plant<'_, f64> {
             }
         }
         worst
+    }
+
+    /// Fastest rate of a flow in a tube that carries waves [1/s], and the line.
+    pub(super) fn fastest_wave(&self) -> Option<(f64, usize)> {
+        let units = self.wiring.waves.iter().zip(&self.waves);
+        let rates = units.map(|(unit, wave)| (wave.fastest(), unit.line));
+        rates.max_by(|a, b| a.0.total_cmp(&b.0))
     }
 
     /// Largest change of what effects let in or out per pressure of a block [kg/(s Pa)].

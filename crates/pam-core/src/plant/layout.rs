@@ -1,6 +1,6 @@
 //! Where each state and channel of a rig is, and what it is called.
 
-use super::units::Wiring;
+use super::units::{WaveUnit, Wiring};
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, RigSpec};
 use crate::effects::Role;
@@ -26,14 +26,16 @@ pub const BALANCE: [&str; BALANCE_COUNT] = [
 /// energy `p V/(kappa - 1)` grows by the first two less the third.
 pub const HEAT_BALANCE: [&str; 3] = ["enthalpy_gained", "heat_gained", "gas_work"];
 
-/// Places of the states: supplies' pressures, gases' pressures, gases' masses, coordinates, their
-/// rates, what effects need.
+/// Places of the states: supplies' pressures, gases' pressures, gases' masses, flows in tubes,
+/// coordinates, their rates, what effects need.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// Supplies.
     pub supplies: usize,
-    /// Chambers and, behind them, inlets of lines.
+    /// Chambers and, behind them, inlets of lines and what lies inside tubes.
     pub gases: usize,
+    /// Flows with inertia, in tubes that carry waves.
+    pub flows: usize,
     /// Joints, or one for a linear load.
     pub coordinates: usize,
     /// Chambers among the gases.
@@ -56,7 +58,7 @@ impl Layout {
     #[inline]
     #[must_use]
     pub fn effect(&self, k: usize) -> usize {
-        self.supplies + 2 * (self.gases + self.coordinates) + k
+        self.rate(self.coordinates) + k
     }
 
     /// Absolute pressure of a supply [Pa].
@@ -80,18 +82,25 @@ impl Layout {
         self.supplies + self.gases + k
     }
 
+    /// Mass flow in a tube [kg/s].
+    #[inline]
+    #[must_use]
+    pub fn flow(&self, k: usize) -> usize {
+        self.supplies + 2 * self.gases + k
+    }
+
     /// Joint angle [rad], or shortening of a linear load [m].
     #[inline]
     #[must_use]
     pub fn angle(&self, k: usize) -> usize {
-        self.supplies + 2 * self.gases + k
+        self.flow(self.flows) + k
     }
 
     /// Its rate.
     #[inline]
     #[must_use]
     pub fn rate(&self, k: usize) -> usize {
-        self.supplies + 2 * self.gases + self.coordinates + k
+        self.angle(self.coordinates) + k
     }
 
     /// A sum of [`BALANCE`].
@@ -111,6 +120,8 @@ pub enum StateRole {
     Mass,
     /// The same, of a gas whose temperature is free: a state of its own.
     FreeMass,
+    /// Mass flow in a tube [kg/s].
+    Flow,
     /// Joint angle [rad], or shortening of a linear load [m].
     Position,
     /// Its rate.
@@ -135,6 +146,7 @@ impl StateRole {
             Self::Pressure => "pressure",
             Self::Mass => "mass",
             Self::FreeMass => "free_mass",
+            Self::Flow => "flow",
             Self::Position => "position",
             Self::Rate => "rate",
             Self::Effect(Role::Moves) => "effect_moves",
@@ -186,6 +198,8 @@ pub enum Channel {
     Temperature(usize),
     /// Mass of a gas [kg].
     Mass(usize),
+    /// Mass flow in a tube [kg/s].
+    Flow(usize),
     /// One of [`BALANCE`].
     Balance(usize),
 }
@@ -199,7 +213,7 @@ pub struct Names {
     pub initial: Vec<(String, usize)>,
     /// Commands that a simulation takes: of the valves, then of the regulators.
     pub inputs: Vec<String>,
-    /// Names of the gases: `chamber.flexor`, `line.flexor`.
+    /// Names of the gases: `chamber.flexor`, `line.flexor` for all that is in this line.
     pub gases: Vec<String>,
     /// Names of the coordinates: `joint.elbow`, or `load`.
     pub coordinates: Vec<String>,
@@ -222,14 +236,14 @@ impl Names {
         let joints = coordinate_names(spec);
         let regulators = spec.supplies.iter().filter(|s| s.kind == "regulator");
         let chambers = spec.chambers.iter().map(|c| dotted("chamber", &c.name));
-        let inlets = wiring.inlets.iter().map(|(line, _)| dotted("line", &spec.lines[*line].name));
+        let inside = wiring.lines_of_gases().map(|line| dotted("line", &spec.lines[line].name));
         Self {
             channels: channels(spec, wiring, &joints, layout.sums),
             initial: initial(spec, wiring, layout, &joints),
             inputs: (spec.valves.iter().map(|v| dotted("valve_command", &v.name)))
                 .chain(regulators.map(|s| dotted("supply_command", &s.name)))
                 .collect(),
-            gases: chambers.chain(inlets).collect(),
+            gases: chambers.chain(inside).collect(),
             coordinates: if spec.load.is_some() {
                 vec!["load".into()]
             } else {
@@ -257,6 +271,12 @@ fn channels(
     }
     for (k, name) in inlets.clone().enumerate() {
         add("line_pressure", name, Channel::Pressure(wiring.chambers + k));
+    }
+    for (k, name) in segments(spec, wiring, 1) {
+        add("segment_pressure", &name, Channel::Pressure(k));
+    }
+    for (k, name) in segments(spec, wiring, 0) {
+        add("segment_flow", &name, Channel::Flow(k));
     }
     for (k, name) in joints.iter().enumerate() {
         add("joint_angle", name, Channel::Angle(k));
@@ -289,10 +309,25 @@ fn channels(
     for (k, name) in inlets.enumerate() {
         add("line_mass", name, Channel::Mass(wiring.chambers + k));
     }
+    for (k, name) in segments(spec, wiring, 1) {
+        add("segment_mass", &name, Channel::Mass(k));
+    }
     for (k, name) in BALANCE.iter().chain(&HEAT_BALANCE).take(sums).enumerate() {
         add(name, "", Channel::Balance(k));
     }
     found
+}
+
+/// What lies between the segments of the tubes (`less` 1: the gases), or flows through them (`less` 0),
+/// with its name: of the line, and the number of the segment in front of it.
+fn segments(spec: &RigSpec, wiring: &Wiring, less: usize) -> Vec<(usize, String)> {
+    let of = |wave: &WaveUnit| {
+        let first = if less == 0 { wave.flow } else { wave.gas };
+        let name = &spec.lines[wave.line].name;
+        let full = |k: usize| if name.is_empty() { k.to_string() } else { format!("{name}.{k}") };
+        (0..wave.segments - less).map(|k| (first + k, full(k + 1))).collect::<Vec<_>>()
+    };
+    wiring.waves.iter().flat_map(of).collect()
 }
 
 /// States that an initial value can be given for, with the place of each.
@@ -312,6 +347,12 @@ fn initial(
     }
     for (k, (line, _)) in wiring.inlets.iter().enumerate() {
         add("line_pressure", &spec.lines[*line].name, layout.pressure(wiring.chambers + k));
+    }
+    for (k, name) in segments(spec, wiring, 1) {
+        add("segment_pressure", &name, layout.pressure(k));
+    }
+    for (k, name) in segments(spec, wiring, 0) {
+        add("segment_flow", &name, layout.flow(k));
     }
     for (k, name) in joints.iter().enumerate() {
         add("joint_angle", name, layout.angle(k));

@@ -98,6 +98,7 @@ impl Rig {
         let layout = Layout {
             supplies: wiring.supplies.len(),
             gases: wiring.gases.len(),
+            flows: wiring.waves.iter().map(|wave| wave.segments).sum(),
             coordinates: wiring.coordinates.len(),
             chambers: wiring.chambers,
             effects: wiring.ports.states,
@@ -250,12 +251,22 @@ impl Rig {
                 "the arm's mass matrix is not positive definite: a link without inertia".into(),
             ));
         }
-        let (air, place) = plant.fastest_air(|_| true);
         let needed = |step: f64| {
             format!(
                 "a step of {step:.1e} s would be needed, at least {LEAST_STEP:.0e} s is allowed"
             )
         };
+        if let Some((wave, line)) = plant.fastest_wave() {
+            if STABLE / wave < LEAST_STEP {
+                let line = &self.spec.lines[line];
+                let (name, segments) = (dotted("line", &line.name), line.segments);
+                return Err(Error::Model(format!(
+                    "{name} is too short for {segments} segments: {}",
+                    needed(STABLE / wave)
+                )));
+            }
+        }
+        let (air, place) = plant.fastest_air(|_| true);
         if STABLE / body < LEAST_STEP {
             return Err(Error::Model(format!(
                 "what moves is too light, or too strongly damped or held, for its inertia: {}",
@@ -352,6 +363,9 @@ impl Rig {
         for (k, gas) in self.names.gases.iter().enumerate() {
             let free = wiring.ports.frees_mass(k) || wiring.gases[k].has_energy();
             add(gas, if free { StateRole::FreeMass } else { StateRole::Mass });
+        }
+        for place in layout.flow(0)..layout.angle(0) {
+            add(named(place), StateRole::Flow);
         }
         for place in layout.angle(0)..layout.effect(0) {
             let role = if place < layout.rate(0) { StateRole::Position } else { StateRole::Rate };

@@ -1,7 +1,7 @@
 //! The state equation of a rig, composed of its blocks.
 //!
-//! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], joint
-//! angles [rad] and rates [rad/s], then what effects need and, where they are kept, the sums of
+//! States as in [`Layout`]: absolute pressures of supplies and gases [Pa], gas masses [kg], flows in
+//! tubes that carry waves [kg/s], joint angles [rad] and rates [rad/s], then what effects need and, where they are kept, the sums of
 //! [`super::layout::BALANCE`]. Any of them can be *driven* by a signal instead of being integrated:
 //! that is where the rig is cut.
 
@@ -9,13 +9,14 @@ use super::body::Body;
 use super::layout::{Channel, Layout};
 use super::memory::Memory;
 use super::ports::{Acting, Place, Ports};
-use super::units::{GasLaw, LineUnit, Passes, Path, SupplyUnit, ValveUnit, Wiring};
+use super::units::{GasLaw, LineUnit, Passes, Path, SupplyUnit, ValveUnit, WaveUnit, Wiring};
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
 use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::tube::Tube;
 use crate::blocks::valve::Opening;
+use crate::blocks::wave::Wave;
 use crate::effects::{Effect, Number};
 use crate::scalar::{constant, Scalar};
 use crate::Result;
@@ -144,6 +145,7 @@ pub struct Plant<'a, S> {
     pub(super) walls: Vec<Option<S>>,
     pub(crate) valves: Vec<Valve<S>>,
     pub(crate) lines: Vec<Line<S>>,
+    pub(super) waves: Vec<Wave<S>>,
     pub(crate) scales: Vec<S>,
     pub(crate) body: Body<S>,
     /// Effects that are switched on.
@@ -158,6 +160,8 @@ pub(super) struct Altered {
     pub areas: bool,
     pub passages: bool,
     pub flows: bool,
+    /// Some tube carries waves.
+    pub waves: bool,
     pub balances: bool,
     /// Some gas has an energy balance.
     pub heats: bool,
@@ -171,6 +175,7 @@ impl Altered {
         let ports: &Ports = &wiring.ports;
         Self {
             heats: wiring.heated(),
+            waves: !wiring.waves.is_empty(),
             supplies: ports.on_supplies(),
             areas: ports.area.iter().any(Option::is_some),
             passages: ports.passage.iter().any(Option::is_some),
@@ -260,9 +265,15 @@ impl<'a, S: Number> Plant<'a, S> {
         let lines: Vec<Line<S>> = wiring.lines.iter().map(line).collect();
         let half_volume = |line: usize| match wiring.lines[line].path {
             Path::Tube { length, diameter } => {
-                values[diameter] * values[diameter] * values[length] * (std::f64::consts::PI / 8.0)
+                let parts = wiring.lines[line].segments.max(1) as f64;
+                let share = std::f64::consts::PI / 8.0 / parts;
+                values[diameter] * values[diameter] * values[length] * share
             }
             Path::Orifice(_) => constant(0.0),
+        };
+        let wave = |unit: &WaveUnit| {
+            let [length, diameter, alpha] = [unit.length, unit.diameter, unit.alpha];
+            Wave::new(values[length], values[diameter], values[alpha], unit.segments, &rig.gas)
         };
         let paths = |valve: &ValveUnit| match valve.passes {
             Passes::Area(area) => [Opening::Area(values[area]); 2],
@@ -271,18 +282,15 @@ impl<'a, S: Number> Plant<'a, S> {
                 Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
             }),
         };
-        let alike = |alpha: f64| Polytropic {
-            inflow: constant(alpha),
-            outflow: constant(alpha),
-            volume: constant(alpha),
-        };
+        let alike = |alpha: S| Polytropic { inflow: alpha, outflow: alpha, volume: alpha };
         Ok(Self {
             layout: rig.layout,
             balanced,
             supplies: wiring.supplies.iter().map(|unit| supply(unit, &values)).collect(),
             fixed_volume: (wiring.gases.iter())
                 .map(|gas| {
-                    gas.tubes.iter().fold(values[gas.volume], |sum, line| sum + half_volume(*line))
+                    let own = gas.volume.map_or(constant(0.0), |volume| values[volume]);
+                    gas.tubes.iter().fold(own, |sum, line| sum + half_volume(*line))
                 })
                 .collect(),
             alphas: (wiring.gases.iter())
@@ -292,8 +300,9 @@ impl<'a, S: Number> Plant<'a, S> {
                         outflow: values[outflow],
                         volume: values[volume],
                     },
-                    GasLaw::Isothermal => alike(1.0),
-                    GasLaw::Energy(_) => alike(rig.gas.gamma),
+                    GasLaw::Isothermal => alike(constant(1.0)),
+                    GasLaw::Alike(alpha) => alike(values[alpha]),
+                    GasLaw::Energy(_) => alike(constant(rig.gas.gamma)),
                 })
                 .collect(),
             walls: (wiring.gases.iter())
@@ -306,6 +315,7 @@ impl<'a, S: Number> Plant<'a, S> {
                 .map(|valve| Valve { paths: paths(valve), null: values[valve.null] })
                 .collect(),
             lines,
+            waves: wiring.waves.iter().map(wave).collect(),
             scales: wiring.groups.iter().map(|group| group.elastic_scale(&values)).collect(),
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
             altered: Altered::at(wiring),
@@ -642,6 +652,7 @@ impl Plant<'_, f64> {
                 Channel::Torque(k) => here.torque[k],
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
+                Channel::Flow(k) => state[layout.flow(k)],
                 Channel::Temperature(k)
                     if wiring.ports.balance[k].is_some() || self.walls[k].is_some() =>
                 {

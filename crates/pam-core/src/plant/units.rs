@@ -17,7 +17,7 @@ pub const MOST_LINKS: usize = 4;
 pub(crate) enum Node {
     Ambient,
     Supply(usize),
-    /// A chamber, or behind all chambers the inlet of a line.
+    /// A chamber; behind all chambers the inlet of a line; behind these what lies inside a tube.
     Gas(usize),
 }
 
@@ -75,6 +75,35 @@ pub(crate) struct LineUnit {
     pub from: Node,
     pub to: Node,
     pub path: Path,
+    /// Segments of a tube that carries waves; 0 of any other line.
+    pub segments: usize,
+}
+
+/// Where a tube that carries waves has its gas and its flows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WaveUnit {
+    pub line: usize,
+    pub length: ParameterId,
+    pub diameter: ParameterId,
+    pub alpha: ParameterId,
+    pub segments: usize,
+    /// The first of the gases between its segments, one less than these.
+    pub gas: usize,
+    /// The first of its flows, one through each segment.
+    pub flow: usize,
+}
+
+impl WaveUnit {
+    /// The node in front of a segment; behind the last one, the end of the line.
+    #[inline]
+    pub fn node(&self, lines: &[LineUnit], segment: usize) -> Node {
+        let line = &lines[self.line];
+        match segment {
+            0 => line.from,
+            k if k == self.segments => line.to,
+            k => Node::Gas(self.gas + k - 1),
+        }
+    }
 }
 
 /// What gives the pressure of a gas.
@@ -84,20 +113,22 @@ pub(crate) enum GasLaw {
     Coefficients([ParameterId; 3]),
     /// All wall, as an inlet.
     Isothermal,
+    /// One coefficient for all that happens to it, as along a tube that carries waves.
+    Alike(ParameterId),
     /// An energy balance with a heat transfer coefficient.
     Energy(ParameterId),
 }
 
-/// Volume of gas: a chamber, or the rigid inlet of a line.
+/// Volume of gas: a chamber, the rigid inlet of a line, or what lies inside a tube.
 #[derive(Debug, Clone)]
 pub(crate) struct GasUnit {
-    /// Fixed volume [m3].
-    pub volume: ParameterId,
-    /// Lines of which half the tube's volume is here.
+    /// Fixed volume [m3], none inside a tube.
+    pub volume: Option<ParameterId>,
+    /// Lines of which half the tube's volume, or half of that of a segment, is here.
     pub tubes: Vec<usize>,
     pub law: GasLaw,
     pub pressure_zero: Option<ParameterId>,
-    /// Gauge [Pa]; an inlet begins at the pressure of the line's end.
+    /// Gauge [Pa]; a line's gas begins at the pressure of the line's end.
     pub initial_pressure: f64,
 }
 
@@ -182,10 +213,13 @@ pub(crate) enum BodyUnit {
 pub(crate) struct Wiring {
     pub supplies: Vec<SupplyUnit>,
     pub gases: Vec<GasUnit>,
-    /// The first `chambers` of `gases` are chambers, the rest inlets of lines.
+    /// The first `chambers` of `gases` are chambers, the next ones inlets of lines, the rest lies
+    /// inside tubes.
     pub chambers: usize,
     /// Line and end of line of each inlet.
     pub inlets: Vec<(usize, Node)>,
+    /// Tubes that carry waves.
+    pub waves: Vec<WaveUnit>,
     pub valves: Vec<ValveUnit>,
     pub lines: Vec<LineUnit>,
     pub groups: Vec<Group>,
@@ -206,5 +240,17 @@ impl Wiring {
     /// Whether some gas has an energy balance.
     pub fn heated(&self) -> bool {
         self.gases.iter().any(GasUnit::has_energy)
+    }
+
+    /// Line of every gas behind the chambers.
+    pub fn lines_of_gases(&self) -> impl Iterator<Item = usize> + '_ {
+        let inside = self.waves.iter().flat_map(|w| std::iter::repeat_n(w.line, w.segments - 1));
+        self.inlets.iter().map(|(line, _)| *line).chain(inside)
+    }
+
+    /// Every gas behind the chambers, with the end of its line, at whose pressure it begins.
+    pub fn beginnings(&self) -> impl Iterator<Item = (usize, Node)> + '_ {
+        let of = |(k, line): (usize, usize)| (self.chambers + k, self.lines[line].to);
+        self.lines_of_gases().enumerate().map(of)
     }
 }

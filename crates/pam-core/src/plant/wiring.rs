@@ -4,7 +4,8 @@
 use super::parameters::Parameters;
 use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{
-    Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit, Wiring,
+    Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit,
+    WaveUnit, Wiring,
 };
 use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::supply::FASTEST;
@@ -89,13 +90,21 @@ impl Wiring {
         let supplies = supplies(spec, &mut table)?;
         let valves = valves(spec, &ports, &mut table)?;
         let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
-        let mut gases = gases(spec, &inlets, &mut table)?;
+        let waves = waves(spec, &lines, inlets.len(), &mut table)?;
+        let mut gases = gases(spec, &inlets, &waves, &lines, &mut table)?;
         for (k, line) in
             lines.iter().enumerate().filter(|(_, l)| matches!(l.path, Path::Tube { .. }))
         {
             for end in [line.from, line.to] {
                 if let Node::Gas(gas) = end {
                     gases[gas].tubes.push(k);
+                }
+            }
+        }
+        for wave in &waves {
+            for segment in 1..wave.segments {
+                if let Node::Gas(gas) = wave.node(&lines, segment) {
+                    gases[gas].tubes.extend([wave.line, wave.line]);
                 }
             }
         }
@@ -109,6 +118,7 @@ impl Wiring {
             supplies,
             gases,
             inlets,
+            waves,
             valves,
             lines,
             groups,
@@ -276,12 +286,39 @@ fn lines(
                 (0.0, 1.0, "m2"),
             )?)
         };
-        units.push(LineUnit { from, to, path });
+        units.push(LineUnit { from, to, path, segments: line.segments });
     }
     Ok((units, inlets))
 }
 
-fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Result<Vec<GasUnit>> {
+/// The tubes that carry waves, with places for their gases and flows.
+fn waves(
+    spec: &RigSpec,
+    lines: &[LineUnit],
+    inlets: usize,
+    table: &mut Parameters,
+) -> Result<Vec<WaveUnit>> {
+    let (mut gas, mut flow) = (spec.chambers.len() + inlets, 0);
+    let mut units = Vec::new();
+    for (k, (line, unit)) in spec.lines.iter().zip(lines).enumerate() {
+        let (Path::Tube { length, diameter }, true) = (unit.path, line.segments > 0) else {
+            continue;
+        };
+        let (name, segments) = (format!("{}.alpha", dotted("line", &line.name)), line.segments);
+        let alpha = table.add(name, line.alpha, (0.5, 2.0, ""))?;
+        units.push(WaveUnit { line: k, length, diameter, alpha, segments, gas, flow });
+        (gas, flow) = (gas + segments - 1, flow + segments);
+    }
+    Ok(units)
+}
+
+fn gases(
+    spec: &RigSpec,
+    inlets: &[(usize, Node)],
+    waves: &[WaveUnit],
+    lines: &[LineUnit],
+    table: &mut Parameters,
+) -> Result<Vec<GasUnit>> {
     let mut units = Vec::new();
     let plain = |volume, law, initial_pressure| GasUnit {
         volume,
@@ -289,6 +326,11 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Re
         initial_pressure,
         tubes: Vec::new(),
         pressure_zero: None,
+    };
+    let begins = |end: Node| match end {
+        Node::Gas(gas) => spec.chambers.get(gas).map_or(0.0, |c| c.initial_pressure),
+        Node::Supply(supply) => spec.supplies[supply].initial_pressure,
+        Node::Ambient => 0.0,
     };
     for chamber in &spec.chambers {
         let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));
@@ -307,18 +349,19 @@ fn gases(spec: &RigSpec, inlets: &[(usize, Node)], table: &mut Parameters) -> Re
                 table.add(name("alpha"), chamber.alpha, polytropic)?,
             ])
         };
-        units.push(plain(volume, law, chamber.initial_pressure));
+        units.push(plain(Some(volume), law, chamber.initial_pressure));
     }
     for (k, end) in inlets {
         let line = &spec.lines[*k];
         let name = format!("{}.inlet_volume", dotted("line", &line.name));
         let volume = table.add(name, line.inlet_volume, (0.0, 1e3, "m3"))?;
-        let pressure = match end {
-            Node::Gas(gas) => spec.chambers.get(*gas).map_or(0.0, |c| c.initial_pressure),
-            Node::Supply(supply) => spec.supplies[*supply].initial_pressure,
-            Node::Ambient => 0.0,
-        };
-        units.push(plain(volume, GasLaw::Isothermal, pressure));
+        let wave = waves.iter().find(|wave| wave.line == *k);
+        let law = wave.map_or(GasLaw::Isothermal, |wave| GasLaw::Alike(wave.alpha));
+        units.push(plain(Some(volume), law, begins(*end)));
+    }
+    for wave in waves {
+        let gas = plain(None, GasLaw::Alike(wave.alpha), begins(lines[wave.line].to));
+        units.extend(std::iter::repeat_n(gas, wave.segments - 1));
     }
     Ok(units)
 }

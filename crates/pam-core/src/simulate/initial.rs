@@ -23,6 +23,8 @@ impl Initial {
                 spec.supplies[place].initial_pressure
             } else if place < layout.mass(0) {
                 wiring.gases[place - layout.supplies].initial_pressure
+            } else if place < layout.angle(0) {
+                0.0
             } else if place < layout.rate(0) && spec.load.is_some() {
                 wiring.groups[0].rest_length
             } else if place < layout.rate(0) {
@@ -53,7 +55,7 @@ impl Initial {
         };
         let (layout, place) = (&rig.layout, rig.names.initial[k].1);
         let full = format!("initial.{name}");
-        if place < layout.angle(0) {
+        if place < layout.mass(0) {
             check_range(
                 &full,
                 value,
@@ -61,6 +63,8 @@ impl Initial {
                 1e8,
                 "Pa (gauge)",
             )?;
+        } else if place < layout.angle(0) {
+            check_range(&full, value, -10.0, 10.0, "kg/s")?;
         } else if place >= layout.rate(0) {
             check_range(
                 &full,
@@ -88,7 +92,7 @@ impl Initial {
         for ((_, place), value) in rig.names.initial.iter().zip(&self.values) {
             state[*place] = if *place < layout.mass(0) {
                 value + ambient
-            } else if rig.spec().load.is_some() {
+            } else if *place >= layout.angle(0) && rig.spec().load.is_some() {
                 if *place < layout.rate(0) {
                     wiring.groups[0].rest_length - value
                 } else {
@@ -98,8 +102,8 @@ impl Initial {
                 *value
             };
         }
-        for (k, (_, end)) in wiring.inlets.iter().enumerate() {
-            let place = layout.pressure(wiring.chambers + k);
+        for (gas, end) in wiring.beginnings() {
+            let place = layout.pressure(gas);
             let given = rig
                 .names
                 .initial

@@ -91,6 +91,7 @@ _VALVE = (
     "null_voltage",
 )
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
+_WAVES = ("alpha",)  # of a tube that has segments
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _MUSCLE = ("modulus_scale", "softening", "temperature")
 _ARM = (
@@ -233,10 +234,11 @@ class _Map:
         names: set[str] = set()
         for way in self.around(block):
             for full in (way.name, *way.between):
-                names |= {
-                    f"{full}.{key}"
-                    for key in (_VALVE if full.partition(".")[0] == "valve" else _LINE)
-                }
+                kind, _, name = full.partition(".")
+                keys = _VALVE if kind == "valve" else _LINE
+                if kind == "line" and self.rig.tables("line")[name].get("segments"):
+                    keys = (*keys, *_WAVES)
+                names |= {f"{full}.{key}" for key in keys}
         return names
 
     def chambers_at(self, block: str) -> set[str]:
