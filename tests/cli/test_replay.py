@@ -97,3 +97,38 @@ def test_a_recording_that_is_not_there_is_named(
     code, _, err = run(capsys, "replay", case, "--recording", "ramps")
     assert code == 2
     assert "--recording = 'ramps' is not allowed: one of waves, steps is needed" in err
+
+
+def test_a_model_away_from_its_case_says_where_that_was_looked_for(
+    capsys: pytest.CaptureFixture[str], case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model, moved = tmp_path / "model.toml", tmp_path / "elsewhere" / "model.toml"
+    moved.parent.mkdir()
+    moved.write_bytes(model.read_bytes())
+    code, _, err = run(capsys, "replay", moved)
+    assert code == 2
+    assert f"case = 'case': there is no folder {moved.parent / 'case'}; give the folder" in err
+    assert "CASE --rig FILE" in err
+    monkeypatch.chdir(moved.parent)  # as that line says, from anywhere
+    code, out, _ = run(capsys, "replay", case, "--rig", "model.toml")
+    assert code == 0
+    assert out == run(capsys, "replay", model)[1]
+
+
+@pytest.mark.parametrize("name", pamrs.rigs.names())
+def test_a_rig_of_the_package_is_no_case(
+    capsys: pytest.CaptureFixture[str], case: Path, tmp_path: Path, name: str
+) -> None:
+    code, _, err = run(capsys, "replay", name)
+    assert code == 2
+    assert f"{name} is a rig of the package, not a case; give the folder of a case" in err
+    pamrs.rigs.named(name).to_toml(tmp_path / "alone.toml")
+    code, _, err = run(capsys, "replay", tmp_path / "alone.toml")
+    assert code == 2
+    assert "does not say from which case it is; give the folder of the case" in err
+    pamrs.rigs.named(name).with_case(str(case)).to_toml(tmp_path / "alone.toml")
+    code, out, err = run(capsys, "replay", tmp_path / "alone.toml")
+    assert code == 0  # one that takes other inputs says so
+    assert out.count("rms difference") >= 2
+    said = f"{name} cannot be run:" in err or f"{name} has none of the channels" in err
+    assert ("->" in out) != said

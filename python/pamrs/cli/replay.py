@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pamrs.channels import laboratory_unit
+from pamrs.channels import channel_of, laboratory_unit
 from pamrs.cli._shared import (
     check_writable,
     progress,
@@ -77,9 +77,16 @@ def replay_command(
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:
     """A case with its own rig, and the model beside it, if there is one."""
+    from pamrs import rigs
+    from pamrs.errors import CaseError
     from pamrs.recordings import load_case, model_and_case
 
     model = None
+    if not place.exists() and str(place) in rigs.names():
+        raise CaseError(
+            f"{place} is a rig of the package, not a case; give the folder of a case, and this as "
+            f"its rig (pamrs replay CASE --rig {place})"
+        )
     if place.is_file() and place.name != "case.toml":
         model, place = model_and_case(place)
     found = load_case(place, allow_outside=allow_outside)
@@ -102,13 +109,27 @@ def _chosen(case: Case, name: str) -> list[Recording]:
 def _run(rig: Rig, recording: Recording) -> Simulation | None:
     """A free run; None, with the reason on standard error, where the rig cannot be run so."""
     from pamrs.errors import RecordingError, SimulationError
-    from pamrs.simulation import replay
+    from pamrs.simulation import differences, replay
 
     try:
-        return replay(rig, recording)
+        run = replay(rig, recording)
+        if not differences(run, recording):
+            typer.echo(
+                f"{recording.name}: {rig.name} has none of the channels that were recorded "
+                f"({', '.join(recording.channels)}); it has {', '.join(_measurable(run))}",
+                err=True,
+            )
+        return run
     except (RecordingError, SimulationError) as error:
         typer.echo(f"{recording.name}: {rig.name} cannot be run: {error}", err=True)
         return None
+
+
+def _measurable(run: Simulation) -> list[str]:
+    """Channels of a run that a stand measures."""
+    from pamrs.recordings import CHANNELS
+
+    return [name for name in run if name != "time" and channel_of(name) in CHANNELS]
 
 
 def _lines(nominal: Simulation | None, own: Simulation | None, recording: Recording) -> list[str]:

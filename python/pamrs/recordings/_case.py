@@ -31,6 +31,10 @@ _OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
 _ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
 _ERRORS: Final = ("same", "proportional", "none")
 _RIG: Final = "rig.toml"
+_GIVE_BOTH: Final = (
+    "give the folder of the case, and this file as its rig (CASE --rig FILE; in Python: "
+    "load_case(CASE).with_rig(load_rig(FILE)))"
+)
 _LIES_OUTSIDE: Final = (
     "lies outside the case folder; copy it there, or allow it with "
     "--allow-outside (in Python: load_case(..., allow_outside=True))"
@@ -162,13 +166,13 @@ def model_and_case(file: Path) -> tuple[Rig, Path]:
     except RigError as error:
         raise CaseError(str(error)) from error
     if not rig.case:
-        raise CaseError(
-            f"{file}: a rig file that does not say from which case it is; give the folder of the "
-            "case, and this file as its rig (pamrs diagnose CASE --rig FILE)"
-        )
+        raise CaseError(f"{file}: a rig file that does not say from which case it is; {_GIVE_BOTH}")
     home = file.parent / rig.case
     if not home.is_dir():
-        raise CaseError(f"{file}: case = {rig.case!r}: there is no such case folder")
+        raise CaseError(
+            f"{file}: case = {rig.case!r}: there is no folder {os.path.normpath(home)}; "
+            f"{_GIVE_BOTH}"
+        )
     return rig, home
 
 
