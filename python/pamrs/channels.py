@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "unit_of"]
+__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "rate_of", "unit_of"]
 
 #: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
 #: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``; behind that
@@ -54,6 +54,14 @@ def channel_of(name: str) -> str:
 def dotted(channel: str, name: str) -> str:
     """``muscle_pressure.flexor``, or ``muscle_pressure`` for a block without a name."""
     return f"{channel}.{name}" if name else channel
+
+
+def rate_of(name: str) -> str:
+    """The channel of the rate of an angle or a length: ``joint_rate.elbow`` of
+    ``joint_angle.elbow``.
+    """
+    kind, dot, block = name.partition(".")
+    return f"{'length_rate' if kind == 'length' else 'joint_rate'}{dot}{block}"
 
 
 def unit_of(name: str) -> str:

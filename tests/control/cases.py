@@ -10,6 +10,7 @@ from pamrs.control import (
     AdaptiveSliding,
     AirModel,
     ArmModel,
+    ByLength,
     Cascade,
     DeadZoneCompensation,
     Feedforward,
@@ -42,6 +43,7 @@ PERIOD = 0.005
 PAIR = RigModel(pamrs.rigs.named("antagonistic_joint"))
 ARM = RigModel(pamrs.rigs.named("two_joint_arm"))
 REGULATED = RigModel(pamrs.rigs.named("regulated_joint"), pressure_limit=1e6)
+MASS = RigModel(pamrs.rigs.named("hanging_mass"))
 WHOLE = RigModel(pamrs.rigs.named("recruitment"))
 BUNDLE = RigModel(pamrs.rigs.named("recruitment"), active=("pair_1", "pair_3"))
 
@@ -158,6 +160,16 @@ CONTROLLERS = {
             drop_at=0.2,
         ),
     ),
+    "rig mass by length": lambda x: ByLength(
+        Cascade(
+            Sliding(MASS.arm, slope=5.0 * x, switching=4e3, boundary_layer=0.01, period=PERIOD),
+            MASS.pressure_loop("", period=PERIOD),
+        ),
+        MASS.rig,
+    ),
+    "rig mass adaptive": lambda x: RigController(
+        MASS, MASS.law("adaptive", slope=5.0 * x, period=PERIOD)
+    ),
     "dead zone": lambda x: DeadZoneCompensation(PID(2.0 * x, 1.5, 0.1, period=PERIOD), DIAGNOSED),
 }
 
@@ -202,6 +214,9 @@ def told(name, sample):
     renamed = {}
     for channel in CHANNELS[name.split()[1]]:
         word, _, block = channel.partition(".")
+        if word == "length":
+            renamed[channel] = 0.275 - 0.03 * sample["joint_angle"]
+            continue
         # no two blocks see the same
         renamed[channel] = sample[word] * (1.0 + 0.01 * len(block)) if block else sample[word]
     return renamed
@@ -233,6 +248,7 @@ CHANNELS = {
         "muscle_pressure.wrist",
         "supply_pressure",
     ],
+    "mass": ["length", "muscle_pressure", "supply_pressure"],
     "regulated": ["joint_angle", "muscle_pressure", "supply_pressure"],
     "whole": [
         "joint_angle.shoulder",

@@ -42,6 +42,9 @@ def test_every_public_controller_is_among_the_cases():
 
 
 def aim_of(name, time):
+    if name.startswith("rig mass"):
+        angle, rate, acceleration = smooth(time)
+        return Reference(0.275 - 0.03 * angle, -0.03 * rate, -0.03 * acceleration)
     return Reference(3e5 + 1e5 * math.sin(time)) if name == "pressure loop" else smooth(time)
 
 
@@ -173,7 +176,8 @@ def test_a_refused_sample_changes_nothing_whatever_refuses_it(name, first):
     wrong += [({**good, channel: np.array([1.0, math.nan, 1.0])}, aim) for channel in good]
     # two lengths in one sample, of which the first is good by itself
     angle, pressure = (
-        next(n for n in good if n.startswith(word)) for word in ("joint_angle", "muscle_pressure")
+        next(n for n in good if n.startswith(word))
+        for word in (("joint_angle", "length"), "muscle_pressure")
     )
     wrong += [({**good, angle: np.zeros(3), pressure: np.zeros(4)}, aim)]
     arrays = Reference(aim.angle + np.zeros(3), aim.rate + np.zeros(3), math.nan)

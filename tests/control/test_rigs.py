@@ -579,9 +579,8 @@ def test_a_batch_of_pairs_runs_as_each_alone():
 
 
 def test_what_no_controller_can_turn_is_named():
-    for name in ("bench", "hanging_mass"):
-        with pytest.raises(ParameterError, match=rf"{name}.*\[load\]"):
-            RigModel(pamrs.rigs.named(name))
+    with pytest.raises(ParameterError, match=r"bench.*\[load\] is a frame.*follow a force"):
+        RigModel(pamrs.rigs.named("bench"))
     with pytest.raises(ParameterError, match=r"tube.*has no \[muscle\]"):
         RigModel(pamrs.rigs.named("tube"))
     with pytest.raises(ParameterError, match=r"regulated_joint.*pressure_limit"):

@@ -18,6 +18,7 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig, load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS, PORTS
 from pamrs.rigs._keys import every_key
+from pamrs.simulation import core_rig
 from tests.rig.cases import refused, same, stand
 
 
@@ -65,6 +66,20 @@ def test_packaged_rigs_read_back_to_the_last_bit(name: str, tmp_path: Path) -> N
     kept = {key: given for key, given in rig.parameters.items() if ".alpha" not in key}
     assert {key: anew.parameters[key] for key in kept} == kept
     assert any(0.0 < given.tol < math.inf for given in rig.parameters.values())
+
+
+def test_the_file_allows_as_stiff_a_spring_as_the_core() -> None:
+    (key,) = (key for key in BLOCKS["joint"] if key.name == "stiffness")
+    for name in ("shoulder", "two_joint_arm"):
+        rig = rigs.named(name)
+        joint = next(iter(rig.tables("joint")))
+        parameter = "joint.stiffness" if not joint else f"joint.{joint}.stiffness"
+        core_rig(rig.with_parameters({parameter: key.upper}))
+        model = rig.model
+        table = model["joint"] if not joint else model["joint"][joint]
+        table["stiffness"] = 1.01 * key.upper
+        with pytest.raises(pamrs.errors.PamrsError, match=r"stiffness.*1e9|stiffness.*1000000000"):
+            core_rig(pamrs.Rig(name, model))
 
 
 def test_pickling_leaves_out_what_is_made_again() -> None:

@@ -21,6 +21,7 @@ from pamrs.control._hysteresis import (
     SlipMemory,
 )
 from pamrs.control._joint_sensor import JointSensor
+from pamrs.control._load import ByLength, LoadModel
 from pamrs.control._model import ArmModel, JointModel
 from pamrs.control._neural import NETWORKS, Neural
 from pamrs.control._parts import ANTI_WINDUP, FilteredDerivative, Integrator, LowPass
@@ -90,6 +91,7 @@ __all__ = [
     "Demand",
     "CoContraction",
     "BundleTorque",
+    "ByLength",
     "Cascade",
     "ClosedLoop",
     "ConductanceInverse",
@@ -108,6 +110,7 @@ __all__ = [
     "JointSensor",
     "LiveError",
     "LiveRun",
+    "LoadModel",
     "LowPass",
     "Measurement",
     "Metrics",

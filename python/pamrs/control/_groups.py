@@ -23,6 +23,8 @@ def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
     """What makes the torque that holds a joint other than the sine of its angle times a number, as
     ``key = value``.
     """
+    if rig.tables("load"):
+        return ("load.kind = 'mass', whose weight is the same everywhere",)
     arm, own = next(iter(rig.tables("arm").values())), rig.tables("joint")[joint]
     found = [("arm", arm, key, "rad") for key in ("base_angle", "centre_angle")]
     found.append((named("joint", joint), own, "stiffness", "N m/rad"))
@@ -76,7 +78,7 @@ class Group:
 
 
 def joints_of(rig: Rig) -> tuple[str, ...]:
-    """Names of a rig's joints, base first.
+    """Names of a rig's joints, base first; one without a name where a mass hangs from the muscles.
 
     Parameters
     ----------
@@ -89,13 +91,18 @@ def joints_of(rig: Rig) -> tuple[str, ...]:
     Raises
     ------
     ParameterError
-        If it has no muscle, joint or arm; the message says what a load is instead.
+        If it has no muscle, joint or arm; if a load frame prescribes the length of its muscles.
     """
+    for name, load in rig.tables("load").items():
+        if load.get("kind", "mass") == "frame":
+            raise ParameterError(
+                f"rig {rig.name!r}: [{named('load', name)}] is a frame, which prescribes the "
+                "length of the muscles, so that no controller moves them: follow a force by a "
+                "pressure (pamrs.control.torque_line has it, a line in the pressure), or take a "
+                "load of kind 'mass'"
+            )
     if rig.tables("load"):
-        raise ParameterError(
-            f"rig {rig.name!r} has a [load] in the place of joint and arm, which no controller of "
-            "a joint turns: a rig with [joint] and [arm] is needed"
-        )
+        return ("",)
     for block in ("muscle", "joint", "arm"):
         if not rig.tables(block):
             raise ParameterError(

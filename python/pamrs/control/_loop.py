@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, rate_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control.metrics import Metrics, evaluate
@@ -124,7 +124,7 @@ class ClosedLoop:
             self.time,
             wanted,
             self.channels[channel],
-            rate=self.channels.get(channel.replace("joint_angle", "joint_rate", 1)),
+            rate=self.channels.get(rate_of(channel)),
             parts=trajectory.phases,
             unit=unit,
         )
@@ -366,6 +366,8 @@ def measured_by(controller: Controller, measured: Mapping[str, str] | None) -> d
     """
     alias = dict(measured or {})
     joints = getattr(controller, "joints", ("",))
+    if getattr(controller, "tracked", ()) == ("length",):
+        alias.setdefault("joint_angle", "length")
     if len(joints) == 1 and joints[0]:
         alias.setdefault("joint_angle", f"joint_angle.{joints[0]}")
     return alias
@@ -460,10 +462,11 @@ def tracked_of(rig: Rig, measured: Mapping[str, str] | None) -> tuple[str, str]:
     angle = (measured or {}).get("joint_angle", "joint_angle")
     if angle not in known:
         raise ParameterError(
-            f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured; it has: "
+            f"the rig {rig.name!r} has no channel {angle!r}; name the joint by measured, or put "
+            "the controller into ByLength where a mass hangs; it has: "
             f"{', '.join(known)}"
         )
-    return angle, angle.replace("joint_angle", "joint_rate", 1)
+    return angle, rate_of(angle)
 
 
 def actuation_of(rig: Rig, controller: Controller) -> Actuation:

@@ -221,7 +221,13 @@ class ArmModel(JointModel):
             If the rig has not these blocks, there is no such torque model or chamber, the muscles
             cannot raise the joint, or there is nothing to take the limit from.
         """
-        names, arm = joints_of(rig), next(iter(rig.tables("arm").values()))
+        names = joints_of(rig)
+        if rig.tables("load"):
+            raise ParameterError(
+                f"rig {rig.name!r} has a [load] in the place of [joint] and [arm]: it has a "
+                "LoadModel, and a RigModel takes either"
+            )
+        arm = next(iter(rig.tables("arm").values()))
         if arm["kind"] != "one_link" or len(names) != 1:
             raise ParameterError(
                 f"rig {rig.name!r} has an arm of kind {arm['kind']!r} with {len(names)} joints: it "

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike
 
 from pamrs.control._air import AirModel
 from pamrs.control._groups import Group, named
+from pamrs.control._load import shortened
 from pamrs.control._protocol import (
     Controller,
     Measurement,
@@ -121,7 +122,8 @@ class RigController(SampledController):
     -----
     Channels are ``joint_angle``, ``joint_rate``, ``muscle_pressure`` and ``supply_pressure`` with
     the rig's names behind. With several joints a reference has one entry for each along its first
-    axis, base first. Groups that the model leaves out stay vented.
+    axis, base first. A mass that hangs is followed by ``length`` and ``length_rate``, and a
+    reference of it is a length [m]. Groups that the model leaves out stay vented.
 
     Raises
     ------
@@ -178,6 +180,8 @@ class RigController(SampledController):
             )
         self._gain_batch = sizes.pop() if sizes else None
         self._number = {name: k for k, name in enumerate(model.joints)}
+        # a mass is followed by its length, and the law is told the shortening
+        self._rest_length = getattr(model.arm, "rest_length", None)
         self._channels = self._named_channels()
         #: Channels of the joints that are tracked, base first.
         self.tracked = tuple(self._channels[0])
@@ -243,6 +247,8 @@ class RigController(SampledController):
         model = self.model
         angles = [named("joint_angle", name) for name in model.joints]
         rates = [named("joint_rate", name) for name in model.joints]
+        if self._rest_length is not None:
+            angles, rates = ["length"], ["length_rate"]
         pressures = [named("muscle_pressure", group.chamber) for group in model.groups]
         supplies = [group.feed.source for group in model.groups]
         return angles, rates, pressures, supplies
@@ -316,6 +322,9 @@ class RigController(SampledController):
             if all(name in measurement for name in rate)
             else None
         )
+        if self._rest_length is not None:
+            angles = [self._rest_length - angles[0]]
+            rates = None if rates is None else [-rates[0]]
         pressures = [self._read(measurement, name) for name in pressure]
         supplies = [
             self._read(measurement, name) if name is not None and name in measurement else limit
@@ -394,7 +403,7 @@ class RigController(SampledController):
         Parameters
         ----------
         angle : float or array_like, shape (joints,)
-            Of every joint [rad], base first.
+            Of every joint [rad], base first; the length [m] of a hanging mass.
 
         Returns
         -------
@@ -408,13 +417,16 @@ class RigController(SampledController):
             If there is not an angle for each joint within its range, or no pressures up to the
             limit hold them.
         """
-        arm, joints = self.model.arm, len(self.joints)
+        arm, joints, rest_length = self.model.arm, len(self.joints), self._rest_length
         at = np.asarray(angle, dtype=np.float64)
+        if rest_length is not None:
+            at = rest_length - at
         low, high = (np.broadcast_to(end, joints) for end in arm.angle_range)
         if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
+            ends = (low, high) if rest_length is None else (rest_length - high, rest_length - low)
             raise ParameterError(
-                f"angle = {angle!r} is not allowed: {joints} from {low.tolist()} to "
-                f"{high.tolist()} are needed"
+                f"angle = {angle!r} is not allowed: {joints} from {ends[0].tolist()} to "
+                f"{ends[1].tolist()} are needed"
             )
         rows: Any = float(at.ravel()[0]) if joints == 1 else at.ravel()
         still = rows * 0.0
@@ -423,7 +435,7 @@ class RigController(SampledController):
         for k, asked in enumerate(np.broadcast_to(drive, joints)):
             if not least[k] <= asked <= most[k]:
                 raise ParameterError(
-                    f"no pressures hold {self.tracked[k]} = {at.ravel()[k]:g}: a drive of "
+                    f"no pressures hold {self.tracked[k]} = {np.ravel(angle)[k]:g}: a drive of "
                     f"{asked:.4g} Pa is needed, and {least[k]:.4g} to {most[k]:.4g} can be had"
                 )
         c1, c2 = arm.torque.at(rows)
@@ -435,7 +447,7 @@ class RigController(SampledController):
         rest, limit = [0.0] * len(groups), [self.model.pressure_limit] * len(groups)
         wanted, _ = self._shared(0.0, each, rest, limit)
         self._before.put_back(before)
-        start = {name: value for name, value in zip(self.tracked, each[2], strict=True)}
+        start = dict(zip(self.tracked, np.ravel(angle).astype(float).tolist(), strict=True))
         for group in groups:
             pressure = float(wanted[group.chamber])
             start[named("muscle_pressure", group.chamber)] = pressure
@@ -472,7 +484,8 @@ class RigController(SampledController):
         """The reference with the rows of the law."""
         joints = len(self.joints)
         if joints == 1:
-            return self._aim(reference)
+            aim = self._aim(reference)
+            return aim if self._rest_length is None else shortened(aim, self._rest_length)
         try:
             fields = Reference(*reference)
             arrays = [np.asarray(value, dtype=np.float64) for value in fields]

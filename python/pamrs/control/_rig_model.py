@@ -13,6 +13,7 @@ from pamrs.control._air import AirModel
 from pamrs.control._cascade import PressureLoop
 from pamrs.control._feedforward import FeedforwardPressure
 from pamrs.control._groups import Group, joints_of
+from pamrs.control._load import LoadModel
 from pamrs.control._model import ArmModel, JointModel
 from pamrs.control._neural import Neural
 from pamrs.control._planar import PlanarArmModel
@@ -31,6 +32,7 @@ _CROSSOVER: Final = 110.0  # 1/s, that of the shoulder's pressure loop with its 
 _RESET: Final = 1.0  # 1/s, ki/kp of the same
 #: I [kg m2] and I/C1 of the shoulder with its payload, at mid-range.
 _SHOULDER: Final = (7.9807, 8626.7)
+_SHOULDER_RANGE: Final = 1.8326  # rad, between its stops
 
 
 class RigModel:
@@ -39,13 +41,14 @@ class RigModel:
     Parameters
     ----------
     rig : Rig
-        With muscles, joints and an arm; valves with an area, or regulators, feed the muscles.
+        With muscles, joints and an arm, or a mass that hangs from muscles; valves or regulators
+        feed the muscles.
     torque, pressure_limit, active
         As for :meth:`pamrs.control.ArmModel.from_rig`.
 
     Attributes
     ----------
-    arm : ArmModel or PlanarArmModel
+    arm : ArmModel, PlanarArmModel or LoadModel
         For the laws.
     joints : tuple of str
         Names, base first.
@@ -166,6 +169,8 @@ class RigModel:
         inertia, c1 = self.mobility()
         ease: Any = (inertia / c1) / _SHOULDER[1]
         light = float(inertia.min()) / _SHOULDER[0]
+        if isinstance(self.arm, LoadModel):
+            return self._law_of_load(kind, period, float(ease[0]), light, changes)
         if len(self.joints) == 1:
             ease = float(ease[0])
         laws: dict[str, Callable[[], Controller]] = {
@@ -193,6 +198,30 @@ class RigModel:
             raise ParameterError(f"kind = {kind!r} is not allowed: one of {', '.join(laws)}")
         return laws[kind]()
 
+    def _law_of_load(
+        self, kind: str, period: float, ease: float, light: float, changes: dict[str, Any]
+    ) -> Controller:
+        """The law of a hanging mass: its stroke is to it what the joint's range is to the shoulder,
+        and it switches three times as hard, since a muscle that pulls straight is stiffer beside
+        what it moves.
+        """
+        arm = self.arm
+        reach = (arm.angle_range[1] - arm.angle_range[0]) / _SHOULDER_RANGE
+        surface = {"switching": 6e4 * ease * reach, "boundary_layer": 0.2 * reach}
+        gains = (light / reach**2, 5.0 * light / reach**2, 300.0 * light)
+        laws: dict[str, Callable[[], Controller]] = {
+            "feedforward": lambda: FeedforwardPressure(arm, period=period, **changes),
+            "sliding": lambda: Sliding(arm, period=period, **{**surface, **changes}),
+            "adaptive": lambda: AdaptiveSliding(
+                arm, changes.pop("gains", gains), period=period, **{**surface, **changes}
+            ),
+        }
+        if kind not in laws:
+            raise ParameterError(
+                f"kind = {kind!r} is not allowed for a hanging mass: one of {', '.join(laws)}"
+            )
+        return laws[kind]()
+
 
 def _arm(
     rig: Rig,
@@ -201,6 +230,8 @@ def _arm(
     active: Sequence[str] | None,
 ) -> JointModel:
     """The equation of motion of a rig."""
+    if rig.tables("load"):
+        return LoadModel.from_rig(rig, torque=torque, pressure_limit=pressure_limit, active=active)
     if not rig.tables("link"):
         return ArmModel.from_rig(rig, torque=torque, pressure_limit=pressure_limit, active=active)
     if torque != "full":

@@ -35,6 +35,7 @@ __all__ = [
     "active_groups",
     "group_torques",
     "joint_torque",
+    "rest_length_of",
     "torque_line",
 ]
 
@@ -54,10 +55,54 @@ class TorqueModel(Protocol):
         """``C1`` [N m/Pa], above zero, and ``C2`` [N m] at an angle [rad]."""
 
 
-def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Joint, dict[str, Any]]:
-    """A muscle of a rig, how it pulls, and the table of the joint that it turns; without a name the
-    only muscle of a rig with one joint and one link.
+class _Straight:
+    """How a muscle pulls on a load: straight, the shortening [m] in the place of an angle."""
+
+    def shortening(self, angle: ArrayLike) -> Array:
+        """Itself [m]."""
+        return np.asarray(angle, dtype=np.float64)
+
+    def torque_arm(self, angle: ArrayLike) -> Array:
+        """1."""
+        return np.ones_like(np.asarray(angle, dtype=np.float64))
+
+
+def rest_length_of(rig: Rig) -> float:
+    """Length at rest of the muscles that pull on a load [m]; they have one.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ParameterError
+        If the rig has no load or no muscle.
     """
+    muscles = rig.tables("muscle")
+    if not rig.tables("load") or not muscles:
+        raise ParameterError(f"rig {rig.name!r} has no [load] with a muscle: one is needed")
+    return float(next(iter(muscles.values()))["rest_length"])
+
+
+def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Any, dict[str, Any]]:
+    """A muscle of a rig, how it pulls, and the table of the joint that it turns, or the ends of the
+    shortening where it pulls on a load; without a name the only muscle of a rig with one joint and
+    one link.
+    """
+    if rig.tables("load"):
+        if muscle is None:
+            raise ParameterError(
+                f"rig {rig.name!r} has a [load] in the place of [joint] and [arm], which this "
+                "model of a joint needs; RigModel and LoadModel take a load"
+            )
+        rest, load = rest_length_of(rig), next(iter(rig.tables("load").values()))
+        ends = {"min_angle": rest - load["max_length"], "max_angle": rest - load["min_length"]}
+        return rig.muscle_of(muscle), _Straight(), ends
     if muscle is None:
         for block in ("muscle", "joint", "arm"):
             if len(rig.tables(block)) != 1:
@@ -487,7 +532,7 @@ def group_torques(rig: Rig, groups: Sequence[Group]) -> dict[str, GroupTorque]:
     made: dict[str, GroupTorque] = {}
     found = {}
     for group in groups:
-        what = [(muscles[name], ways.get(name), joints[group.joint]) for name in group.muscles]
+        what = [(muscles[name], ways.get(name), joints.get(group.joint)) for name in group.muscles]
         key = repr(what)
         if key not in made:
             made[key] = GroupTorque(rig, group.muscles)

@@ -377,7 +377,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             "stiffness",
             "N m/rad",
             0.0,
-            1e7,
+            1e9,
             0.0,
             note="of a spring across the joint, beside the muscles; 0: none",
         ),
