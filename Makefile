@@ -158,13 +158,17 @@ effects: build  ## a page of every effect of the catalogue, its fingerprint draw
 golden: build  ## the published golden values against this build
 	$(BIN)/python -m pytest -q tests/golden
 
+# With the oldest Python that is supported: what is pinned for a newer one may not install there. The lists change together, or not at all.
 lock:  ## pin the newest versions that pyproject.toml allows
+	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "make lock takes Python 3.11; this is " + sys.version.split()[0] + " (choose one: make lock PYTHON=path/to/python3.11)")'
 	rm -rf $(VENV)/lock && "$(PYTHON)" -m venv $(VENV)/lock
 	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; b = o.pop("bench"); w = lambda name, some: open("$(VENV)/lock/" + name, "w").write("".join(r + "\n" for r in some if not r.startswith("pamrs"))); w("wanted.txt", p["dependencies"] + sum(o.values(), [])); w("bench.txt", b)'
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/wanted.txt
-	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/new && mv $(VENV)/lock/new requirements-dev.lock
-	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/bench.txt --constraint requirements-dev.lock
-	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf requirements-dev.lock; } > $(VENV)/lock/new && mv $(VENV)/lock/new requirements-bench.lock
+	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/dev.lock
+	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/bench.txt --constraint $(VENV)/lock/dev.lock
+	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock; } > $(VENV)/lock/bench.lock
+	mv $(VENV)/lock/dev.lock requirements-dev.lock && mv $(VENV)/lock/bench.lock requirements-bench.lock
+	rm -rf $(VENV)/lock
 
 clean:  ## remove everything that was built
 	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -159,3 +159,23 @@ def test_locks_pin_every_dependency():
     assert names(wanted) - {"pamrs"} <= pinned("requirements-dev.lock")
     assert names(peers) <= pinned("requirements-bench.lock")
     assert not pinned("requirements-dev.lock") & pinned("requirements-bench.lock")
+
+
+def test_locks_are_what_pyproject_allows():
+    """`make lock` takes the oldest Python that is supported, and pins what is in the ranges."""
+    requirements = pytest.importorskip("packaging.requirements")
+    with (ROOT / "pyproject.toml").open("rb") as file:
+        project = tomllib.load(file)["project"]
+    files = [ROOT / f"requirements-{name}.lock" for name in ("dev", "bench")]
+    lines = [file.read_text(encoding="utf-8").splitlines() for file in files]
+    oldest = project["requires-python"].removeprefix(">=")
+    for head, *_ in lines:
+        assert f"made for Python {oldest} by `make lock`" in head
+    pins = (line.split("==") for _, *rest in lines for line in rest)
+    pinned = {name.lower().replace("_", "-"): version for name, version in pins}
+    for text in chain(project["dependencies"], *project["optional-dependencies"].values()):
+        wanted = requirements.Requirement(text)
+        if wanted.name != "pamrs":
+            assert pinned[wanted.name.lower().replace("_", "-")] in wanted.specifier, text
+    recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nlock:")[2]
+    assert f"!= ({oldest.replace('.', ', ')})" in recipe.partition("\n\n")[0]
