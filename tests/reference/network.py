@@ -291,6 +291,8 @@ class Node:
     rise_limit: float = math.inf
     fall_limit: float = math.inf
     #: Heat transfer coefficient (W/(m^2 K)) of a chamber with an energy balance.
+    #: Error of its outlet that a regulator does not answer (Pa).
+    dead_band: float = 0.0
     heat_transfer: float | None = None
 
 
@@ -415,6 +417,7 @@ class Network:
                     "fall_limit",
                 )
                 if supply.get(key) is not None
+                    "dead_band",
             }
             start = ambient + supply["initial_pressure"]
             self._add(
@@ -669,7 +672,9 @@ class Network:
             if node.kind == "constant":
                 pressure_rate.append(0.0)
             elif node.kind == "regulator":
-                wanted = (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
+                error = set_pressure[i] - pressure[i]
+                answer = math.copysign(max(abs(error) - node.dead_band, 0.0), error)
+                wanted = (answer - node.droop * net_out) / node.time_constant
                 pressure_rate.append(min(max(wanted, -node.fall_limit), node.rise_limit))
             elif node.heat_transfer is not None:
                 area = wall[i] or 6.0 * volume[i] ** (2.0 / 3.0)

@@ -395,6 +395,7 @@ def test_json_of_lines_regulators_and_links() -> None:
             "rise_limit": 1e12,
             "fall_limit": 1e12,
         },
+            "dead_band": 0.0,
     ]
     assert (fed["lines"][0]["from"], fed["lines"][0]["to"]) == ("supply", "chamber")
     arm = rigs.named("two_joint_arm")

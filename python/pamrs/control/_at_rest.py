@@ -28,7 +28,7 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
     Raises
     ------
     ParameterError
-        With the name of the effect or of the dead time.
+        With the name of the effect, of the dead time or dead band, or of a valve that switches.
     """
     for name, table in rig.tables("supply").items():
         late = table.get("dead_time", 0.0)

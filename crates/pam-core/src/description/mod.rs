@@ -46,6 +46,8 @@ pub struct SupplySpec {
     #[serde(default = "no_limit")]
     pub fall_limit: f64,
 }
+    #[serde(default)]
+    pub dead_band: f64,
 
 fn no_limit() -> f64 {
     FASTEST

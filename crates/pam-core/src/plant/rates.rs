@@ -231,15 +231,21 @@ fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
     match unit {
         SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
         SupplyUnit::Constant => Supply::Constant,
-        SupplyUnit::Regulator { time_constant, droop, rise_limit, fall_limit, dead_time } => {
-            Supply::Regulator {
-                time_constant: values[*time_constant],
-                droop: values[*droop],
-                rise_limit: values[*rise_limit],
-                fall_limit: values[*fall_limit],
-                dead_time: values[*dead_time],
-            }
-        }
+        SupplyUnit::Regulator {
+            time_constant,
+            droop,
+            rise_limit,
+            fall_limit,
+            dead_time,
+            dead_band,
+        } => Supply::Regulator {
+            time_constant: values[*time_constant],
+            droop: values[*droop],
+            rise_limit: values[*rise_limit],
+            fall_limit: values[*fall_limit],
+            dead_time: values[*dead_time],
+            dead_band: values[*dead_band],
+        },
     }
 }
 

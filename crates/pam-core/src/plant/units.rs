@@ -43,6 +43,7 @@ pub(crate) enum SupplyUnit {
         fall_limit: ParameterId,
         dead_time: ParameterId,
     },
+        dead_band: ParameterId,
 }
 
 /// What a valve passes where it is wide open.

@@ -170,6 +170,7 @@ fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
                     (1.0, FASTEST, "Pa/s"),
                 )?,
                 dead_time: table.add(name("dead_time"), supply.dead_time, (0.0, 10.0, "s"))?,
+                dead_band: table.add(name("dead_band"), supply.dead_band, (0.0, 1e7, "Pa"))?,
             },
             _ => SupplyUnit::Constant,
         })

@@ -81,7 +81,15 @@ class Block:
         return self.kind in ("arm", "pull")
 
 
-_SUPPLY = ("volume", "time_constant", "droop", "dead_time", "rise_limit", "fall_limit")
+_SUPPLY = (
+    "volume",
+    "time_constant",
+    "droop",
+    "dead_time",
+    "rise_limit",
+    "fall_limit",
+    "dead_band",
+)
 _VALVE = (
     "discharge_area_max",
     "fill_conductance",
