@@ -106,9 +106,9 @@ class AirModel:
     Raises
     ------
     ParameterError
-        If there is no such chamber, no valve feeds it or no supply the valve, the valve has
-        conductances in the place of an area, or its area table is level somewhere but at its ends,
-        so that it has no inverse.
+        If there is no such chamber, no valve feeds it or no supply the valve, the valve switches or
+        has conductances in the place of an area, or its area table is level somewhere but at its
+        ends, so that it has no inverse.
     """
 
     def __init__(self, rig: Rig, chamber: str | None = None) -> None:
@@ -119,6 +119,11 @@ class AirModel:
             raise ParameterError(
                 f"valve.flow = {valve['flow']!r} is not allowed: a controller's model inverts a "
                 "valve with an area, flow = 'orifice'"
+            )
+        if valve["spool"] == "switching":
+            raise ParameterError(
+                "valve.spool = 'switching' is not allowed: a controller's model inverts a valve "
+                "that opens by degrees"
             )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])

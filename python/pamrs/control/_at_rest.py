@@ -37,6 +37,18 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
                 f"{qualified('supply', name)}.dead_time = {late:g} is not allowed: it is no state "
                 "of a linear model; set it to 0, and give it as the delay of the loop"
             )
+        band = table.get("dead_band", 0.0)
+        if supplies and band > 0.0:
+            raise ParameterError(
+                f"{qualified('supply', name)}.dead_band = {band:g} is not allowed: inside its band "
+                "it does not answer; hold supply_pressure"
+            )
+    for name, table in rig.tables("valve").items():
+        if table["spool"] == "switching":
+            raise ParameterError(
+                f"{qualified('valve', name)}.spool = 'switching' is not allowed: what switches has "
+                "no linear model"
+            )
     for effect in rig.effects:
         info = EFFECTS[effect["id"]]
         kink = info.kink

@@ -109,6 +109,9 @@ fn runs(driven: &[bool]) -> Vec<Range<usize>> {
 pub struct Controls<S> {
     /// Normalised spool position of each valve, -1 to 1.
     pub(crate) spool: Vec<S>,
+    /// Of each valve, where commands come late: the position before, and the share of the step until
+    /// it changes.
+    pub(crate) earlier: Vec<(S, S)>,
     /// Set pressure of each supply.
     pub(crate) set_pressure: Vec<SetPressure<S>>,
     /// Time since the start [s], where an effect asks for it.

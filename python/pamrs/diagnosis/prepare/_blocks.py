@@ -97,6 +97,12 @@ _VALVE = (
     "vent_conductance",
     "vent_critical_ratio",
     "null_voltage",
+    "natural_frequency",
+    "damping_ratio",
+    "opening_delay",
+    "closing_delay",
+    "carrier_frequency",
+    "carrier_phase",
 )
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
