@@ -200,3 +200,40 @@ def test_a_linear_model_has_the_spool_as_two_states() -> None:
     natural = 2.0 * np.pi * 60.0
     wanted = natural * complex(-0.7, np.sqrt(1.0 - 0.49))
     assert float(np.abs(poles - wanted).min()) < 1e-6 * natural
+
+
+def coil(**own: float) -> pamrs.Rig:
+    """The valve that fills, without a carrier."""
+    rig = parse_rig(PAIR)
+    plain = {"valve.fill.carrier_frequency": 0.0, "valve.vent.carrier_frequency": 0.0}
+    return rig.with_parameters(plain | {f"valve.fill.{key}": value for key, value in own.items()})
+
+
+def test_a_late_command_is_a_longer_delay_on_both_ways() -> None:
+    """An edge of the command lies inside a step there, and has a slope."""
+    late = coil().with_effect("input_path_lag", {"delay": 4.1e-3}, form="dead_time", at="fill")
+    fill = coil()
+    longer = coil(
+        **{
+            key: fill.parameter(f"valve.fill.{key}").value + 4.1e-3
+            for key in ("opening_delay", "closing_delay")
+        }
+    )
+    volts = {"fill": np.repeat([0.0, 24.0] * 8, 4), "vent": np.zeros(64)}
+    one, other = (pamrs.simulate(rig, volts, sample_time=0.01) for rig in (late, longer))
+    np.testing.assert_allclose(one["muscle_pressure"], other["muscle_pressure"], rtol=1e-12)
+    measured = {"muscle_pressure": (other["muscle_pressure"], np.zeros(64))}
+    commands = {f"valve_command.{name}": values for name, values in volts.items()}
+
+    def slopes(rig: pamrs.Rig, names: list[str]) -> np.ndarray:
+        _, jacobian = core_rig(rig).predict(
+            "chamber", commands, 0.01, 1e-3, [0], names, measured, 64
+        )
+        found: np.ndarray = jacobian[:, : len(names)].sum(axis=1)
+        return found
+
+    by_delay = slopes(late, ["input_path_lag.delay"])
+    by_both = slopes(longer, ["valve.fill.opening_delay", "valve.fill.closing_delay"])
+    size = float(np.abs(by_both).max())
+    assert size > 1e4
+    np.testing.assert_allclose(by_delay, by_both, rtol=0.0, atol=1e-9 * size)
