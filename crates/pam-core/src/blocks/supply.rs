@@ -3,9 +3,9 @@
 //! A tank empties isothermally, `dP/dt = -(R T/V) mdot` (dissertation 6.3); a constant source keeps
 //! its pressure; a relieving regulator brings its outlet to the set pressure with a lag, less by
 //! its droop under flow: `dP/dt = (P_set - k mdot - P)/tau` (P. Beater, *Pneumatic Drives*, 2007,
-//! ch. 8), no faster up and down than its limits, and later by its dead time. With a dead band `b` it
-//! answers of the error `P_set - P` what is beyond the band ([`answered`]): C. Robinson, *Modeling and
-//! control of pneumatic artificial muscles* (2014), ch. 3.
+//! ch. 8), no faster up and down than its limits, and later by its dead time. With a dead band `b`
+//! it answers of the error `P_set - P` what is beyond the band ([`answered`]): C. Robinson,
+//! *Modeling and control of pneumatic artificial muscles* (2014), ch. 3.
 
 use crate::scalar::{constant, Scalar};
 

@@ -1,18 +1,19 @@
 //! What the spool of a valve does by itself. It stands in the `[valve]` of a rig and in no
-//! catalogue; it acts at the ports of its valve as an effect does, behind all effects on its command.
+//! catalogue; it acts at the ports of its valve as an effect does, behind all effects on its
+//! command.
 //!
 //! `second_order`: a mass on a spring between two stops ([`crate::blocks::spool`]).
 //!
 //! The others switch: a coil pulls a spool from one position to another, and a spring brings it
-//! back. The coil has current while the position that comes in is above one half, or, with a carrier
-//! of frequency `f` and phase `phi`, from each `t_k = (k + phi)/f` for the share `d` of `1/f` that
-//! comes in at `t_k` (the duty, latched once a period as timers do). The spool switches when the coil
-//! has had (or lacked) current for the opening (closing) delay; a pulse, or a gap, that is not longer
-//! moves nothing: below a duty of `f` times the opening delay such a valve does not open. Delays and
-//! dead region as in R. B. van Varseveld & G. M. Bone, "Accurate position control of a pneumatic
-//! actuator using on/off solenoid valves", IEEE/ASME Trans. Mechatronics 2, 1997. A form is called
-//! after the paths that are open with current and without; with `either` a valve has two coils, one
-//! for each sign of what comes in.
+//! back. The coil has current while the position that comes in is above one half, or, with a
+//! carrier of frequency `f` and phase `phi`, from each `t_k = (k + phi)/f` for the share `d` of
+//! `1/f` that comes in at `t_k` (the duty, latched once a period as timers do). The spool switches
+//! when the coil has had (or lacked) current for the opening (closing) delay; a pulse, or a gap,
+//! that is not longer moves nothing: below a duty of `f` times the opening delay such a valve does
+//! not open. Delays and dead region as in R. B. van Varseveld & G. M. Bone, "Accurate position
+//! control of a pneumatic actuator using on/off solenoid valves", IEEE/ASME Trans. Mechatronics 2,
+//! 1997. A form is called after the paths that are open with current and without; with `either` a
+//! valve has two coils, one for each sign of what comes in.
 
 use super::{
     begun, Effect, EffectInfo, EffectParameter, EffectState, Form, Make, Port, Role, BEGINNING,

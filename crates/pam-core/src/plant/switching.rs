@@ -1,4 +1,5 @@
-//! Valves that switch within a step: at which instants, and what that does to the slopes of a state.
+//! Valves that switch within a step: at which instants, and what that does to the slopes of a
+//! state.
 
 use super::rates::{Controls, Plant};
 use crate::scalar::{constant, Scalar};
