@@ -189,8 +189,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 }
 
 impl<'a, S: Scalar> Stepper<'a, S> {
-    /// As [`Self::step`] where valves switch: an RK4 step from each instant at which one does to the
-    /// next.
+    /// As [`Self::step`] where valves switch: an RK4 step from each instant at which one does to
+    /// the next.
     fn step_in_pieces(
         &mut self,
         state: &mut [S],
@@ -261,8 +261,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         drive(plant, at(2), until / step.dt, state);
     }
 
-    /// A valve takes another position. Where its instant has slopes, so has the state: until then it
-    /// moved as before, from then on as after it (the saltation of a system that switches).
+    /// A valve takes another position. Where its instant has slopes, so has the state: until then
+    /// it moved as before, from then on as after it (the saltation of a system that switches).
     fn switch(
         &mut self,
         state: &mut [S],
