@@ -82,7 +82,10 @@ class Valve:
 
     def share(self, command: float) -> float:
         """Share of the widest opening at a command voltage: positive fills, negative vents."""
-        x = min(max((command - self.null_voltage) / self.half_range, -1.0), 1.0)
+        return self.share_at(min(max((command - self.null_voltage) / self.half_range, -1.0), 1.0))
+
+    def share_at(self, x: float) -> float:
+        """The same at a normalised position of the spool."""
         i = min(bisect_right(self.opening, abs(x)), len(self.opening) - 1)
         low, high = self.opening[i - 1], self.opening[i]
         share = (abs(x) - low) / (high - low)

@@ -31,6 +31,7 @@ from .geometry import GeometryReference
 from .muscle import MuscleReference, MuscleTable
 from .planar import Link, PlanarArm
 from .plant import Arm, Gas, Joint
+from .spool import Piece, pieces_of
 
 Array = NDArray[np.float64]
 
@@ -333,6 +334,8 @@ class Node:
     dead_time: float = 0.0
     rise_limit: float = math.inf
     fall_limit: float = math.inf
+    #: Error of its outlet that a regulator does not answer (Pa).
+    dead_band: float = 0.0
     #: Heat transfer coefficient (W/(m^2 K)) of a chamber with an energy balance.
     heat_transfer: float | None = None
 
@@ -434,6 +437,7 @@ class Network:
         self.pipes: list[tuple[Flow, int, int]] = []
         self.valves: list[tuple[Valve, str, int, int]] = []
         self.segments: list[tuple[Segment, str, int, int]] = []
+        self.parts = {suffix("valve_command", part["name"]): part for part in model["valves"]}
         self._build_gas(model)
         self.rest_length = math.nan
         self.coordinates, self.body = self._build_body(model)
@@ -468,6 +472,7 @@ class Network:
                     "dead_time",
                     "rise_limit",
                     "fall_limit",
+                    "dead_band",
                 )
                 if supply.get(key) is not None
             }
@@ -672,12 +677,13 @@ class Network:
 
     # ---------------------------------------------------------------- equations
 
-    def flows(self, command: Mapping[str, float]) -> list[tuple[Flow, int, int]]:
-        """Every open way at a command, with its two ends."""
+    def flows(self, position: Mapping[str, float]) -> list[tuple[Flow, int, int]]:
+        """Every open way at positions of the valves, with its two ends."""
         ways = list(self.pipes)
         for valve, name, source, target in self.valves:
-            share = valve.share(command[suffix("valve_command", name)])
-            if share == 0.0:
+            x = position[suffix("valve_command", name)]
+            share = valve.share_at(x)
+            if share == 0.0 or x == 0.0:
                 continue
             ends = (source, target) if share > 0.0 else (target, self.index["ambient"])
             if valve.iso is None:
@@ -751,7 +757,9 @@ class Network:
             if node.kind == "constant":
                 pressure_rate.append(0.0)
             elif node.kind == "regulator":
-                wanted = (set_pressure[i] - node.droop * net_out - pressure[i]) / node.time_constant
+                error = set_pressure[i] - pressure[i]
+                answer = math.copysign(max(abs(error) - node.dead_band, 0.0), error)
+                wanted = (answer - node.droop * net_out) / node.time_constant
                 pressure_rate.append(min(max(wanted, -node.fall_limit), node.rise_limit))
             elif node.heat_transfer is not None:
                 area = wall[i] or 6.0 * volume[i] ** (2.0 / 3.0)
@@ -824,23 +832,52 @@ def _possible(means: Transmission, positions: Iterable[float]) -> Iterable[float
 
 
 def _rhs(
-    _: float, state: Array, rate: Callable[[Array], list[float]], left: list[str]
+    time: float, state: Array, rate: Callable[[float, Array], list[float]], left: list[str]
 ) -> list[float]:
     """Derivative; not a number where a trial step has left the model, so that the integrator
     shortens it.
     """
     try:
-        return rate(state)
+        return rate(time, state)
     except ValueError as error:
         left[:] = [str(error)]
         return [math.nan] * state.size
 
 
-def _edges(dead_times: Iterable[float], sample_time: float) -> list[float]:
-    """Instants of a sample (s) between which late commands are constant, its ends included."""
+def _edges(
+    dead_times: Iterable[float], spools: Iterable[Sequence[Piece]], k: int, sample_time: float
+) -> list[float]:
+    """Instants of sample k (s after it) between which late commands are constant and spools move
+    smoothly, the sample's ends included.
+    """
     late = {dead_time % sample_time for dead_time in dead_times}
+    late |= {begin - k * sample_time for pieces in spools for begin, _, _ in pieces}
     inside = {time for time in late if 1e-9 < time / sample_time < 1.0 - 1e-9}
     return [0.0, *sorted(inside), sample_time]
+
+
+def _position(pieces: Sequence[Piece], middle: float) -> float | Callable[[float], float]:
+    """Position of a spool in the piece that has an instant (s)."""
+    return next((at for begin, end, at in pieces if begin <= middle <= end), pieces[-1][2])
+
+
+def _rate(
+    rig: Network,
+    at: Mapping[str, float | Callable[[float], float]],
+    start: float,
+    set_pressure: Sequence[float],
+) -> Callable[[float, Array], list[float]]:
+    """Derivative at a time after a sample began, with the spools where they are then."""
+    still = {name: place for name, place in at.items() if not callable(place)}
+    if len(still) == len(at):
+        ways = rig.flows(still)
+        return lambda _, state: rig.derivative(state, ways, set_pressure)
+
+    def rate(time: float, state: Array) -> list[float]:
+        moving = {name: place(start + time) for name, place in at.items() if callable(place)}
+        return rig.derivative(state, rig.flows(still | moving), set_pressure)
+
+    return rate
 
 
 def simulate(
@@ -903,10 +940,14 @@ def simulate(
     positive = np.zeros(n)
     atol = rig.tolerances(states[0], rtol)
     first = min(1e-3, sample_time)
+    spools = {
+        name: pieces_of(part, held[name].tolist(), sample_time) for name, part in rig.parts.items()
+    }
     for k in range(n - 1):
-        ways = rig.flows({name: float(values[k]) for name, values in held.items()})
         state, positive[k + 1] = states[k], positive[k]
-        edges = _edges([rig.nodes[i].dead_time for i in regulators], sample_time)
+        edges = _edges(
+            [rig.nodes[i].dead_time for i in regulators], spools.values(), k, sample_time
+        )
         for begin, end in pairwise(edges):
             set_pressure = [node.start for node in rig.nodes]
             for i, name in regulators.items():
@@ -915,7 +956,9 @@ def simulate(
                 ) / sample_time
                 if name in held and late >= 0.0:
                     set_pressure[i] = rig.gas.ambient_pressure + float(held[name][int(late)])
-            rate = partial(rig.derivative, ways=ways, set_pressure=set_pressure)
+            middle = k * sample_time + 0.5 * (begin + end)
+            at = {name: _position(pieces, middle) for name, pieces in spools.items()}
+            rate = _rate(rig, at, k * sample_time, set_pressure)
             left: list[str] = []
             slope = partial(_rhs, rate=rate, left=left)
             settings = {

@@ -143,6 +143,7 @@ def test_a_chain_keeps_its_shape_and_its_names() -> None:
         "discharge_area_max": 8.4e-6,
         "null_voltage": 5.0,
         "half_range": 5.0,
+        "spool": "ideal",
         "opening": [0.0, 0.25, 0.5, 0.75, 1.0],
         "fraction": [0.0, 0.2, 0.5, 0.8, 1.0],
     }
@@ -253,7 +254,7 @@ def test_the_muscle_of_a_rig_with_one_and_with_several() -> None:
 
 def test_json_of_the_shoulder() -> None:
     model = rigs.shoulder().model
-    valve = {key: value for key, value in model["valve"].items() if key != "flow"}
+    valve = {key: value for key, value in model["valve"].items() if key not in ("flow", "spool")}
     joint = {
         key: model["joint"][key]
         for key in ("upper_axial", "upper_offset", "lower_axial", "lower_offset", "rest_angle")
@@ -409,6 +410,7 @@ def test_json_of_lines_regulators_and_links() -> None:
             "dead_time": 0.0,
             "rise_limit": 1e12,
             "fall_limit": 1e12,
+            "dead_band": 0.0,
         },
     ]
     assert (fed["lines"][0]["from"], fed["lines"][0]["to"]) == ("supply", "chamber")

@@ -245,6 +245,7 @@ fn regulator(droop: f64) -> SupplySpec {
         dead_time: 0.0,
         rise_limit: FASTEST,
         fall_limit: FASTEST,
+        dead_band: 0.0,
     }
 }
 
@@ -463,6 +464,7 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
         dead_time: 0.0,
         rise_limit: FASTEST,
         fall_limit: FASTEST,
+        dead_band: 0.0,
     }];
     let mut through_line = spec.clone();
     through_line.lines = vec![orifice("supply", "chamber", 8.4e-6)];

@@ -167,14 +167,20 @@ class AirModel:
     Raises
     ------
     ParameterError
-        If there is no such chamber, no valve feeds it or no supply the valve, the valve fills
-        nothing, or its area table is level somewhere but at its ends, so that it has no inverse.
+        If there is no such chamber, no valve feeds it or no supply the valve, the valve switches or
+        fills nothing, or its area table is level somewhere but at its ends, so that it has no
+        inverse.
     """
 
     def __init__(self, rig: Rig, chamber: str | None = None) -> None:
         group = _group(rig, chamber)
         valve = rig.tables("valve")[group.feed.name]
         table = rig.tables("chamber")[group.chamber]
+        if valve["spool"] == "switching":
+            raise ParameterError(
+                "valve.spool = 'switching' is not allowed: a controller's model inverts a valve "
+                "that opens by degrees"
+            )
         gas: dict[str, float] = rig.model["gas"]
         self.ambient = float(gas["ambient_pressure"])
         supply = rig.tables("supply")[group.feed.supply or ""]

@@ -28,7 +28,7 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
     Raises
     ------
     ParameterError
-        With the name of the effect or of the dead time.
+        With the name of the effect, of the dead time or dead band, or of a valve that switches.
     """
     for name, table in rig.tables("supply").items():
         late = table.get("dead_time", 0.0)
@@ -36,6 +36,18 @@ def check_smooth(rig: Rig, *, supplies: bool) -> None:
             raise ParameterError(
                 f"{qualified('supply', name)}.dead_time = {late:g} is not allowed: it is no state "
                 "of a linear model; set it to 0, and give it as the delay of the loop"
+            )
+        band = table.get("dead_band", 0.0)
+        if supplies and band > 0.0:
+            raise ParameterError(
+                f"{qualified('supply', name)}.dead_band = {band:g} is not allowed: inside its band "
+                "it does not answer; hold supply_pressure"
+            )
+    for name, table in rig.tables("valve").items():
+        if table["spool"] == "switching":
+            raise ParameterError(
+                f"{qualified('valve', name)}.spool = 'switching' is not allowed: what switches has "
+                "no linear model"
             )
     for effect in rig.effects:
         info = EFFECTS[effect["id"]]

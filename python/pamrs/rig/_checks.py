@@ -88,14 +88,15 @@ def _map_problems(label: str, muscle: Mapping[str, Any]) -> list[str]:
 
 
 def _valve(label: str, valve: Mapping[str, Any]) -> list[str]:
-    """What is wrong with a valve's area table."""
+    """What is wrong with a valve's area table and its positions."""
+    problems = _positions(label, valve)
     opening, fraction, label = valve["opening"], valve["fraction"], f"{label}.area_fraction"
     if len(opening) != len(fraction) or len(opening) < 2:
         return [
+            *problems,
             f"{label}: opening has {len(opening)} values and fraction {len(fraction)}; the same "
-            "number, two at least, is needed"
+            "number, two at least, is needed",
         ]
-    problems = []
     if (
         opening[0] != 0.0
         or opening[-1] != 1.0
@@ -105,6 +106,18 @@ def _valve(label: str, valve: Mapping[str, Any]) -> list[str]:
     if any(b < a for a, b in zip(fraction, fraction[1:], strict=False)):
         problems.append(f"{label}.fraction = {fraction} is not allowed: it must not fall")
     return problems
+
+
+def _positions(label: str, valve: Mapping[str, Any]) -> list[str]:
+    """Positions of a spool that switches: two that are not the same, three around a closed one."""
+    here, there = valve.get("with_current"), valve.get("without_current")
+    if here is None or (here != there and (here != "either" or there == "closed")):
+        return []
+    needed = "'closed'" if here == "either" else f"another than '{here}'"
+    return [
+        f"{label}.without_current = {there!r} is not allowed: with {label}.with_current = "
+        f"{here!r}, {needed} is needed"
+    ]
 
 
 def _joint(label: str, joint: Mapping[str, Any]) -> list[str]:

@@ -26,7 +26,7 @@ from pamrs.rig.schema import (
     Key,
     Port,
     keys_of,
-    kind_of,
+    kind_for,
     qualified,
     tables_of,
 )
@@ -227,7 +227,7 @@ class Reader:
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
             if key not in keys and _dig(table, key.where) is not None:
-                kind, only = _shown(kind_of(block, table)), ", ".join(key.only)
+                kind, only = _shown(kind_for(block, table, key)), ", ".join(key.only)
                 self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")
         content = {key.name: self.value(label, key, _dig(table, key.where)) for key in keys}
         if content.get("geometry") == "":

@@ -231,9 +231,9 @@ def _chamber(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _valve(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A valve with an area is the core's usual one, and needs no word for it."""
-    usual = kind_of("valve", table) == "orifice"
-    return {key: value for key, value in table.items() if key != "flow" or not usual}
+    """A valve with an area and an ideal spool is the core's usual one, and needs no word for it."""
+    usual = {"flow": "orifice", "spool": "ideal"}
+    return {key: value for key, value in table.items() if usual.get(key) != value}
 
 
 def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:

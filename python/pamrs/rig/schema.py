@@ -24,6 +24,7 @@ __all__ = [
     "Key",
     "Port",
     "keys_of",
+    "kind_for",
     "kind_of",
     "qualified",
     "split_name",
@@ -110,6 +111,8 @@ _TENDON = ("tendon", "published")
 _TRANSMISSIONS = (*_TENDON, "pulley", "polynomial")
 _ONE_LINK = ("one_link",)
 _ISO = ("iso_6358",)
+_SPRUNG = ("second_order",)
+_SWITCHING = ("switching",)
 _MAP = ("map",)
 _ELASTIC = tuple(model for model in ALL_MODELS if model != "map")
 _COEFFICIENTS = ("coefficients",)
@@ -117,6 +120,9 @@ _COEFFICIENTS = ("coefficients",)
 #: Keys of [joint] that are no part of its transmission.
 STOPS: Final = ("min_angle", "max_angle", "stop_stiffness", "stop_damping")
 SPRING: Final = ("stiffness", "spring_angle")
+
+#: A further key that says what keys a block has, and what it is where it is left out.
+_FURTHER_KINDS: Final = {"valve": ("spool", "ideal")}
 
 #: The key of a block that says of which kind it is, and the kind where it is left out.
 _KINDS: Final = {
@@ -196,6 +202,15 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             only=("regulator",),
             note="fastest fall of the outlet pressure; 1e12 Pa/s: none",
         ),
+        Key(
+            "dead_band",
+            "Pa",
+            0.0,
+            1e7,
+            0.0,
+            only=("regulator",),
+            note="error of the outlet pressure that it does nothing about",
+        ),
     ),
     "valve": (
         Key(
@@ -212,6 +227,67 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key("vent_critical_ratio", "1", 0.0, 0.9, only=_ISO),
         Key("null_voltage", "V", -50.0, 50.0),
         Key("half_range", "V", 1e-3, 100.0),
+        Key(
+            "spool",
+            default="ideal",
+            kind="choice",
+            choices=("ideal", "second_order", "switching"),
+            note="where the command says, a mass on a spring, or on and off by a coil",
+        ),
+        Key("natural_frequency", "Hz", 0.1, 1e5, only=_SPRUNG),
+        Key("damping_ratio", "1", 0.01, 100.0, 0.7, only=_SPRUNG),
+        Key(
+            "with_current",
+            default="fill",
+            kind="choice",
+            choices=("fill", "vent", "closed", "either"),
+            only=_SWITCHING,
+            note="what is open; either: two coils, one above null_voltage and one below",
+        ),
+        Key(
+            "without_current",
+            default="closed",
+            kind="choice",
+            choices=("closed", "vent", "fill"),
+            only=_SWITCHING,
+            note="what is open",
+        ),
+        Key(
+            "opening_delay",
+            "s",
+            0.0,
+            10.0,
+            0.0,
+            only=_SWITCHING,
+            note="from the current to the spool's move; shorter pulses move nothing",
+        ),
+        Key(
+            "closing_delay",
+            "s",
+            0.0,
+            10.0,
+            0.0,
+            only=_SWITCHING,
+            note="from the end of the current to the spool's return; shorter gaps move nothing",
+        ),
+        Key(
+            "carrier_frequency",
+            "Hz",
+            0.0,
+            1e5,
+            0.0,
+            only=_SWITCHING,
+            note="the command is a duty, latched once a period; 0: no pulses, on above one half",
+        ),
+        Key(
+            "carrier_phase",
+            "1",
+            0.0,
+            1.0,
+            0.0,
+            only=_SWITCHING,
+            note="share of a period after which the first one begins",
+        ),
         Key("opening", "1", 0.0, 1.0, kind="vector", path=("area_fraction", "opening")),
         Key("fraction", "1", 0.0, 1.0, kind="vector", path=("area_fraction", "fraction")),
     ),
@@ -498,8 +574,24 @@ PORTS: Final[dict[str, tuple[Port, ...]]] = {
 
 def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
     """The keys that a block of its kind has: force model of a muscle, kind of a joint."""
-    kind = kind_of(block, content)
-    return tuple(key for key in BLOCKS[block] if not key.only or kind in key.only)
+    kinds = [kind_of(block, content), _further(block, content)]
+    return tuple(
+        key for key in BLOCKS[block] if not key.only or any(kind in key.only for kind in kinds)
+    )
+
+
+def kind_for(block: str, content: Mapping[str, Any], key: Key) -> Any:
+    """The kind of a block on which it depends whether it has a key."""
+    name = _FURTHER_KINDS.get(block, ("", None))[0]
+    further = next((other.choices for other in BLOCKS[block] if other.name == name), ())
+    own = any(kind in further for kind in key.only)
+    return _further(block, content) if own else kind_of(block, content)
+
+
+def _further(block: str, content: Mapping[str, Any]) -> Any:
+    """Spool of a valve, None for the other blocks."""
+    name, default = _FURTHER_KINDS.get(block, ("", None))
+    return content.get(name, default)
 
 
 def kind_of(block: str, content: Mapping[str, Any]) -> Any:

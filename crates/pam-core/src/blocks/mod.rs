@@ -6,6 +6,7 @@ pub mod chamber;
 pub mod gas;
 pub mod joint;
 pub mod pipe;
+pub mod spool;
 pub mod supply;
 pub mod tube;
 pub mod valve;

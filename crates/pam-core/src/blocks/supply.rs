@@ -3,7 +3,9 @@
 //! A tank empties isothermally, `dP/dt = -(R T/V) mdot` (dissertation 6.3); a constant source keeps
 //! its pressure; a relieving regulator brings its outlet to the set pressure with a lag, less by
 //! its droop under flow: `dP/dt = (P_set - k mdot - P)/tau` (P. Beater, *Pneumatic Drives*, 2007,
-//! ch. 8), no faster up and down than its limits, and later by its dead time.
+//! ch. 8), no faster up and down than its limits, and later by its dead time. With a dead band `b`
+//! it answers of the error `P_set - P` what is beyond the band ([`answered`]): C. Robinson,
+//! *Modeling and control of pneumatic artificial muscles* (2014), ch. 3.
 
 use crate::scalar::{constant, Scalar};
 
@@ -57,7 +59,21 @@ pub enum Supply<S> {
         fall_limit: S,
         /// How late the command acts [s].
         dead_time: S,
+        /// Error of the pressure that it does nothing about [Pa].
+        dead_band: S,
     },
+}
+
+/// The error that a regulator answers [Pa], of the one that it has: `sgn(e) max(|e| - b, 0)`.
+#[inline]
+pub fn answered<S: Scalar>(error: S, dead_band: S) -> S {
+    if error.re() > dead_band.re() {
+        error - dead_band
+    } else if error.re() < -dead_band.re() {
+        error + dead_band
+    } else {
+        constant(0.0)
+    }
 }
 
 impl<S: Scalar> Supply<S> {
@@ -68,9 +84,13 @@ impl<S: Scalar> Supply<S> {
         match self {
             Self::Tank(volume) => -(outflow * rt) / *volume,
             Self::Constant => constant(0.0),
-            Self::Regulator { time_constant, droop, rise_limit, fall_limit, .. } => {
+            Self::Regulator { time_constant, droop, rise_limit, fall_limit, dead_band, .. } => {
                 let towards = |set: S| {
-                    let rate = (-pressure - *droop * outflow + set) / *time_constant;
+                    let rate = if dead_band.re() > 0.0 {
+                        (answered(set - pressure, *dead_band) - *droop * outflow) / *time_constant
+                    } else {
+                        (-pressure - *droop * outflow + set) / *time_constant
+                    };
                     if rate.re() > rise_limit.re() {
                         *rise_limit
                     } else if rate.re() < -fall_limit.re() {
@@ -89,11 +109,12 @@ impl<S: Scalar> Supply<S> {
         }
     }
 
-    /// Whether it follows its command at once, and as fast as its lag lets it.
+    /// Whether it follows every command, at once, and as fast as its lag lets it.
     pub fn first_order(&self) -> bool {
         match self {
-            Self::Regulator { rise_limit, fall_limit, dead_time, .. } => {
-                rise_limit.re().min(fall_limit.re()) >= FASTEST && dead_time.re() <= 0.0
+            Self::Regulator { rise_limit, fall_limit, dead_time, dead_band, .. } => {
+                let late = dead_time.re() > 0.0 || dead_band.re() > 0.0;
+                rise_limit.re().min(fall_limit.re()) >= FASTEST && !late
             }
             _ => true,
         }
@@ -133,6 +154,7 @@ mod tests {
             rise_limit: 2e6,
             fall_limit: 3e6,
             dead_time: 0.03,
+            dead_band: 0.0,
         };
         assert_eq!(regulator.dead_time(), 0.03);
         let at = SetPressure::steady;
@@ -142,6 +164,15 @@ mod tests {
         assert_eq!(regulator.pressure_rate(1e5, 0.0, 8.4e4, &edge), 1.5e6);
         assert!(regulator.pressure_rate(5e5 - 1e4, 1e-3, 8.4e4, &at(5e5)).abs() < 1e-6);
         assert!((regulator.pressure_rate(4e5, 0.0, 8.4e4, &at(5e5)) - 1e6).abs() < 1e-6);
+        let mut banded = regulator;
+        if let Supply::Regulator { dead_band, .. } = &mut banded {
+            *dead_band = 2e4;
+        }
+        assert!(!banded.first_order());
+        assert_eq!(banded.pressure_rate(5e5, 0.0, 8.4e4, &at(5.15e5)), 0.0);
+        assert!((banded.pressure_rate(5e5, 0.0, 8.4e4, &at(5.3e5)) - 1e5).abs() < 1e-6);
+        assert!((banded.pressure_rate(5e5, 0.0, 8.4e4, &at(4.7e5)) + 1e5).abs() < 1e-6);
+        assert!((banded.pressure_rate(5e5, 1e-3, 8.4e4, &at(5e5)) + 1e5).abs() < 1e-6);
         assert_eq!(Supply::<f64>::Constant.pressure_rate(1e5, 1.0, 8.4e4, &at(0.0)), 0.0);
         assert!(
             (Supply::Tank(0.01).pressure_rate(1e5, 1e-3, 8.4e4, &at(0.0)) + 8.4e3_f64).abs() < 1e-9

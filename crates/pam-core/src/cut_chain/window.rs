@@ -5,7 +5,7 @@ use super::block::{unread, Block};
 use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
 use super::clock::Clocks;
 use crate::effects::Number;
-use crate::plant::{moves, Controls, Memory, Plant, Simulated};
+use crate::plant::{Controls, Memory, Plant, Simulated};
 use crate::scalar::{constant, Scalar};
 use crate::simulate::{check_state, Stepper, Timing};
 use crate::Result;
@@ -292,7 +292,7 @@ impl<'a, S: Number> Cut<'a, S> {
                         // that they were read under
                         let (was, now) = (last.spool[*valve], controls.spool[*valve]);
                         // a spool with a motion of its own is already where it is at that instant
-                        let moving = moves(&rig.wiring.ports.command[*valve]);
+                        let moving = rig.wiring.ports.moves_valve(*valve);
                         let spool = if moving { now } else { was + (now - was) * share };
                         y[place] = plant.behind_tube(*gas, y[place], y, spool);
                     }

@@ -82,6 +82,10 @@ impl RigSpec {
             let block = Block { kind: "valve", name: &valve.name };
             block.choice("flow", &valve.flow, &["orifice", "iso_6358"])?;
             block.range("half_range", valve.half_range, 1e-9, 1e3, "V")?;
+            block.choice("spool", &valve.spool, &["ideal", "second_order", "switching"])?;
+            let closed = ["closed", "fill", "vent"];
+            block.choice("without_current", &valve.without_current, &closed)?;
+            valve.spool_form()?;
         }
         for line in &self.lines {
             let block = Block { kind: "line", name: &line.name };

@@ -3,6 +3,7 @@
 mod check;
 
 use crate::blocks::supply::FASTEST;
+use crate::effects::{spool, Form};
 use crate::muscle::MuscleSpec;
 use crate::{Error, Result};
 use serde::Deserialize;
@@ -45,6 +46,8 @@ pub struct SupplySpec {
     pub rise_limit: f64,
     #[serde(default = "no_limit")]
     pub fall_limit: f64,
+    #[serde(default)]
+    pub dead_band: f64,
 }
 
 fn no_limit() -> f64 {
@@ -78,6 +81,84 @@ pub struct ValveSpec {
     pub half_range: f64,
     pub opening: Vec<f64>,
     pub fraction: Vec<f64>,
+    /// `ideal` (it is where the command says), `second_order` or `switching`.
+    #[serde(default = "default_spool")]
+    pub spool: String,
+    #[serde(default)]
+    pub natural_frequency: f64,
+    #[serde(default)]
+    pub damping_ratio: f64,
+    /// What is open with current where it switches: `fill`, `vent`, `closed`, or `either` of two
+    /// coils.
+    #[serde(default = "default_with_current")]
+    pub with_current: String,
+    /// What is open without.
+    #[serde(default = "default_without_current")]
+    pub without_current: String,
+    #[serde(default)]
+    pub opening_delay: f64,
+    #[serde(default)]
+    pub closing_delay: f64,
+    #[serde(default)]
+    pub carrier_frequency: f64,
+    #[serde(default)]
+    pub carrier_phase: f64,
+}
+
+impl ValveSpec {
+    /// What the spool does by itself, if anything.
+    ///
+    /// # Errors
+    /// [`Error::Choice`] for a valve that switches between two positions that no valve has.
+    pub(crate) fn spool_form(&self) -> Result<Option<&'static Form>> {
+        let (with, without) = (&self.with_current, &self.without_current);
+        match self.spool.as_str() {
+            "ideal" => Ok(None),
+            "switching" => {
+                spool::INFO.form(&format!("{with}_{without}")).map(Some).ok_or_else(|| {
+                    let others: Vec<_> = (spool::INFO.forms.iter())
+                        .filter_map(|form| form.name.strip_suffix(without.as_str()))
+                        .filter_map(|with| with.strip_suffix('_'))
+                        .map(|with| format!("\"{with}\""))
+                        .collect();
+                    Error::Choice {
+                        name: format!("{}.with_current", dotted("valve", &self.name)),
+                        value: format!("\"{with}\""),
+                        allowed: format!(
+                            "where without_current = \"{without}\" one of {}",
+                            others.join(", ")
+                        ),
+                    }
+                })
+            }
+            other => Ok(spool::INFO.form(other)),
+        }
+    }
+
+    /// The value of a parameter of its spool.
+    pub(crate) fn of_spool(&self, key: &str) -> f64 {
+        match key {
+            "natural_frequency" => self.natural_frequency,
+            "damping_ratio" => self.damping_ratio,
+            "opening_delay" => self.opening_delay,
+            "closing_delay" => self.closing_delay,
+            "carrier_frequency" => self.carrier_frequency,
+            "carrier_phase" => self.carrier_phase,
+            _ => f64::NAN,
+        }
+    }
+}
+
+fn default_spool() -> String {
+    "ideal".into()
+}
+
+fn default_with_current() -> String {
+    "fill".into()
+}
+
+fn default_without_current() -> String {
+    "closed".into()
 }
 
 fn default_flow() -> String {

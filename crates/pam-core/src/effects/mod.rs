@@ -7,6 +7,7 @@
 
 mod info;
 mod port;
+pub mod spool;
 
 pub(crate) use self::info::BEGINNING;
 pub use self::info::{

@@ -57,6 +57,8 @@ pub enum Port {
     Clock,
     /// Valve: how late it sees its command.
     Late,
+    /// Valve: positions that it takes at instants of its own. One at most: its spool.
+    Switching,
 }
 
 impl Port {
@@ -212,6 +214,20 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// [`Port::Command`]: bring the states to the end of a step [s]; the position there.
     fn follow(&self, own: &mut [S], input: S, step: f64) -> S {
         self.position(own, input, step)
+    }
+
+    /// [`Port::Switching`]: bring the states to the end of a step of a time from a time on [s], and
+    /// tell the positions that it takes in it, each with how long after the step began [s]. `input`
+    /// is the position that comes in so long after that, `change` when it jumps. Where it stands is
+    /// [`Self::position`].
+    fn switched_to(
+        &self,
+        _own: &mut [S],
+        _input: &dyn Fn(f64) -> S,
+        _change: Option<S>,
+        _over: (f64, f64),
+        _tell: &mut dyn FnMut(S, f64),
+    ) {
     }
 
     /// [`Port::Area`]: share of the largest area [1] where the table says `share`, above zero where

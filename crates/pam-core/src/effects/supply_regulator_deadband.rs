@@ -8,8 +8,9 @@
 
 use super::{Effect, EffectInfo, EffectParameter, Form, Kink, Port};
 use crate::blocks::gas::Gas;
+use crate::blocks::supply::answered;
 use crate::made_by;
-use crate::scalar::{constant, Scalar};
+use crate::scalar::Scalar;
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -35,18 +36,6 @@ pub const INFO: EffectInfo = EffectInfo {
     }],
     ..EffectInfo::USUAL
 };
-
-/// The error that the regulator answers [Pa].
-#[inline]
-pub fn answered<S: Scalar>(error: S, dead_band: S) -> S {
-    if error.re() > dead_band.re() {
-        error - dead_band
-    } else if error.re() < -dead_band.re() {
-        error + dead_band
-    } else {
-        constant(0.0)
-    }
-}
 
 /// Dead band of a regulator.
 #[derive(Debug, Clone, Copy)]

@@ -15,7 +15,8 @@ impl<S: Scalar> Plant<'_, S> {
         let zeros = |n: usize| vec![constant(0.0); n];
         let (supplies, valves) = (self.wiring.supplies.len(), self.wiring.valves.len());
         let unset = vec![SetPressure::steady(constant(0.0)); supplies];
-        let mut out = Controls { set_pressure: unset, spool: zeros(valves), time: 0.0 };
+        let (spool, earlier) = (zeros(valves), Vec::new());
+        let mut out = Controls { set_pressure: unset, spool, earlier, time: 0.0 };
         self.command(commands, &mut out);
         out
     }
@@ -38,6 +39,7 @@ impl<S: Scalar> Plant<'_, S> {
         for (k, spool) in out.spool.iter_mut().enumerate() {
             *spool = self.opened(k, self.commanded(k, commands(k)));
         }
+        out.earlier.clear();
         out.time = 0.0;
     }
 
@@ -53,10 +55,10 @@ impl<S: Scalar> Plant<'_, S> {
     /// The position that opens a valve, for the commanded one; where something on the way moves by
     /// itself it is left as it is.
     fn opened(&self, valve: usize, commanded: S) -> S {
-        let path = &self.wiring.ports.command[valve];
-        if moves(path) {
+        if self.wiring.ports.moves_valve(valve) {
             return commanded;
         }
+        let path = &self.wiring.ports.command[valve];
         path.iter().fold(commanded, |x, acting| self.effect(acting).position(&[], x, 0.0))
     }
 
@@ -114,9 +116,18 @@ impl<S: Scalar> Plant<'_, S> {
     ) {
         let wiring = &self.wiring;
         self.command(|_| 0.0, controls);
+        let switches = wiring.ports.switches();
         for (k, spool) in controls.spool.iter_mut().enumerate() {
             let held = Held::over(time, step, sample_time, shift + self.late(k));
-            *spool = self.opened(k, held.mean(|sample| self.commanded(k, command(k, sample))));
+            let commanded = |sample| self.commanded(k, command(k, sample));
+            if switches {
+                controls.earlier.push((commanded(held.before), held.share_before));
+            }
+            *spool = if wiring.ports.switching[k].is_some() {
+                commanded(held.now)
+            } else {
+                self.opened(k, held.mean(commanded))
+            };
         }
         let mut input = wiring.valves.len();
         for (supply, set) in self.supplies.iter().zip(&mut controls.set_pressure) {
@@ -143,10 +154,10 @@ impl<S: Scalar> Plant<'_, S> {
         out.set_pressure.clone_from(&controls.set_pressure);
         out.spool.clone_from(&controls.spool);
         out.time = time + age;
-        for (k, path) in
-            self.wiring.ports.command.iter().enumerate().filter(|(_, path)| moves(path))
-        {
-            out.spool[k] = path.iter().fold(out.spool[k], |x, acting| {
+        let ports = &self.wiring.ports;
+        for k in (0..ports.command.len()).filter(|valve| ports.moves_valve(*valve)) {
+            let path = ports.command[k].iter().chain(&ports.switching[k]);
+            out.spool[k] = path.fold(out.spool[k], |x, acting| {
                 self.effect(acting).position(self.own(acting, state), x, age)
             });
         }

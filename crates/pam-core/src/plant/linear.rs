@@ -127,13 +127,20 @@ impl Rig {
     /// have been done.
     ///
     /// # Errors
-    /// [`Error::Model`] where a derivative is not finite.
+    /// [`Error::Model`] where a derivative is not finite, or a valve switches.
     pub(crate) fn linearised(
         &self,
         state: &[f64],
         memory: &[Memory<f64>],
         side: Side,
     ) -> Result<LinearModel> {
+        let switching = |valve: &usize| self.wiring.ports.switching[*valve].is_some();
+        if let Some(valve) = (0..self.wiring.valves.len()).find(switching) {
+            let name = dotted("valve", &self.spec().valves[valve].name);
+            return Err(Error::Model(format!(
+                "{name} switches, and what switches has no linear model"
+            )));
+        }
         let (moving, point) = (self.moving(), Point::new(self, state, memory));
         let commands = 0..self.wiring.valves.len();
         let opening = moving.iter().filter(|m| m.opens).map(|m| By::State(m.place));
@@ -384,6 +391,7 @@ impl<S: Scalar> Plant<'_, S> {
     fn held(&self, set: &[S]) -> Controls<S> {
         Controls {
             spool: vec![constant(0.0); self.valves.len()],
+            earlier: Vec::new(),
             set_pressure: set.iter().map(|pressure| SetPressure::steady(*pressure)).collect(),
             time: 0.0,
         }

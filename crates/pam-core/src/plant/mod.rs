@@ -12,6 +12,7 @@ mod muscle_force;
 pub mod parameters;
 mod ports;
 pub mod rates;
+mod switching;
 mod tap;
 mod units;
 mod views;
@@ -24,8 +25,9 @@ pub use layout::{Channel, Layout, Names, StatePlace, StateRole, BALANCE, HEAT_BA
 pub use linear::{LinearModel, Side};
 pub use memory::Memory;
 pub use parameters::{ParameterId, Parameters, Values};
-pub(crate) use ports::{moves, Acting, Place};
+pub(crate) use ports::{Acting, Place};
 pub(crate) use rates::{Controls, Line, Plant, Scratch, Simulated};
+pub(crate) use switching::{Switch, Switches};
 pub(crate) use units::{BodyUnit, Group, Node, Passes, Path};
 
 use self::units::Wiring;

@@ -6,7 +6,7 @@ use super::units::{BodyUnit, Node, SupplyUnit, Wiring};
 use super::wiring::model;
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, EffectSpec, RigSpec};
-use crate::effects::{EffectInfo, Form, Port, Role};
+use crate::effects::{spool, EffectInfo, Form, Port, Role};
 use crate::Result;
 
 /// An effect that is switched on.
@@ -67,6 +67,7 @@ pub(crate) struct Ports {
     /// Of each valve.
     pub command: Vec<Vec<Acting>>,
     pub late: Vec<Vec<Acting>>,
+    pub switching: Vec<Option<Acting>>,
     pub area: Vec<Option<Acting>>,
     pub passage: Vec<Option<Acting>>,
     pub flows: Vec<(Flow, Acting)>,
@@ -114,7 +115,17 @@ impl Ports {
 
     /// Positions of valves move within a sample.
     pub fn moves_valves(&self) -> bool {
-        self.command.iter().any(|acting| moves(acting))
+        (0..self.command.len()).any(|valve| self.moves_valve(valve))
+    }
+
+    /// The position of a valve does.
+    pub fn moves_valve(&self, valve: usize) -> bool {
+        moves(&self.command[valve]) || self.switching[valve].is_some()
+    }
+
+    /// Some valve switches at instants of its own.
+    pub fn switches(&self) -> bool {
+        self.switching.iter().any(Option::is_some)
     }
 
     /// Controls are not the same at every stage of a step: moving valves, or a time that an effect
@@ -195,6 +206,7 @@ pub(super) fn switch_on(
     let mut ports = Ports {
         command: vec![Vec::new(); wiring.valves.len()],
         late: vec![Vec::new(); wiring.valves.len()],
+        switching: vec![None; wiring.valves.len()],
         area: vec![None; wiring.valves.len()],
         passage: vec![None; wiring.valves.len()],
         feed: vec![Vec::new(); wiring.supplies.len()],
@@ -216,6 +228,13 @@ pub(super) fn switch_on(
         ports.effects.push(instance);
     }
     twice(spec, wiring, &ports.effects, &places)?;
+    for (k, valve) in wiring.valves.iter().enumerate() {
+        if let Some((form, parameters)) = &valve.spool {
+            let (name, parameters) = (spool::INFO.id.to_string(), parameters.clone());
+            ports.effects.push(Instance { info: &spool::INFO, form, name, parameters });
+            places.push(vec![Place::Valve(k)]);
+        }
+    }
     let mut order: Vec<usize> = (0..places.len()).collect();
     order.sort_by_key(|k| ports.effects[*k].info.order);
     for effect in order {
@@ -441,6 +460,7 @@ impl Ports {
         let taken = match (port, place) {
             (Port::Command, Place::Valve(k)) => push(&mut self.command[k], acting),
             (Port::Late, Place::Valve(k)) => push(&mut self.late[k], acting),
+            (Port::Switching, Place::Valve(k)) => self.switching[k].replace(acting),
             (Port::Area, Place::Valve(k)) => self.area[k].replace(acting),
             (Port::Passage, Place::Valve(k)) => {
                 let gas = wiring.valves[k].to;

@@ -110,6 +110,9 @@ fn runs(driven: &[bool]) -> Vec<Range<usize>> {
 pub struct Controls<S> {
     /// Normalised spool position of each valve, -1 to 1.
     pub(crate) spool: Vec<S>,
+    /// Of each valve, where commands come late: the position before, and the share of the step until
+    /// it changes.
+    pub(crate) earlier: Vec<(S, S)>,
     /// Set pressure of each supply.
     pub(crate) set_pressure: Vec<SetPressure<S>>,
     /// Time since the start [s], where an effect asks for it.
@@ -236,15 +239,21 @@ fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
     match unit {
         SupplyUnit::Tank(volume) => Supply::Tank(values[*volume]),
         SupplyUnit::Constant => Supply::Constant,
-        SupplyUnit::Regulator { time_constant, droop, rise_limit, fall_limit, dead_time } => {
-            Supply::Regulator {
-                time_constant: values[*time_constant],
-                droop: values[*droop],
-                rise_limit: values[*rise_limit],
-                fall_limit: values[*fall_limit],
-                dead_time: values[*dead_time],
-            }
-        }
+        SupplyUnit::Regulator {
+            time_constant,
+            droop,
+            rise_limit,
+            fall_limit,
+            dead_time,
+            dead_band,
+        } => Supply::Regulator {
+            time_constant: values[*time_constant],
+            droop: values[*droop],
+            rise_limit: values[*rise_limit],
+            fall_limit: values[*fall_limit],
+            dead_time: values[*dead_time],
+            dead_band: values[*dead_band],
+        },
     }
 }
 

@@ -5,6 +5,7 @@ use super::ports::Ports;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::blocks::valve::AreaTable;
+use crate::effects::Form;
 use crate::muscle::spec::softened;
 use crate::muscle::CompiledMuscle;
 use crate::scalar::Scalar;
@@ -42,6 +43,7 @@ pub(crate) enum SupplyUnit {
         rise_limit: ParameterId,
         fall_limit: ParameterId,
         dead_time: ParameterId,
+        dead_band: ParameterId,
     },
 }
 
@@ -62,6 +64,8 @@ pub(crate) struct ValveUnit {
     pub passes: Passes,
     pub null: ParameterId,
     pub half_range: f64,
+    /// What its spool does by itself, with the parameters of that.
+    pub spool: Option<(&'static Form, Vec<ParameterId>)>,
 }
 
 #[derive(Debug, Clone, Copy)]

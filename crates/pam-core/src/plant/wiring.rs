@@ -1,7 +1,7 @@
 //! How the air and the effects of a description fit together: ports become indices, numbers become
 //! parameters.
 
-use super::parameters::Parameters;
+use super::parameters::{ParameterId, Parameters};
 use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{
     Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit,
@@ -11,7 +11,7 @@ use super::wiring_motion::{body, coordinate_names, coordinates, groups};
 use crate::blocks::supply::FASTEST;
 use crate::blocks::valve::AreaTable;
 use crate::description::{dotted, RigSpec, SupplySpec, ValveSpec};
-use crate::effects::EffectInfo;
+use crate::effects::{EffectInfo, Form};
 use crate::{Error, Result};
 
 pub(super) fn model<T>(text: impl Into<String>) -> Result<T> {
@@ -180,6 +180,7 @@ fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
                     (1.0, FASTEST, "Pa/s"),
                 )?,
                 dead_time: table.add(name("dead_time"), supply.dead_time, (0.0, 10.0, "s"))?,
+                dead_band: table.add(name("dead_band"), supply.dead_band, (0.0, 1e7, "Pa"))?,
             },
             _ => SupplyUnit::Constant,
         })
@@ -217,9 +218,24 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
                 (-1e3, 1e3, "V"),
             )?,
             half_range: valve.half_range,
+            spool: spool(valve, &block, table)?,
         });
     }
     Ok(units)
+}
+
+/// What the spool of a valve does by itself.
+fn spool(
+    valve: &ValveSpec,
+    block: &str,
+    table: &mut Parameters,
+) -> Result<Option<(&'static Form, Vec<ParameterId>)>> {
+    let Some(form) = valve.spool_form()? else { return Ok(None) };
+    let parameters = form.parameters.iter().map(|parameter| {
+        let (name, bounds) = (parameter.name, (parameter.lower, parameter.upper, parameter.unit));
+        table.add(format!("{block}.{name}"), valve.of_spool(name), bounds)
+    });
+    Ok(Some((form, parameters.collect::<Result<_>>()?)))
 }
 
 /// What a valve passes where it is wide open.

@@ -19,7 +19,7 @@ use crate::description::dotted;
 use crate::error::check_range;
 use crate::lanes::Wanted;
 use crate::plant::{Channel, LinearModel, Memory, Rig, Side};
-use crate::plant::{Controls, Plant, Scratch, Simulated};
+use crate::plant::{Controls, Plant, Scratch, Simulated, Switch, Switches};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use std::ops::Range;
@@ -91,6 +91,8 @@ pub(crate) struct Stepper<'a, S> {
     stages: Option<[Controls<S>; 3]>,
     /// State before a step, where something happens between steps.
     before: Option<Vec<S>>,
+    /// Instants within a step at which valves switch, where they do.
+    switches: Option<Switches<S>>,
     /// Whether anybody asks what the sensors read.
     pub reads: bool,
 }
@@ -105,6 +107,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Self {
             stages,
             before,
+            switches: ports.switches().then(Switches::none),
             reads: true,
             scratch: plant.scratch(),
             method: Rk4::new(plant.states()),
@@ -142,7 +145,11 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         simulated: &Simulated,
         mut drive: impl FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]),
     ) {
-        let Self { plant, scratch, method, start, end, remembers, stages, before, reads } = self;
+        if self.switches.is_some() {
+            return self.step_in_pieces(state, memory, controls, (time, dt), simulated, &mut drive);
+        }
+        let Self { plant, scratch, method, start, end, remembers, stages, before, reads, .. } =
+            self;
         let layout = plant.rig().layout();
         if let Some(stages) = stages {
             for (k, stage) in stages.iter_mut().enumerate() {
@@ -178,6 +185,164 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             plant.contractions(state, end);
             plant.follow_muscles(state, memory, start, end);
         }
+    }
+}
+
+impl<'a, S: Scalar> Stepper<'a, S> {
+    /// As [`Self::step`] where valves switch: an RK4 step from each instant at which one does to
+    /// the next.
+    fn step_in_pieces(
+        &mut self,
+        state: &mut [S],
+        memory: &mut [Memory<S>],
+        held: &Controls<S>,
+        (time, dt): (f64, f64),
+        simulated: &Simulated,
+        drive: Drives<'_, 'a, S>,
+    ) {
+        self.begin(state, held, time);
+        drive(&self.plant, self.controls(held, 0), 0.0, state);
+        let remembers = self.remembers && self.plant.pulls(simulated);
+        if remembers {
+            self.plant.contractions(state, &mut self.start);
+        }
+        let began = state.to_vec();
+        let mut switches = self.switches.take().unwrap_or_else(Switches::none);
+        self.plant.switches(&began, held, time, dt, &mut switches);
+        let step = Pieces { began: &began, held, time, dt, simulated };
+        let mut from = 0.0;
+        for switch in std::mem::take(&mut switches.each) {
+            let until = switch.after.re();
+            if until - from > SHORTEST_PIECE * dt {
+                self.piece(state, memory, &step, (from, until), &switches, drive);
+                from = until;
+            }
+            self.switch(state, memory, &step, &switch, &mut switches, drive);
+        }
+        self.piece(state, memory, &step, (from, dt), &switches, drive);
+        self.finish(state, &step, &switches, drive);
+        self.switches = Some(switches);
+        if remembers {
+            self.plant.contractions(state, &mut self.end);
+            self.plant.follow_muscles(state, memory, &self.start, &self.end);
+        }
+    }
+
+    /// Controls of a part of a step, valves where they stand in it.
+    fn set_stages(&mut self, step: &Pieces<'_, S>, (from, until): (f64, f64), now: &Switches<S>) {
+        let Self { plant, stages, .. } = self;
+        for (k, stage) in stages.iter_mut().flatten().enumerate() {
+            let age = from + 0.5 * k as f64 * (until - from);
+            plant.stage(step.began, step.held, step.time, age, stage);
+            now.write(stage);
+        }
+    }
+
+    /// An RK4 step over a part of a step.
+    fn piece(
+        &mut self,
+        state: &mut [S],
+        memory: &[Memory<S>],
+        step: &Pieces<'_, S>,
+        (from, until): (f64, f64),
+        now: &Switches<S>,
+        drive: Drives<'_, 'a, S>,
+    ) {
+        self.set_stages(step, (from, until), now);
+        let Self { plant, scratch, method, start, stages, .. } = self;
+        let runs = step.runs(plant, state.len());
+        let at = |stage: usize| stages.as_ref().map_or(step.held, |stages| &stages[stage]);
+        let length = until - from;
+        method.step_in(state, runs, length, |fraction, y, out| {
+            let controls = at((2.0 * fraction) as usize);
+            drive(plant, controls, (from + fraction * length) / step.dt, y);
+            plant.rates(y, controls, memory, start, step.simulated, scratch, out);
+        });
+        drive(plant, at(2), until / step.dt, state);
+    }
+
+    /// A valve takes another position. Where its instant has slopes, so has the state: until then
+    /// it moved as before, from then on as after it (the saltation of a system that switches).
+    fn switch(
+        &mut self,
+        state: &mut [S],
+        memory: &[Memory<S>],
+        step: &Pieces<'_, S>,
+        switch: &Switch<S>,
+        now: &mut Switches<S>,
+        drive: Drives<'_, 'a, S>,
+    ) {
+        let at = switch.after.re();
+        let later = switch.after - at;
+        if later.same(&constant(0.0)) {
+            now.take(switch);
+            return;
+        }
+        let mut rates = [vec![constant(0.0); state.len()], vec![constant(0.0); state.len()]];
+        for (k, rates) in rates.iter_mut().enumerate() {
+            if k == 1 {
+                now.take(switch);
+            }
+            self.set_stages(step, (at, at), now);
+            let Self { plant, scratch, start, stages, .. } = self;
+            let controls = stages.as_ref().map_or(step.held, |stages| &stages[0]);
+            drive(plant, controls, at / step.dt, state);
+            plant.rates(state, controls, memory, start, step.simulated, scratch, rates);
+        }
+        let [before, after] = rates;
+        for run in step.runs(&self.plant, state.len()) {
+            for place in run {
+                state[place] += (before[place] - after[place]) * later;
+            }
+        }
+    }
+
+    /// What happens between steps, and what sensors read.
+    fn finish(
+        &mut self,
+        state: &mut [S],
+        step: &Pieces<'_, S>,
+        now: &Switches<S>,
+        drive: Drives<'_, 'a, S>,
+    ) {
+        let Self { plant, stages, reads, .. } = self;
+        let Some([first, _, last]) = stages else { return };
+        plant.stage(step.began, step.held, step.time, 0.0, first);
+        drive(plant, last, 1.0, state);
+        plant.discrete_update(step.began, state, step.held, step.dt);
+        if *reads {
+            plant.read(step.began, state, [first, last], step.dt);
+        }
+        now.end(state);
+    }
+}
+
+/// Least part of a step that is one of its own.
+const SHORTEST_PIECE: f64 = 1e-12;
+
+/// Writes driven states, see [`Stepper::step`].
+type Drives<'d, 'a, S> = &'d mut dyn FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]);
+
+/// A step that valves cut into pieces.
+struct Pieces<'s, S> {
+    /// State at its beginning.
+    began: &'s [S],
+    held: &'s Controls<S>,
+    /// When it begins, and how long it takes [s].
+    time: f64,
+    dt: f64,
+    simulated: &'s Simulated,
+}
+
+impl<S: Scalar> Pieces<'_, S> {
+    /// Places that are integrated, the sums of the balance among them.
+    fn runs<'b>(
+        &'b self,
+        plant: &Plant<'_, S>,
+        states: usize,
+    ) -> impl Iterator<Item = Range<usize>> + Clone + 'b {
+        let kept = plant.rig().layout().states()..states;
+        self.simulated.runs().iter().cloned().chain([kept])
     }
 }
 

@@ -8,7 +8,7 @@ from pamrs.diagnosis.prepare import Block
 from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.rig.schema import kind_of
+from pamrs.rig.schema import kind_of, split_name
 
 __all__ = ["ACTS", "acts_in", "core_names", "depends", "fits", "places_of"]
 
@@ -118,8 +118,10 @@ def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
 def fits(rig: Rig, effect: str) -> bool:
     """Whether a rig has what an effect acts on, and no uncertain parameter that says the same."""
     info = EFFECTS[effect]
-    if any(p in rig.parameters and rig.parameters[p].tol > 0.0 for p in info.stated_by):
-        return False
+    if info.stated_by:
+        blocks = (split_name(name) for name, given in rig.parameters.items() if given.tol > 0.0)
+        if {f"{block}.{key}" for block, _, key in blocks}.intersection(info.stated_by):
+            return False
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
         kind in ("", kind_of(block, table))

@@ -293,6 +293,9 @@ def _check_rig(rig: Rig) -> None:
         )
         if several
         else "",
+        "its valve switches; valves that open by degrees can be planned"
+        if any(table["spool"] == "switching" for table in rig.tables("valve").values())
+        else "",
         "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned"
         if regulators_of(rig)
         else "",

@@ -641,6 +641,11 @@ def library(
             f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for "
             "rigs of one chain"
         )
+    if any(table["spool"] == "switching" for table in rig.tables("valve").values()):
+        raise DiagnosisError(
+            f"rig {rig.name!r} has a valve that switches; experiments are made for valves that "
+            "open by degrees"
+        )
     regulated = bool(regulators_of(rig)) and not rig.tables("valve")
     if not rig.tables("valve") and not regulated and (rig.tables("supply") or rig.tables("muscle")):
         raise DiagnosisError(

@@ -81,7 +81,15 @@ class Block:
         return self.kind in ("arm", "pull")
 
 
-_SUPPLY = ("volume", "time_constant", "droop", "dead_time", "rise_limit", "fall_limit")
+_SUPPLY = (
+    "volume",
+    "time_constant",
+    "droop",
+    "dead_time",
+    "rise_limit",
+    "fall_limit",
+    "dead_band",
+)
 _VALVE = (
     "discharge_area_max",
     "fill_conductance",
@@ -89,6 +97,12 @@ _VALVE = (
     "vent_conductance",
     "vent_critical_ratio",
     "null_voltage",
+    "natural_frequency",
+    "damping_ratio",
+    "opening_delay",
+    "closing_delay",
+    "carrier_frequency",
+    "carrier_phase",
 )
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _WAVES = ("alpha",)  # of a tube that has segments

@@ -1,8 +1,8 @@
 //! `second_order`: `y'' = w^2 (x - y) - 2 zeta w y'`, the spool as a mass on a spring.
 //!
 //! `w = 2 zeta/T`, so that `T` is what a slow command comes late by, and a large `zeta` is a lag of
-//! first order. The spool ends at its stops, -1 and 1. The command is held, so that the motion is
-//! that of a free oscillator about it, in closed form. E. Richer & Y. Hurmuzlu, "A high performance
+//! first order. The opening ends at -1 and 1. The command is held, so that the motion is that of a
+//! free oscillator about it, in closed form ([`swung`]). E. Richer & Y. Hurmuzlu, "A high performance
 //! pneumatic force actuator system: part I, nonlinear mathematical model", ASME J. Dyn. Syst. Meas.
 //! Control 122, 2000 (spool, coil and springs). A model of servo valves that feed muscles: A.
 //! Hildebrandt, O. Sawodny, R. Neumann & A. Hartmann, "Cascaded control concept of a robot with two
@@ -10,6 +10,7 @@
 
 use super::{opens, LAG_AND_DELAY, SHORTEST, TIME_CONSTANT};
 use crate::blocks::gas::Gas;
+use crate::blocks::spool::swung;
 use crate::effects::{begun, Effect, EffectParameter, Form, BEGINNING, BEGUN};
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -25,42 +26,12 @@ pub(super) const FORM: Form = Form {
     ..LAG_AND_DELAY
 };
 
-/// Below it the powers of the square are enough.
-const SMALL: f64 = 1e-2;
-
-/// `exp(-s) cosh(sqrt(q))` and `exp(-s) sinh(sqrt(q))/sqrt(q)`, of any sign of `q`.
-fn swings<S: Scalar>(q: S, s: S) -> (S, S) {
-    if q.re().abs() < SMALL {
-        let even = q * (q * (q / 720.0 + 1.0 / 24.0) + 0.5) + 1.0;
-        let odd = q * (q * (q / 5040.0 + 1.0 / 120.0) + 1.0 / 6.0) + 1.0;
-        let left = (-s).exp();
-        (left * even, left * odd)
-    } else if q.re() > 0.0 {
-        let root = q.sqrt();
-        let (slow, fast) = ((root - s).exp() * 0.5, (-root - s).exp() * 0.5);
-        (slow + fast, (slow - fast) / root)
-    } else {
-        let root = (-q).sqrt();
-        let (sin, cos) = root.sin_cos();
-        let left = (-s).exp();
-        (left * cos, left * sin / root)
-    }
-}
-
 /// Position and rate a time [s] later, the input held.
 fn moved<S: Scalar>([from, rate]: [S; 2], input: S, t: S, damping: S, time: f64) -> [S; 2] {
     if t.re() <= SHORTEST {
         return [input, constant(0.0)];
     }
-    let natural = damping * 2.0 / t;
-    let faded = damping * natural * time;
-    let turned = natural * time;
-    let (even, odd) = swings((damping * damping - 1.0) * turned * turned, faded);
-    let away = from - input;
-    [
-        input + away * (even + faded * odd) + rate * odd * time,
-        rate * (even - faded * odd) - natural * natural * away * odd * time,
-    ]
+    swung([from, rate], input, damping * 2.0 / t, damping, constant(time))
 }
 
 /// A spool on a spring; its states say that it has begun, where it is, and how fast it moves.
