@@ -161,7 +161,7 @@ fn a_closed_tube_rings_at_a_quarter_wave() {
     let n = model.states.len();
     let place = |name: &str| model.states.iter().position(|state| state == name).unwrap();
     let (p, m) = (place("segment_pressure.5"), place("segment_flow.5"));
-    let product = model.a[p * n + m] * model.a[m * n + p];
+    let product = -model.a[p * n + m] * model.a[m * n + p];
     let speed = (1.4 * RT).sqrt() * segments as f64 / length;
     assert!((product / speed.powi(2) - 1.0).abs() < 1e-6, "inertia and capacity make the speed");
     assert!(model.a[m * n + m] < 0.0, "friction");
