@@ -94,6 +94,18 @@ def test_mass_is_conserved_and_the_balance_closes() -> None:
     # sound is no energy balance of its own: what that makes up is said
     adiabatic = pamrs.simulate(pamrs.rigs.named("long_tube"), sample_time=0.002, duration=0.2)
     assert abs(adiabatic.balance.created) > 1e-6
+    assert "alpha = 1 of a tube" in str(adiabatic.balance)
+
+
+def test_a_new_rig_has_an_energy_balance_in_its_chambers_and_its_own_alpha_along_the_tube() -> None:
+    rig = parse_rig(pamrs.rigs.template("long_tube"))
+    assert {table["gas"] for table in rig.tables("chamber").values()} == {"energy_balance"}
+    assert rig.parameter("line.alpha").tol == 0.02
+    isothermal = rig.with_parameters({"line.alpha": 1.0})
+    run = pamrs.simulate(isothermal, sample_time=0.002, duration=0.5)
+    moved = np.ptp(run["air_mass.left"])
+    assert abs(run.balance.residual) < 1e-9 * moved
+    assert abs(run.balance.created) < 1e-9 * moved
 
 
 @pytest.mark.parametrize("bar", [0.2, 2.0, 7.0])

@@ -79,11 +79,14 @@ _BALANCE: Final = (
 def _with_energy_balance(text: str) -> str:
     """A rig file whose chambers have an energy balance in the place of coefficients."""
     lines: list[str] = []
+    inside = False
     for line in text.splitlines():
-        if re.match(r"alpha(_in|_out)?\s*=", line):
+        if line.startswith("["):
+            inside = re.match(r"\[chamber(\.[^\]]+)?\]", line) is not None
+        if inside and re.match(r"alpha(_in|_out)?\s*=", line):
             continue
         lines.append(line)
-        if re.match(r"\[chamber(\.[^\]]+)?\]", line):
+        if inside and line.startswith("["):
             lines += _BALANCE
     return "\n".join(lines) + "\n"
 

@@ -124,7 +124,7 @@ class Balance:
         if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
             reason = (
                 "the constant gas coefficients, which are no energy balance; gas = "
-                '"energy_balance" of a chamber is'
+                '"energy_balance" of a chamber is, and alpha = 1 of a tube makes up none'
             )
             air += f" ({1e3 * self.created:+.4g} g by {reason})"
         share = (

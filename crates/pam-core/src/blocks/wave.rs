@@ -1,24 +1,23 @@
 //! Tube that holds gas and carries waves, as a row of equal segments.
 //!
-//! Between two nodes of gas flows `m`, which has inertia:
-//! `dm/dt = (A/l) [(u - d)(1 - h b^2 w^4/(u d)^2) - (2 (b^2 - h) w^2 ln(u/d) + k w max(w, e p))/(u +
-//! d)]` with the area `A`, the length `l` of a segment, `w = m/(C rho0 sqrt(T0/T))`, the pressures
-//! `u = max(p_up, b w)` and `d = max(p_down, b w)`, and `p` their mean. A node of the volume `A l`
-//! has `dp/dt = alpha R T/(A l) (m_in - m_out)`; a half of it is at either end of the tube. Waves run
-//! at `sqrt(alpha R T)`: `alpha` is 1.4 for sound, 1 where the wall keeps the gas at its
-//! temperature. E. B. Wylie, V. L. Streeter, *Fluid Transients in Systems*, 1993 (inertia,
-//! capacity and friction of a pipe in lumps); B. W. Andersen, *The Analysis and Design of Pneumatic
-//! Systems*, 1967.
+//! Between two nodes of gas flows `m`, which has inertia: `dm/dt = (A/l) [(u - d)(1 - h b^2 w^4/(u
+//! d)^2) - (2 (b^2 - h) w^2 ln(u/d) + k/n w max(w, e p))/(u + d)]` with the area `A`, the length
+//! `l` of one of `n` segments, `w = m/(C rho0 sqrt(T0/T))`, the pressures `u = max(p_up, b w)` and
+//! `d = max(p_down, b w)`, and `p` their mean. A node of the volume `A l` has `dp/dt = alpha R
+//! T/(A l) (m_in - m_out)`; a half of it is at either end of the tube. Waves run at `sqrt(alpha R
+//! T)`: `alpha` is 1.4 for sound, 1 where the wall keeps the gas at its temperature. E. B. Wylie,
+//! V. L. Streeter, *Fluid Transients in Systems*, 1993 (inertia, capacity and friction of a pipe
+//! in lumps); B. W. Andersen, *The Analysis and Design of Pneumatic Systems*, 1967.
 //!
 //! The friction is that with which the tube passes in a steady flow what [`Tube`] passes, however
-//! many segments it has: with `y = w/m p` along the tube
-//! `f(y_1) - f(y_2) = k`, `f = y^2 + 2 (h - b^2) ln y + h b^2/y^2`, where `f'(b) = 0`, so that the
-//! flow is choked where it leaves at the speed at which a tube of [`Tube`] does, and `k` and `h`
-//! give the same choked flow and the same slope next to equal pressures. The terms besides `k` are
-//! those of the momentum that gas takes along where it becomes faster (Shapiro, *Compressible Fluid
-//! Flow*, 1953, chapter 6). Between the two the flows differ by less than half a percent up to `b =
-//! 0.5`, by 2.3 % for the shortest tube there is (`b = 0.61`), where `h` is not bound by `f'(y) >= 0`,
-//! and by a percent where it is, in tubes with `b` below 0.12. `e` is where [`Tube`] is laminar.
+//! many segments it has: with `y = p/w` at its two ends `f(y_1) - f(y_2) = k`, `f = y^2 + 2 (h -
+//! b^2) ln y + h b^2/y^2`, where `f'(b) = 0`, so that the flow is choked where it leaves at the
+//! speed at which a tube of [`Tube`] does, and `k` and `h` give the same choked flow and the same
+//! slope next to equal pressures. The terms besides `k` are those of the momentum that gas takes
+//! along where it becomes faster (Shapiro, *Compressible Fluid Flow*, 1953, chapter 6). Between
+//! the two the flows differ by less than half a percent up to `b = 0.5` and by 2.3 % for the
+//! shortest tube there is (`b = 0.61`). Below `b = 0.12` (14 m of 4 mm) `f'(y) >= 0` bounds `h`,
+//! and the slope next to equal pressures is up to 2 % off. `e` is where [`Tube`] is laminar.
 
 use super::gas::{Gas, LAMINAR_RATIO};
 use super::tube::Tube;
@@ -37,7 +36,7 @@ pub struct Wave<S> {
     critical_ratio: S,
     /// `h` [1].
     bend: S,
-    /// `k` of one segment [1].
+    /// `k/n` [1].
     friction: S,
     /// `e`, share of the choked flow up to which it is laminar [1].
     laminar: S,
@@ -174,7 +173,7 @@ mod tests {
             let choked = steady(&wave, 6e5, 1e3);
             assert!((choked / tube.mass_flow(6e5, 1e3) - 1.0).abs() < 1e-3, "{length}");
             let small = steady(&wave, 6e5, 6e5 - 100.0);
-            assert!((small / tube.mass_flow(6e5, 6e5 - 100.0) - 1.0).abs() < 0.01, "{length}");
+            assert!((small / tube.mass_flow(6e5, 6e5 - 100.0) - 1.0).abs() < 0.02, "{length}");
         }
     }
 

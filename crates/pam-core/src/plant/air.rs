@@ -448,18 +448,7 @@ impl Plant<'_, f64> {
                 add(Node::Gas(unit.to), Node::Ambient, slope);
             }
         }
-        for (unit, wave) in wiring.waves.iter().zip(&self.waves) {
-            // a flow is no pressure: with `A/c` as its measure both have the rates of the wave
-            for k in 0..unit.segments {
-                for node in [unit.node(&wiring.lines, k), unit.node(&wiring.lines, k + 1)] {
-                    match node {
-                        Node::Gas(k) => steepest[k] += wave.admittance(),
-                        Node::Supply(k) => drawn[k] += wave.admittance(),
-                        Node::Ambient => {}
-                    }
-                }
-            }
-        }
+        self.steepest_waves(&mut steepest, &mut drawn);
         let of_effects = self.fastest_effect(|place| match place {
             Place::Supply(k) => moves(Node::Supply(k)),
             Place::Gas(k) => moves(Node::Gas(k)),
@@ -484,6 +473,23 @@ impl Plant<'_, f64> {
             }
         }
         worst
+    }
+
+    /// What waves take from gases and supplies per pressure [kg/(s Pa)]: a flow is no pressure, and
+    /// with `A/c` as its measure both have the rates of the wave.
+    fn steepest_waves(&self, gases: &mut [f64], supplies: &mut [f64]) {
+        let lines = &self.wiring.lines;
+        for (unit, wave) in self.wiring.waves.iter().zip(&self.waves) {
+            for k in 0..unit.segments {
+                for node in [unit.node(lines, k), unit.node(lines, k + 1)] {
+                    match node {
+                        Node::Gas(k) => gases[k] += wave.admittance(),
+                        Node::Supply(k) => supplies[k] += wave.admittance(),
+                        Node::Ambient => {}
+                    }
+                }
+            }
+        }
     }
 
     /// Fastest rate of a flow in a tube that carries waves [1/s], and the line.

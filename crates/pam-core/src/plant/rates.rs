@@ -257,6 +257,19 @@ fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
     }
 }
 
+/// The coefficients of a gas.
+fn polytropic<S: Scalar>(law: GasLaw, values: &Values<S>, gamma: f64) -> Polytropic<S> {
+    let alike = |alpha: S| Polytropic { inflow: alpha, outflow: alpha, volume: alpha };
+    match law {
+        GasLaw::Coefficients([inflow, outflow, volume]) => {
+            Polytropic { inflow: values[inflow], outflow: values[outflow], volume: values[volume] }
+        }
+        GasLaw::Isothermal => alike(constant(1.0)),
+        GasLaw::Alike(alpha) => alike(values[alpha]),
+        GasLaw::Energy(_) => alike(constant(gamma)),
+    }
+}
+
 impl<'a, S: Number> Plant<'a, S> {
     /// Compose a rig with parameter values; `balanced` keeps the sums of [`super::layout::BALANCE`]
     /// behind the states.
@@ -291,7 +304,6 @@ impl<'a, S: Number> Plant<'a, S> {
                 Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
             }),
         };
-        let alike = |alpha: S| Polytropic { inflow: alpha, outflow: alpha, volume: alpha };
         Ok(Self {
             layout: rig.layout,
             balanced,
@@ -303,16 +315,7 @@ impl<'a, S: Number> Plant<'a, S> {
                 })
                 .collect(),
             alphas: (wiring.gases.iter())
-                .map(|gas| match gas.law {
-                    GasLaw::Coefficients([inflow, outflow, volume]) => Polytropic {
-                        inflow: values[inflow],
-                        outflow: values[outflow],
-                        volume: values[volume],
-                    },
-                    GasLaw::Isothermal => alike(constant(1.0)),
-                    GasLaw::Alike(alpha) => alike(values[alpha]),
-                    GasLaw::Energy(_) => alike(constant(rig.gas.gamma)),
-                })
+                .map(|gas| polytropic(gas.law, &values, rig.gas.gamma))
                 .collect(),
             walls: (wiring.gases.iter())
                 .map(|gas| match gas.law {
