@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import shutil
 import tomllib
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from pamrs._files import parse_toml, read_file
 from pamrs.errors import CaseError, RecordingError, RigError
 from pamrs.recordings import load_case, load_recording, table
 from pamrs.recordings.logs import read_log
+from tests.recordings.written import N, mapping, written
 
 HEADER = "time [s],force [N]\n"
 
@@ -177,6 +179,59 @@ def test_a_link_in_the_folder_of_a_bag_is_not_opened(tmp_path: Path) -> None:
     )
     with pytest.raises(CaseError, match=r"file = 'bag': .*bag_0.db3 lies outside the case folder"):
         load_case(home)
+
+
+MAPPED = "".join(
+    f'{name} = {{ column = "{item["column"]}", unit = "{item["unit"]}" }}\n'
+    for name, item in mapping("/rig/position[{}]").items()
+)
+
+
+def case_of_a_bag(home: Path, bag: str) -> None:
+    """A case of one bag, which was written with :func:`written`."""
+    pamrs.rigs.shoulder().to_toml(home / "rig.toml")
+    (home / "case.toml").write_text(
+        f'schema = "pamrs.case/1"\n[[recording]]\nfile = "{bag}"\n[recording.channels]\n{MAPPED}'
+    )
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_bag_whose_names_sqlite_decodes_is_not_opened(tmp_path: Path, whole: bool) -> None:
+    """A file of that very name lies in the case folder, empty: what is read is another one."""
+    pytest.importorskip("rosbags")
+    bag, _, _ = written(tmp_path, "bag")
+    (stored,) = bag.glob("*.db3")
+    secret = stored.rename(tmp_path / "secret.db3")
+    home = tmp_path / "stand"
+    (home / "bag").mkdir(parents=True)
+    if whole:
+        name = "bag/..%2f..%2fsecret.db3"
+        told = (bag / "metadata.yaml").read_text()
+        assert stored.name in told
+        told = told.replace(stored.name, Path(name).name)
+        (home / "bag" / "metadata.yaml").write_text(told)
+    else:
+        name = "..%2fsecret.db3"
+    (home / name).touch()
+    case_of_a_bag(home, "bag" if whole else name)
+    with pytest.raises(CaseError, match=r"names with %, \? or # are not read from bags"):
+        load_case(home)
+    (home / name).unlink()
+    shutil.copy(secret, home / "bag" / stored.name)
+    (home / "bag" / "metadata.yaml").write_text((bag / "metadata.yaml").read_text())
+    case_of_a_bag(home, "bag")
+    assert len(load_case(home).recordings[0]) == N
+
+
+@pytest.mark.parametrize("mark", ["%", "?", "#"])
+def test_a_folder_above_a_bag_leads_nowhere_else(tmp_path: Path, mark: str) -> None:
+    pytest.importorskip("rosbags")
+    home = tmp_path / f"stand{mark}2"
+    home.mkdir()
+    bag, _, _ = written(tmp_path, "bag")
+    bag.rename(home / "bag")
+    with pytest.raises(RecordingError, match=r"are not read from bags .*; rename it"):
+        read_log(home / "bag")
 
 
 def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
