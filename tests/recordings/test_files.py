@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
+import re
 import shutil
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -17,6 +19,7 @@ from pamrs._files import parse_toml, read_file
 from pamrs.errors import CaseError, RecordingError, RigError
 from pamrs.recordings import load_case, load_recording, table
 from pamrs.recordings.logs import read_log
+from pamrs.recordings.logs._hdf import leads_elsewhere
 from tests.recordings.written import N, mapping, written
 
 HEADER = "time [s],force [N]\n"
@@ -248,12 +251,64 @@ def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
         layout = h5py.VirtualLayout(secret.shape, "f8")
         layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
         file.create_virtual_dataset("virtual", layout)
-        file["link"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
+        for name in ("link", "daq/link"):
+            file[name] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
         assert file["raw"][3] == file["virtual"][3] == file["link"][3] == 3.0  # they do lead there
     log = read_log(tmp_path / "run.h5")
     assert list(log.series) == ["own"]
     assert log.unread["raw"] == log.unread["virtual"]
     assert "its numbers lie in another file; copy them into this one" in log.unread["raw"]
+    assert list(log.unread) == ["link", "raw", "virtual", "daq/link"]
+    for name in ("link", "daq/link"):
+        assert re.search(r"it is a link to '.*secret.h5'; copy what", log.unread[name])
+        with pytest.raises(RecordingError, match=f"'{name}' cannot be used: it is a link to"):
+            log.find(name)
+
+
+def test_a_view_of_the_own_file_is_called_so(tmp_path: Path) -> None:
+    """What it shows may lie in another file all the same, so it is not read."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["own"] = np.arange(40.0)
+        layout = h5py.VirtualLayout((40,), "f8")
+        layout[:] = h5py.VirtualSource(file["own"])
+        file.create_virtual_dataset("view", layout)
+    log = read_log(tmp_path / "run.h5")
+    assert list(log.series) == ["own"]
+    assert log.unread["view"].startswith("it is virtual, a view of other data sets")
+
+
+def test_groups_with_many_names_are_looked_at_once(tmp_path: Path) -> None:
+    """Twenty groups in each other with two names each have a million paths; one that holds itself
+    has no end of them.
+    """
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        inner = file
+        for _ in range(20):
+            outer, inner = inner, inner.create_group("a")
+            outer["b"] = inner
+        inner["back"] = file["/"]
+        inner["self"] = inner
+        inner["p"] = np.arange(40.0)
+        inner["link"] = h5py.ExternalLink("secret.h5", "p")
+        looked: list[str] = []
+        get = h5py.Group.get
+
+        def counted(group: Any, name: str, *given: Any, **options: Any) -> Any:
+            looked.append(name)
+            assert len(looked) < 100
+            return get(group, name, *given, **options)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(h5py.Group, "get", counted)
+            ((name, why),) = leads_elsewhere(file)
+    assert name.count("/") == 20
+    assert name.endswith("/link")
+    assert "it is a link to 'secret.h5'" in why
+    assert len(looked) == 2 * 20 + 4
+    log = read_log(tmp_path / "run.h5")
+    assert len(log.series) == len(log.unread) == 1
 
 
 @pytest.mark.parametrize("how", ["raw", "virtual", "link"])
