@@ -179,17 +179,77 @@ def test_a_measured_room_is_that_of_the_rig() -> None:
     assert pamrs.diagnose(pamrs.Case("blind", NOZZLE, blind, Path())).verdict != "none"
 
 
+def room_of(*temperatures: float, rig: pamrs.Rig = NOZZLE) -> tuple[pamrs.Rig, list[str]]:
+    """The rig at a room of these temperatures, one for each recording, and what is said."""
+    recordings = [
+        of(f"hold{k}", "fit", 0.02, {"ambient_temperature": np.full(50, room)})
+        for k, room in enumerate(temperatures)
+    ]
+    return at_ambient(rig, recordings, SETTINGS.plausibility)
+
+
 def test_one_temperature_holds_for_all_recordings() -> None:
-    rig, said = at_ambient(NOZZLE, [warm_stand(k, room=t) for k, t in enumerate((290, 291, 299))])
+    rig, said = room_of(290.0, 291.0, 299.0)
     assert rig.parameter("gas.temperature").value == pytest.approx(291.0, abs=0.1)
     assert "differs between the recordings, from 290.0 to 299.0 K" in said[1]
-    assert at_ambient(NOZZLE, [])[1] == []
+    assert at_ambient(NOZZLE, [], SETTINGS.plausibility)[1] == []
 
 
-def test_a_room_that_cannot_be_is_an_error() -> None:
-    hot = replace(warm_stand(1), channels={"ambient_temperature": np.full(2000, 1900.0)})
-    with pytest.raises(DiagnosisError, match=r"ambient_temperature of hold1: .*gas.temperature"):
-        at_ambient(NOZZLE, [hot])
+@pytest.mark.parametrize("room", [210.0, 249.9, 330.1, 390.0, 500.0, 1900.0])
+def test_a_room_that_cannot_be_is_an_error(room: float) -> None:
+    with pytest.raises(
+        DiagnosisError, match=rf"ambient_temperature of hold1 \({room} K\): .* 250 to 330 K are"
+    ):
+        room_of(293.0, room, 294.0)
+
+
+def test_an_impossible_room_ends_a_diagnosis_unless_it_is_allowed() -> None:
+    hot = pamrs.Case("hot", NOZZLE, [warm_stand(1, room=390.0)], Path())
+    with pytest.raises(DiagnosisError, match=r"hold1 \(390.0 K\): no room has it"):
+        pamrs.diagnose(hot)
+    wider = SETTINGS.with_values({"plausibility.most_room": 400.0})
+    assert "gas.temperature is 390.0 K" in " ".join(pamrs.diagnose(hot, settings=wider).warnings)
+
+
+def known_to(tolerance: str) -> pamrs.Rig:
+    """The rig at 293.15 K, with what is known of that."""
+    value = 'value = 293.15, unit = "K"' + (tolerance and f", {tolerance}")
+    text = NOZZLE.to_toml_text()
+    assert "[gas]" in text
+    return parse_rig(text.replace("[gas]", f"[gas]\ntemperature = {{ {value} }}"))
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "room", "doubted"),
+    [
+        ("", 273.15, True),  # of an open input
+        ("", 293.15 + 14.9, False),
+        ("", 293.15 + 15.1, True),
+        ("tol = 1.0", 293.15 + 2.9, False),
+        ("tol = 1.0", 293.15 - 3.1, True),
+        ("tol = 10.0", 293.15 + 14.9, False),
+        ("tol = 10.0", 293.15 + 15.1, True),
+    ],
+)
+def test_a_room_far_from_the_rig_file_is_doubted(
+    tolerance: str, room: float, doubted: bool
+) -> None:
+    rig, said = room_of(room, rig=known_to(tolerance))
+    assert rig.parameter("gas.temperature").value == pytest.approx(room)
+    assert len(said) == 1 + doubted
+    if doubted:
+        assert f"{abs(room - 293.15):.1f} K away from gas.temperature of the rig file" in said[1]
+        assert ("known to 1 K" in said[1]) == (tolerance == "tol = 1.0")
+
+
+def test_masked_samples_say_nothing_of_the_room() -> None:
+    values = np.where(np.arange(50) < 20, 295.0, 273.15)
+    one = of("hold", "fit", 0.02, {"ambient_temperature": values})
+    usable = replace(one, mask={"ambient_temperature": values > 280.0})
+    rig, _ = at_ambient(NOZZLE, [usable], SETTINGS.plausibility)
+    assert rig.parameter("gas.temperature").value == 295.0
+    none = replace(one, mask={"ambient_temperature": np.zeros(50, dtype=bool)})
+    assert at_ambient(NOZZLE, [none], SETTINGS.plausibility) == (NOZZLE, [])
 
 
 def test_a_recorded_temperature_of_the_gas_is_compared_by_a_replay() -> None:

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import gzip
 import os
+import re
+import shutil
 import tomllib
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +19,8 @@ from pamrs._files import parse_toml, read_file
 from pamrs.errors import CaseError, RecordingError, RigError
 from pamrs.recordings import load_case, load_recording, table
 from pamrs.recordings.logs import read_log
+from pamrs.recordings.logs._hdf import leads_elsewhere
+from tests.recordings.written import N, mapping, written
 
 HEADER = "time [s],force [N]\n"
 
@@ -179,6 +184,59 @@ def test_a_link_in_the_folder_of_a_bag_is_not_opened(tmp_path: Path) -> None:
         load_case(home)
 
 
+MAPPED = "".join(
+    f'{name} = {{ column = "{item["column"]}", unit = "{item["unit"]}" }}\n'
+    for name, item in mapping("/rig/position[{}]").items()
+)
+
+
+def case_of_a_bag(home: Path, bag: str) -> None:
+    """A case of one bag, which was written with :func:`written`."""
+    pamrs.rigs.shoulder().to_toml(home / "rig.toml")
+    (home / "case.toml").write_text(
+        f'schema = "pamrs.case/1"\n[[recording]]\nfile = "{bag}"\n[recording.channels]\n{MAPPED}'
+    )
+
+
+@pytest.mark.parametrize("whole", [True, False])
+def test_a_bag_whose_names_sqlite_decodes_is_not_opened(tmp_path: Path, whole: bool) -> None:
+    """A file of that very name lies in the case folder, empty: what is read is another one."""
+    pytest.importorskip("rosbags")
+    bag, _, _ = written(tmp_path, "bag")
+    (stored,) = bag.glob("*.db3")
+    secret = stored.rename(tmp_path / "secret.db3")
+    home = tmp_path / "stand"
+    (home / "bag").mkdir(parents=True)
+    if whole:
+        name = "bag/..%2f..%2fsecret.db3"
+        told = (bag / "metadata.yaml").read_text()
+        assert stored.name in told
+        told = told.replace(stored.name, Path(name).name)
+        (home / "bag" / "metadata.yaml").write_text(told)
+    else:
+        name = "..%2fsecret.db3"
+    (home / name).touch()
+    case_of_a_bag(home, "bag" if whole else name)
+    with pytest.raises(CaseError, match=r"names with %, \? or # are not read from bags"):
+        load_case(home)
+    (home / name).unlink()
+    shutil.copy(secret, home / "bag" / stored.name)
+    (home / "bag" / "metadata.yaml").write_text((bag / "metadata.yaml").read_text())
+    case_of_a_bag(home, "bag")
+    assert len(load_case(home).recordings[0]) == N
+
+
+@pytest.mark.parametrize("mark", ["%", "?", "#"])
+def test_a_folder_above_a_bag_leads_nowhere_else(tmp_path: Path, mark: str) -> None:
+    pytest.importorskip("rosbags")
+    home = tmp_path / f"stand{mark}2"
+    home.mkdir()
+    bag, _, _ = written(tmp_path, "bag")
+    bag.rename(home / "bag")
+    with pytest.raises(RecordingError, match=r"are not read from bags .*; rename it"):
+        read_log(home / "bag")
+
+
 def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
     """An HDF5 file can lead to any other: by raw storage, by virtual data sets, by links."""
     h5py = pytest.importorskip("h5py")
@@ -193,12 +251,64 @@ def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
         layout = h5py.VirtualLayout(secret.shape, "f8")
         layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "p", secret.shape)
         file.create_virtual_dataset("virtual", layout)
-        file["link"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
+        for name in ("link", "daq/link"):
+            file[name] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "p")
         assert file["raw"][3] == file["virtual"][3] == file["link"][3] == 3.0  # they do lead there
     log = read_log(tmp_path / "run.h5")
     assert list(log.series) == ["own"]
     assert log.unread["raw"] == log.unread["virtual"]
     assert "its numbers lie in another file; copy them into this one" in log.unread["raw"]
+    assert list(log.unread) == ["link", "raw", "virtual", "daq/link"]
+    for name in ("link", "daq/link"):
+        assert re.search(r"it is a link to '.*secret.h5'; copy what", log.unread[name])
+        with pytest.raises(RecordingError, match=f"'{name}' cannot be used: it is a link to"):
+            log.find(name)
+
+
+def test_a_view_of_the_own_file_is_called_so(tmp_path: Path) -> None:
+    """What it shows may lie in another file all the same, so it is not read."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        file["own"] = np.arange(40.0)
+        layout = h5py.VirtualLayout((40,), "f8")
+        layout[:] = h5py.VirtualSource(file["own"])
+        file.create_virtual_dataset("view", layout)
+    log = read_log(tmp_path / "run.h5")
+    assert list(log.series) == ["own"]
+    assert log.unread["view"].startswith("it is virtual, a view of other data sets")
+
+
+def test_groups_with_many_names_are_looked_at_once(tmp_path: Path) -> None:
+    """Twenty groups in each other with two names each have a million paths; one that holds itself
+    has no end of them.
+    """
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "run.h5", "w") as file:
+        inner = file
+        for _ in range(20):
+            outer, inner = inner, inner.create_group("a")
+            outer["b"] = inner
+        inner["back"] = file["/"]
+        inner["self"] = inner
+        inner["p"] = np.arange(40.0)
+        inner["link"] = h5py.ExternalLink("secret.h5", "p")
+        looked: list[str] = []
+        get = h5py.Group.get
+
+        def counted(group: Any, name: str, *given: Any, **options: Any) -> Any:
+            looked.append(name)
+            assert len(looked) < 100
+            return get(group, name, *given, **options)
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(h5py.Group, "get", counted)
+            ((name, why),) = leads_elsewhere(file)
+    assert name.count("/") == 20
+    assert name.endswith("/link")
+    assert "it is a link to 'secret.h5'" in why
+    assert len(looked) == 2 * 20 + 4
+    log = read_log(tmp_path / "run.h5")
+    assert len(log.series) == len(log.unread) == 1
 
 
 @pytest.mark.parametrize("how", ["raw", "virtual", "link"])

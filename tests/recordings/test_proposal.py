@@ -305,3 +305,45 @@ def test_a_load_frames_load_cell_is_its_force(tmp_path: Path) -> None:
     table.write_text(f"time [s];p [bar];load_cell [N];position [mm]\n{rows}\n", encoding="utf-8")
     found = propose([table], pamrs.rigs.named("bench")).case_toml(tmp_path)
     assert 'force = { column = "load_cell", unit = "N" }' in found
+
+
+def proposed(tmp_path: Path, names: list[str], rig: pamrs.Rig | None) -> tuple[dict[str, str], str]:
+    """Which series of a log are proposed as what, and what is remarked; all are near 21."""
+    values = {name: 21.0 + 0.1 * k + LIFT for k, name in enumerate(names)}
+    np.savez(tmp_path / "run.npz", t=TIME, **{"muscle_pressure [bar]": VENTED}, **values)
+    (item,) = propose([tmp_path / "run.npz"], rig).logs
+    found = {match.series.name: match.channel for match in item.matches}
+    return found, "; ".join(item.remarks)
+
+
+@pytest.mark.parametrize("rig", [None, pamrs.rigs.shoulder()])
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["temp_muscle", "temp_oil"],
+        ["temp_muscle [degC]", "temp_oil [degC]"],
+        ["T1 [degC]"],
+        ["ambient_pressure"],
+        ["room"],
+    ],
+)
+def test_no_room_is_guessed(tmp_path: Path, names: list[str], rig: pamrs.Rig | None) -> None:
+    """A diagnosis would set the gas of the rig by it."""
+    found, told = proposed(tmp_path, names, rig)
+    assert "ambient_temperature" not in found.values()
+    assert "ambient_temperature" not in told
+
+
+@pytest.mark.parametrize("rig", [None, pamrs.rigs.shoulder()])
+@pytest.mark.parametrize(
+    "name",
+    ["ambient_temperature", "Room temperature [degC]", "T_Umgebung [degC]", "tamb", "Temp Raum"],
+)
+def test_a_room_that_is_named_is_proposed(tmp_path: Path, name: str, rig: pamrs.Rig | None) -> None:
+    found, told = proposed(tmp_path, ["temp_oil [degC]", name], rig)
+    assert found[split_heading(name)[0]] == "ambient_temperature"
+    if rig is None:
+        assert found["temp_oil"] == "temperature"
+    else:
+        assert "temp_oil" not in found
+        assert "not found in this log: valve_command" in told

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
 
 import typer
 
@@ -31,6 +31,7 @@ __all__ = ["fit_app"]
 SCHEMA: Final = "pamrs.muscle_fit/1"
 FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
 MAP_SCHEMA: Final = "pamrs.map_fit/1"
+_Contents: TypeAlias = dict[Path, str | bytes | Callable[[Path], object]]
 _MODULI: Final = {"modulus_slope": "dimensionless"}
 
 
@@ -64,6 +65,59 @@ _Outside = Annotated[
     typer.Option("--allow-outside", help="A description's table may lie outside its folder."),
 ]
 
+# of ``pamrs fit muscle`` alone
+_Data = Annotated[
+    Path,
+    typer.Argument(help="Force map: a table with units in its headings, or a TOML description."),
+]
+_Model = Annotated[str | None, typer.Option(help="Force model; by default that of the muscle.")]
+_Order = Annotated[
+    int | None,
+    typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli."),
+]
+_Geometry = Annotated[
+    str | None,
+    typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own."),
+]
+_Free = Annotated[
+    str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")
+]
+_Prior = Annotated[
+    str | None,
+    typer.Option(
+        help='What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.'
+    ),
+]
+_Noise = Annotated[
+    str | None,
+    typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.'),
+]
+_Levels = Annotated[
+    str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")
+]
+_PerLevel = Annotated[bool, typer.Option("--per-level", help="Moduli free at each pressure.")]
+_Friction = Annotated[
+    FrictionChoice | None,
+    typer.Option(
+        help=(
+            "fit: to the loops, before the moduli; muscle: as the muscle has it; none. By "
+            "default fit where the rows have both directions and the muscle no friction."
+        )
+    ),
+]
+_Compare = Annotated[bool, typer.Option("--compare", help="Fit every model and rank them.")]
+_Report = Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")]
+_FittedRig = Annotated[
+    Path | None,
+    typer.Option(
+        help=(
+            "Write a rig file with the fitted muscle: that of --muscle, or a new one with the "
+            "muscle alone."
+        )
+    ),
+]
+_Result = Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")]
+
 fit_app = typer.Typer(help="Fit models to measurements.")
 
 
@@ -75,23 +129,10 @@ def _root() -> None:
 @fit_app.command("muscle")
 def _muscle(
     context: typer.Context,
-    data: Annotated[
-        Path,
-        typer.Argument(
-            help="Force map: a table with units in its headings, or a TOML description."
-        ),
-    ],
-    model: Annotated[
-        str | None, typer.Option(help="Force model; by default that of the muscle.")
-    ] = None,
-    order: Annotated[
-        int | None,
-        typer.Option(help="Order of the stress polynomial, 4 unless the muscle has moduli."),
-    ] = None,
-    geometry: Annotated[
-        str | None,
-        typer.Option(help="cylinder, elliptic or elliptic_published; by default the model's own."),
-    ] = None,
+    data: _Data,
+    model: _Model = None,
+    order: _Order = None,
+    geometry: _Geometry = None,
     muscle: _MuscleName = None,
     rest_length: _RestLength = None,
     rest_diameter: _RestDiameter = None,
@@ -99,77 +140,27 @@ def _muscle(
     wall_thickness: _WallThickness = None,
     where: _Where = None,
     clipped: _Clipped = None,
-    free: Annotated[
-        str | None, typer.Option(help="Geometry to fit too: braid_angle,rest_diameter,...")
-    ] = None,
-    prior: Annotated[
-        str | None,
-        typer.Option(
-            help=(
-                'What is known of moduli: "modulus_slope=10, modulus_offset=10 MPa"; needs --noise.'
-            )
-        ),
-    ] = None,
-    noise: Annotated[
-        str | None,
-        typer.Option(help='Standard deviation of the forces: "5 N", or "0.5 %" of the largest.'),
-    ] = None,
-    levels: Annotated[
-        str | None, typer.Option(help="Fit on these pressures only: 200kPa,400kPa,6bar.")
-    ] = None,
-    per_level: Annotated[
-        bool, typer.Option("--per-level", help="Moduli free at each pressure.")
-    ] = False,
-    friction: Annotated[
-        FrictionChoice | None,
-        typer.Option(
-            help=(
-                "fit: to the loops, before the moduli; muscle: as the muscle has it; none. By "
-                "default fit where the rows have both directions and the muscle no friction."
-            )
-        ),
-    ] = None,
-    compare: Annotated[
-        bool, typer.Option("--compare", help="Fit every model and rank them.")
-    ] = False,
-    report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
-    rig: Annotated[
-        Path | None,
-        typer.Option(
-            help=(
-                "Write a rig file with the fitted muscle: that of --muscle, or a new one with the "
-                "muscle alone."
-            )
-        ),
-    ] = None,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+    free: _Free = None,
+    prior: _Prior = None,
+    noise: _Noise = None,
+    levels: _Levels = None,
+    per_level: _PerLevel = False,
+    friction: _Friction = None,
+    compare: _Compare = False,
+    report: _Report = None,
+    rig: _FittedRig = None,
+    json: _Result = None,
     png: _Picture = None,
     allow_outside: _Outside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
     outputs = _Outputs(report=report, rig=rig, json=json, png=png)
-    check_writable(report, rig, json, png)
-    drawn = ["matplotlib"] if report or png else []
-    check_packages("report", *(["jinja2", "markupsafe"] if report else []), *drawn)
-    if per_level and rig is not None:
-        raise typer.BadParameter(
-            "a rig needs moduli linear in pressure: leave out --per-level or --rig"
-        )
+    _check_outputs(outputs, per_level=per_level)
     sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
     inputs = _inputs(data, muscle, sizes, where or [], clipped, allow_outside)
     shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
-    from pamrs.fit import FitError, fit_muscle
-
-    map_, moduli = inputs.data, "per_level" if per_level else "linear"
-    with progress(f"fitting {map_.label}"):
-        try:
-            start, rubbing, words = _rubbing(map_, inputs.muscle, friction, model, shape["levels"])
-            fit = fit_muscle(map_, start, model=model, order=order, moduli=moduli, **shape)
-            comparison = _comparison(map_, start, fit.order, shape) if compare else None
-            contents = _contents(fit, comparison, rubbing, _command(context), inputs.rig, outputs)
-            summary = _summary(fit, comparison, words, notes)
-        except FitError as error:
-            raise FitError("; ".join([str(error), *map_.notes])) from error
+    asked = _Asked(model, order, "per_level" if per_level else "linear", friction, compare)
+    summary, contents = _results(inputs, asked, shape, notes, _command(context), outputs)
     typer.echo(summary, nl=False)
     write(contents)
     if rig is not None and inputs.rig is None:
@@ -180,6 +171,64 @@ def _muscle(
             ),
             err=True,
         )
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """How a muscle is to be fitted, beside what a comparison takes too."""
+
+    model: str | None
+    order: int | None
+    moduli: str
+    friction: FrictionChoice | None
+    compare: bool
+
+
+def _check_outputs(outputs: _Outputs, *, per_level: bool) -> None:
+    """Refuse files that cannot be written, before any work."""
+    report, rig, png = outputs.report, outputs.rig, outputs.png
+    check_writable(report, rig, outputs.json, png)
+    drawn = ["matplotlib"] if report or png else []
+    check_packages("report", *(["jinja2", "markupsafe"] if report else []), *drawn)
+    if per_level and rig is not None:
+        raise typer.BadParameter(
+            "a rig needs moduli linear in pressure: leave out --per-level or --rig"
+        )
+
+
+def _results(
+    inputs: _Inputs,
+    asked: _Asked,
+    shape: dict[str, Any],
+    notes: Sequence[str],
+    command: str,
+    outputs: _Outputs,
+) -> tuple[str, _Contents]:
+    """What to say of a fit, and every file to write."""
+    from pamrs.fit import FitError
+
+    with progress(f"fitting {inputs.data.label}"):
+        try:
+            fit, comparison, rubbing, words = _fitted(inputs, asked, shape)
+            contents = _contents(fit, comparison, rubbing, command, inputs.rig, outputs)
+            return _summary(fit, comparison, words, notes), contents
+        except FitError as error:
+            raise FitError("; ".join([str(error), *inputs.data.notes])) from error
+
+
+def _fitted(
+    inputs: _Inputs, asked: _Asked, shape: dict[str, Any]
+) -> tuple[MuscleFit, ModelComparison | None, FrictionFit | None, str]:
+    """The fit, every model beside it if that is asked for, and the friction with what to say of
+    it.
+    """
+    from pamrs.fit import fit_muscle
+
+    map_, model = inputs.data, asked.model
+    start, rubbing, words = _rubbing(map_, inputs.muscle, asked.friction, model, shape["levels"])
+    fit = fit_muscle(map_, start, model=model, order=asked.order, moduli=asked.moduli, **shape)
+    comparison = _comparison(map_, start, fit.order, shape) if asked.compare else None
+    return fit, comparison, rubbing, words
 
 
 @fit_app.command("map")
@@ -215,7 +264,7 @@ def _map(
 
     with progress(f"fitting {inputs.data.label}"):
         fit = fit_map(inputs.data, nodes=nodes)
-    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
+    contents: _Contents = {}
     if json is not None:
         contents[json] = _map_json(fit, inputs.data, _command(context))
     if rig is not None:
@@ -258,7 +307,7 @@ def _friction(
 
     with progress(f"fitting {map_.label}"):
         fit = fit_friction(map_, floor=floor)
-    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
+    contents: _Contents = {}
     if json is not None:
         contents[json] = _friction_json(fit, map_, _command(context))
     if png is not None:
@@ -584,11 +633,11 @@ def _contents(
     command: str,
     base: Rig | None,
     files: _Outputs,
-) -> dict[Path, str | bytes | Callable[[Path], object]]:
+) -> _Contents:
     """Every file to write with its content, or what draws it: what is text comes first."""
     from pamrs.fit import report as pages
 
-    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
+    contents: _Contents = {}
     if files.json is not None:
         contents[files.json] = _json(fit, comparison, friction, command)
     if files.rig is not None:

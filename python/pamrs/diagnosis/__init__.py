@@ -212,9 +212,9 @@ def diagnose(
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
     suspected = suspected_units(case)
-    case, held = _nominal(case)
     chosen = DiagnosisSettings() if settings is None else settings
     try:
+        case, held = _nominal(case, chosen)
         check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
@@ -295,11 +295,11 @@ def _check_rig(case: Case) -> None:
             )
 
 
-def _nominal(case: Case) -> tuple[Case, list[str]]:
+def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     """The case with the rig that its recordings were made on as far as that is known before any
     fit, and what that is, in words.
     """
-    rig, said = at_ambient(case.rig, case.recordings)
+    rig, said = at_ambient(case.rig, case.recordings, settings.plausibility)
     return case.with_rig(without_passing(rig)), [*said, *_said_of_held(rig)]
 
 

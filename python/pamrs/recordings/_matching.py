@@ -42,12 +42,14 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
         ("temperature", "temperature temp temperatur", "thermo tc air"),
         (
             "ambient_temperature",
-            "ambient umgebung room raum raumtemperatur tamb troom",
-            "temperature temp temperatur thermo tc air",
+            "ambient umgebung room raum umgebungstemperatur raumtemperatur tamb troom",
+            "temperature temp temperatur thermo tc umgebungstemperatur raumtemperatur tamb troom",
         ),
         ("reference", "reference ref desired target sollwert", "soll wanted"),
     )
 }
+#: Channels that a diagnosis sets the rig by: no weak word, and no unit, names them alone.
+_ONLY_NAMED: Final = frozenset({"ambient_temperature"})
 _NOT: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error")
@@ -111,7 +113,7 @@ def channels_of(rig: Rig | None) -> list[str]:
     Returns
     -------
     list of str
-        With the names of its blocks.
+        With the names of its blocks; at the end the ambient temperature, which has none.
     """
     if rig is None:
         return [name for name in CHANNELS if name != "time"]
@@ -129,7 +131,7 @@ def channels_of(rig: Rig | None) -> list[str]:
     for name, table in rig.tables("supply").items():
         if table["kind"] == "regulator":
             found.append(dotted("supply_command", name))
-    return found
+    return [*found, *sorted(_ONLY_NAMED)]
 
 
 def matched(
@@ -192,6 +194,10 @@ def _score(series: Series, name: str, several: bool, remarks: list[str]) -> floa
     else:
         strong, weak = _WORDS[channel]
         score = 3.0 * len(strong & set(words)) + 1.0 * len(weak & set(words))
+        if channel in _ONLY_NAMED:
+            if not strong & set(words) or not (weak & set(words) or understood_unit(series.unit)):
+                return 0.0
+            score += 2.0  # where it is says more than that it is a temperature
         score += 2.0 if channel in "_".join(words) else 0.0
     if block and set(words_of(block)) <= set(words):
         score += 2.0
@@ -223,6 +229,8 @@ def _lonely(
     """The only series of a dimension, for the only channel of that dimension that is left."""
     found = []
     for column, name in enumerate(wanted):
+        if channel_of(name) in _ONLY_NAMED:
+            continue
         unit = CHANNELS[channel_of(name)].unit
         rivals = [other for other in wanted if CHANNELS[channel_of(other)].unit == unit]
         rows = [

@@ -16,7 +16,7 @@ from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
 from pamrs.recordings._matching import Match, channels_of, matched, words_of
-from pamrs.recordings._several_clocks import UNTOLD
+from pamrs.recordings._several_clocks import SLOW, UNTOLD
 from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.rig import Rig
@@ -270,8 +270,8 @@ def _proposal(
             )
     remarks += _rates({m.channel: times[m.channel] for m in matches if not m.hold})
     remarks += _suspect(matches, rig)
-    missing = [name for name in wanted if name not in times] if rig is not None else []
-    if missing:
+    missing = [name for name in wanted if name not in times and channel_of(name) not in SLOW]
+    if missing and rig is not None:
         remarks.append(f"not found in this log: {', '.join(missing)}")
     stepped = [times[m.channel] for m in matches if not m.hold and times[m.channel] is not None]
     split, parts = _split(log, stepped[0] if stepped else None)

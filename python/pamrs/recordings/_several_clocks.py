@@ -15,12 +15,11 @@ from pamrs.recordings._clock import GAP, Array, Event, Grid, Mask, gaps, usual_i
 from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, judged
 
-__all__ = ["UNTOLD", "Sampled", "on_one_clock"]
+__all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock"]
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
-SLOW: Final = frozenset(
-    {"temperature", "ambient_temperature"}
-)  # need not last as long as the others
+#: No block needs them, and they need not last as long as the others.
+SLOW: Final = frozenset({"temperature", "ambient_temperature"})
 #: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
 UNTOLD: Final = SLOW | COMMANDS
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most

@@ -7,20 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from pamrs.channels import channel_of
+from pamrs.diagnosis.settings import PlausibilitySettings
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
-from pamrs.rig import Rig
+from pamrs.rig import Parameter, Rig
 
 __all__ = ["AMBIENT", "at_ambient"]
 
 AMBIENT = "ambient_temperature"
 _NAME = "gas.temperature"
-_SPREAD = 3.0
-"""Kelvin between the recordings from which one temperature for all is said to be none: one percent
-of the flow through a valve at the most."""
 
 
-def at_ambient(rig: Rig, recordings: Sequence[Recording]) -> tuple[Rig, list[str]]:
+def at_ambient(
+    rig: Rig, recordings: Sequence[Recording], settings: PlausibilitySettings
+) -> tuple[Rig, list[str]]:
     """A rig at the ambient temperature of its recordings.
 
     Supplies, walls and the air around are at ``gas.temperature``. It has one value in a case: the
@@ -31,38 +31,71 @@ def at_ambient(rig: Rig, recordings: Sequence[Recording]) -> tuple[Rig, list[str
     rig : Rig
         The nominal model.
     recordings : sequence of Recording
-        Those of a case; any of them may have the channel ``ambient_temperature``.
+        Those of a case; any of them may have the channel ``ambient_temperature``, of which masked
+        samples do not count.
+    settings : PlausibilitySettings
+        Which temperatures rooms have, and how far from that of the rig file they may be.
 
     Returns
     -------
     rig : Rig
     said : list of str
-        What was set, in words.
+        What was set, in words, and what makes one doubt it.
 
     Raises
     ------
     DiagnosisError
-        If the temperature is outside of what a rig can have.
+        If no room, or no rig, can have a temperature.
     """
-    found = {
-        r.name: float(np.median(values[np.isfinite(values)]))
+    found = [
+        (r.name, float(np.median(values[good])))
         for r in recordings
         for name, values in r.channels.items()
-        if channel_of(name) == AMBIENT and np.isfinite(values).any()
-    }
+        if channel_of(name) == AMBIENT and (good := r.mask[name] & np.isfinite(values)).any()
+    ]
     if not found:
         return rig, []
-    value = float(np.median(list(found.values())))
-    before = rig.parameter(_NAME).value
+    low, high = settings.least_room, settings.most_room
+    wrong = [f"{name} ({value:.1f} K)" for name, value in found if not low <= value <= high]
+    if wrong:
+        raise DiagnosisError(
+            f"{AMBIENT} of {', '.join(wrong)}: no room has it, {low:g} to {high:g} K are allowed; "
+            "correct its unit or calibration, or leave the channel out"
+        )
+    value = float(np.median([one for _, one in found]))
+    before = rig.parameter(_NAME)
     try:
         moved = rig.with_parameters({_NAME: value})
     except ParameterError as error:
-        raise DiagnosisError(f"{AMBIENT} of {', '.join(found)}: {error}") from error
-    said = [f"{_NAME} is {value:.1f} K, as {AMBIENT} was measured ({before:.1f} K in the rig file)"]
-    low, high = min(found.values()), max(found.values())
-    if high - low > _SPREAD:
+        names = ", ".join(name for name, _ in found)
+        raise DiagnosisError(f"{AMBIENT} of {names}: {error}") from error
+    said = [
+        f"{_NAME} is {value:.1f} K, as {AMBIENT} was measured ({before.value:.1f} K in the rig "
+        "file)",
+        *_doubted(value, before, settings),
+    ]
+    low, high = min(one for _, one in found), max(one for _, one in found)
+    if high - low > settings.most_room_spread:
         said.append(
             f"{AMBIENT} differs between the recordings, from {low:.1f} to {high:.1f} K; all of "
             f"them are judged at {value:.1f} K"
         )
     return moved, said
+
+
+def _doubted(value: float, stated: Parameter, settings: PlausibilitySettings) -> list[str]:
+    """A sentence where a measured temperature is far from what the rig file states of it."""
+    if not stated.known:
+        return []
+    limits = [settings.most_room_change]
+    if stated.tol > 0.0:
+        limits.append(settings.room_tolerances * stated.tol)
+    away = abs(value - stated.value)
+    if away <= min(limits):
+        return []
+    known = f" (known to {stated.tol:.2g} K)" if 0.0 < stated.tol < np.inf else ""
+    return [
+        f"{AMBIENT} is {away:.1f} K away from {_NAME} of the rig file{known}: a sensor that is not "
+        "connected, or lies elsewhere, reads so, and all that flows is judged by it; leave the "
+        "channel out where it is none of the room"
+    ]

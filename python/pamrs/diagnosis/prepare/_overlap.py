@@ -71,14 +71,14 @@ def without_copies(
     said : list of str
         A sentence for each of which something was left out.
     """
-    order = [r for r in recordings if r.role == "fit"]
-    kept: dict[int, list[Recording]] = {}
+    places = range(len(recordings))
+    kept: dict[int, list[Recording]] = {}  # by place: one recording may be listed twice
     said: list[str] = []
-    for recording in [*order, *(r for r in recordings if r.role != "fit")]:
+    for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept.values() for one in parts]
-        kept[id(recording)], told = _new_in(recording, before, settings)
+        kept[place], told = _new_in(recordings[place], before, settings)
         said += told
-    return [one for r in recordings for one in kept[id(r)]], said
+    return [one for place in places for one in kept[place]], said
 
 
 def _new_in(

@@ -462,6 +462,44 @@ class PlausibilitySettings(SettingsGroup):
         reason="sample time at which the motion of a joint or load can still be followed",
         origin="judgement",
     )
+    least_room: float = setting(
+        250.0,
+        unit="K",
+        above=0.0,
+        reason="ambient temperature below which a recording is none of a room",
+        origin="judgement: a cold store; degC with an offset of a sensor are below it",
+    )
+    most_room: float = setting(
+        330.0,
+        unit="K",
+        above=0.0,
+        reason="ambient temperature above which a recording is none of a room",
+        origin="judgement: beside an oven; degF under a heading in K are above it",
+    )
+    room_tolerances: float = setting(
+        3.0,
+        unit="tolerances",
+        above=0.0,
+        reason="distance of a measured ambient temperature from that of the rig file, where that "
+        "states one, from which it may be another one",
+        origin="judgement",
+    )
+    most_room_change: float = setting(
+        15.0,
+        unit="K",
+        above=0.0,
+        reason="the same at the most: an input that nothing is connected to reads 0 degC, 20 K "
+        "below a usual room",
+        origin="judgement",
+    )
+    most_room_spread: float = setting(
+        3.0,
+        unit="K",
+        least=0.0,
+        reason="difference between the ambient temperatures of recordings from which it is said "
+        "that one is taken for all: one percent of the flow through a valve at the most",
+        origin="judgement",
+    )
     frozen_tank_change: float = setting(
         2e4,
         unit="Pa",

@@ -41,10 +41,7 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
     unread: dict[str, str] = {}
 
     def take(name: str, item: Any) -> None:
-        if not isinstance(item, h5py.Dataset):
-            return
-        if there := _elsewhere(item):
-            unread[name] = there
+        if not isinstance(item, h5py.Dataset) or _elsewhere(item):
             return
         if item.ndim > 2 or item.dtype.kind not in "biufV" or item.size < 2:
             unread[name] = f"it has the shape {item.shape} and the type {item.dtype}"
@@ -57,12 +54,14 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
             found.append(Series(made.name, made.values, unit, _clock(item, len(made.values))))
 
     with h5py.File(path, "r") as file:
+        unread |= leads_elsewhere(file)
         file.visititems(take)
     return collected(path, found, unread)
 
 
 def _elsewhere(item: Any) -> str:
-    """Why a data set is not read whose numbers another file holds.
+    """Why a data set is not read whose numbers another file holds, or other data sets, which may
+    have them from there.
 
     Parameters
     ----------
@@ -74,36 +73,46 @@ def _elsewhere(item: Any) -> str:
     str
         ``""`` where it has its own.
     """
+    if item.is_virtual and all(source.file_name == "." for source in item.virtual_sources()):
+        return "it is virtual, a view of other data sets; copy its numbers into one of its own"
     if item.external or item.is_virtual:
         return "its numbers lie in another file; copy them into this one"
     return ""
 
 
 def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
-    """What in a group, or below it, leads to other files.
+    """What in a group, or below it, leads to other files, or is a view that may.
 
     Parameters
     ----------
     group : h5py.Group
-        Links to other files are not followed.
+        Links to other files are not followed. What has several names is looked at once.
 
     Yields
     ------
     name, why : str
+        The path from `group`.
     """
     import h5py
 
-    for name in group:
-        link = group.get(name, getlink=True)
-        if isinstance(link, h5py.ExternalLink):
-            yield name, f"it is a link to {link.filename!r}; copy what that holds into this file"
-        elif isinstance(link, h5py.HardLink):
-            item = group[name]
-            if isinstance(item, h5py.Dataset):
-                why = _elsewhere(item)
-                yield from [(item.name, why)] if why else []
-            elif isinstance(item, h5py.Group):
-                yield from leads_elsewhere(item)
+    def address(of: Any) -> int:
+        return int(h5py.h5o.get_info(of.id).addr)
+
+    seen = {address(group)}
+    left = [("", group)]
+    while left:
+        path, inside = left.pop()
+        for own in inside:
+            name, link = path + own, inside.get(own, getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                why = f"it is a link to {link.filename!r}; copy what that holds into this file"
+                yield name, why
+            elif isinstance(link, h5py.HardLink) and address(item := inside[own]) not in seen:
+                seen.add(address(item))
+                if isinstance(item, h5py.Group):
+                    left.append((f"{name}/", item))
+                elif isinstance(item, h5py.Dataset) and (why := _elsewhere(item)):
+                    yield name, why
 
 
 def _unit(item: Any) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +17,7 @@ __all__ = ["read_bag", "read_mcap"]
 
 _MOST_ELEMENTS: Final = 64  # of an array in a message; longer ones are images and the like
 _DEEPEST: Final = 8
+_OF_ADDRESSES: Final = frozenset("%?#")  # rosbags opens a bag by an address, which SQLite decodes
 
 _Messages = Iterable[tuple[str, int, Any]]
 
@@ -34,7 +36,14 @@ def read_bag(path: Path, form: TextFormat) -> Log:
     -------
     Log
         As :func:`read_mcap`.
+
+    Raises
+    ------
+    RecordingError
+        If the path of a bag of ROS 2, or a name in its folder, has a mark by which SQLite would
+        read another file, or if no message has numbers.
     """
+    _check_names(path)
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
@@ -53,6 +62,19 @@ def read_bag(path: Path, form: TextFormat) -> Log:
 
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
         return _collected(path, messages(reader), unread)
+
+
+def _check_names(path: Path) -> None:
+    """Refuse a bag of ROS 2 by whose names SQLite would read another file: ``..%2fother.db3``."""
+    if path.suffix == ".bag":  # of ROS 1, no SQLite
+        return
+    inside = (name for _, *names in os.walk(path) for name in sum(names, []))
+    wrong = next((name for name in (str(path), *inside) if _OF_ADDRESSES & set(name)), None)
+    if wrong is not None:
+        raise RecordingError(
+            f"{path}: {wrong!r}: names with %, ? or # are not read from bags (SQLite would read "
+            "another file); rename it"
+        )
 
 
 def read_mcap(path: Path, form: TextFormat) -> Log:
