@@ -30,7 +30,7 @@ from pamrs.control.stability import (
 )
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.control.helpers import CONDUCTANCE
+from tests.control.helpers import CONDUCTANCE, with_regulator
 
 PERIOD = 0.005
 ELBOW = math.radians(45.0)
@@ -239,6 +239,18 @@ def test_a_regulated_rig_has_its_set_pressure_as_input():
     for k, name in enumerate(model.states):
         moved = run[name] - run[name][0]
         assert moved == pytest.approx(x[:, k], abs=0.01 * np.abs(x[:, k]).max()), name
+
+
+@pytest.mark.parametrize("name", ["shoulder", "throttled_supply"])
+def test_a_regulator_in_front_of_a_valve_is_held(name):
+    """In front of it, or behind a line and its volume: the loop is that of the valve."""
+    rig = with_regulator(pamrs.rigs.named(name))
+    known = RigModel(rig)
+    controller = RigController(known, known.law("sliding", period=PERIOD))
+    model = linearise(rig, initial=controller.holding(ELBOW))
+    assert model.inputs == ("valve_command",)
+    assert "supply_pressure" not in model.states
+    assert margins(model, linear_controller(controller, model.point)).stable
 
 
 def test_a_map_of_stable_gains_takes_rigs_of_several_valves():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
+from pamrs.control._groups import direct_regulators
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator, core_rig, initial_names
@@ -315,11 +316,9 @@ def linearise(
 
 def _held_supplies(rig: Rig) -> tuple[str, ...]:
     """Supplies that change slowly, or not by a command: all but regulators without a valve."""
-    behind = {ports["from"] for ports in rig.ports("valve").values()}
+    direct = direct_regulators(rig)
     return tuple(
-        dotted("supply_pressure", name)
-        for name, table in rig.tables("supply").items()
-        if table.get("kind") != "regulator" or dotted("supply", name) in behind
+        dotted("supply_pressure", name) for name in rig.tables("supply") if name not in direct
     )
 
 
