@@ -570,6 +570,41 @@ def test_every_valve_gets_its_safe_command_at_ctrl_c_and_after_an_error():
         assert device.written[-1] == (pytest.approx(1.0), dict.fromkeys(VALVES, 5.0))
 
 
+def test_a_driver_that_uses_up_its_commands_gets_all_of_them_again():
+    class Popping(SimulatedDevice):
+        failures = 2
+
+        def write(self, command):
+            if self.clock.now() >= 1.0 and self.failures:
+                self.failures -= 1
+                command.popitem()
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Popping(PAIR.rig, clock, lost_from=1.0)
+    controller = RigController(PAIR, PAIR.law("sliding", period=0.01))
+    run = run_live(device, controller, TURN, clock=clock, stamp="time", most_missed=3)
+    assert run.reason == "lost_sensor"
+    assert device.failures == 0
+    assert device.written[-1][1] == run.safe_command == dict.fromkeys(VALVES, 5.0)
+
+
+def test_a_driver_that_never_writes_is_told_with_every_command():
+    class Popping(SimulatedDevice):
+        def write(self, command):
+            if self.clock.now() >= 1.0:
+                command.popitem()
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Popping(PAIR.rig, clock, lost_from=1.0)
+    controller = RigController(PAIR, PAIR.law("sliding", period=0.01))
+    with pytest.raises(LiveError, match=r"safe commands {.*flexor': 5.0, .*extensor': 5.0} could"):
+        run_live(device, controller, TURN, clock=clock, stamp="time", most_missed=3)
+
+
 def test_each_command_is_kept_within_its_own_limits():
     free, _ = rig_live(PAIR)
     assert all(values.min() < 3.0 for values in free.command.values())
