@@ -30,7 +30,7 @@ from pamrs.control.stability import (
 )
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.control.helpers import CONDUCTANCE, with_regulator
+from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator
 
 PERIOD = 0.005
 ELBOW = math.radians(45.0)
@@ -276,6 +276,35 @@ def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
     alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
     assert region.radius[0, 1] >= alone > 1.0
     assert region.stable.tolist() == [[True, False]]
+
+
+class Reordered(SmallPid):
+    """Answers two valves, named in another order where the joint is too high, or one of them."""
+
+    answers = "inputs"
+    tracked = ("joint_angle.elbow",)
+
+    def __init__(self, one=False):
+        super().__init__(kp=2.0, ki=1.0, kd=0.0, period=PERIOD)
+        self.one = one
+
+    def update(self, time, measurement, reference):
+        angle = measurement["joint_angle.elbow"]
+        u = super().update(time, {"joint_angle": angle, "joint_rate": 0.0}, reference)
+        answer = {"flexor": u, "extensor": 10.0 - 2.0 * (u - 5.0)}
+        if angle > reference.angle:
+            answer = dict(list(answer.items())[::-1][: 1 if self.one else 2])
+        return {"valve_command": answer}
+
+
+def test_commands_are_taken_by_their_names():
+    point = {"joint_angle.elbow": 0.5}
+    found = linear_controller(Reordered(), point)
+    assert found.outputs == ("valve_command.flexor", "valve_command.extensor")
+    assert found.d[:, 0] == pytest.approx([-2.0, 4.0], rel=1e-6)
+    assert found.c[:, 0] == pytest.approx([1.0, -2.0], rel=1e-6)
+    with pytest.raises(ParameterError, match="answered valve_command.extensor: valve_command.fl"):
+        linear_controller(Reordered(one=True), point)
 
 
 def test_what_cannot_be_is_named(held):

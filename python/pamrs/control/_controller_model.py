@@ -234,9 +234,22 @@ class _Update:
         """Every float of the state after the update, and behind them the commands."""
         self.controller.restore(state)
         answer: Any = self.controller.update(self.now, sample, self.reference)
-        commands = [answer] if self.names == ("",) else [value for _, value in commands_of(answer)]
         after = self.controller.state
-        return np.array([*(_at(after, path) for path in self.paths), *map(float, commands)])
+        return np.array(
+            [*(_at(after, path) for path in self.paths), *map(float, self._commands(answer))]
+        )
+
+    def _commands(self, answer: Any) -> list[Any]:
+        """Commands of an answer in the order of the names, whatever its own is."""
+        if self.names == ("",):
+            return [answer]
+        given = dict(commands_of(answer))
+        if set(given) != set(self.names):
+            raise ParameterError(
+                f"the controller answered {', '.join(given) or 'nothing'}: "
+                f"{', '.join(self.names)} are needed, as at the operating point"
+            )
+        return [given[name] for name in self.names]
 
 
 def _slopes(
