@@ -14,6 +14,7 @@ from pamrs.control import (
     ArmModel,
     Cascade,
     PressureLoop,
+    Recruitment,
     Reference,
     RigController,
     RigModel,
@@ -276,6 +277,79 @@ def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
     alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
     assert region.radius[0, 1] >= alone > 1.0
     assert region.stable.tolist() == [[True, False]]
+
+
+def recruited(rig, share=Recruitment):
+    known = RigModel(rig)
+    return RigController(
+        known,
+        known.law("sliding", period=PERIOD),
+        shares=share(
+            known.torques_of("shoulder"),
+            known.pressure_limit,
+            period=PERIOD,
+            reach=math.radians(60.0),
+        ),
+    )
+
+
+@pytest.mark.parametrize("degrees", range(20, 120, 12))
+def test_what_a_share_of_groups_asks_for_holds_too(degrees):
+    """Pairs without air bow out and push a little, which the share does not count."""
+    rig, angle = pamrs.rigs.named("recruitment"), math.radians(degrees)
+    controller = recruited(rig)
+    before = controller.state
+    start = controller.holding(angle)
+    assert controller.state == before
+    assert start["muscle_pressure.pair_2"] == start["muscle_pressure.pair_3"] == 0.0
+    run = pamrs.simulate(
+        rig,
+        {name: np.full(501, 5.0) for name in rig.tables("valve")},
+        sample_time=0.001,
+        initial=start,
+    )
+    assert np.abs(run["joint_angle.shoulder"] - angle).max() < 1e-7
+    linearise(rig, initial=start)
+    # one pair holds the arm and what the others push, 3.5 N for each muscle at its lever
+    c1, c2 = RigModel(rig).torques_of("shoulder")[0].at(angle)
+    asked = c1 * start["muscle_pressure.pair_1"] + c2
+    pushed = (
+        4.0 * 3.5 * float(pamrs.Joint.from_model(rig.tables("joint")["shoulder"]).torque_arm(angle))
+    )
+    assert asked - RigModel(rig).arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
+
+
+def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
+    regulated = RigModel(pamrs.rigs.named("regulated_joint"), pressure_limit=1e6)
+    model = pamrs.rigs.shoulder().model
+    del model["valve"], model["supply"]
+    prescribed = RigModel(pamrs.Rig("prescribed", model), pressure_limit=1e6)
+    for known in (regulated, prescribed):
+        start = RigController(known, known.law("sliding", period=PERIOD)).holding(ELBOW)
+        held = np.full(501, start["muscle_pressure"])
+        name = "supply_command" if known is regulated else "pressure"
+        run = pamrs.simulate(known.rig, **{name: held}, sample_time=0.001, initial=start)
+        assert np.abs(run["joint_angle"] - ELBOW).max() < 1e-6
+
+
+def test_a_share_that_cannot_hold_is_named_and_changes_nothing():
+    rig = pamrs.rigs.named("recruitment").with_parameters({"arm.payload": 60.0})
+    controller = recruited(rig)  # one pair at first, and three could
+    before = controller.state
+    with pytest.raises(ParameterError, match=r"hold joint_angle.shoulder = 1.57.*rad/s2"):
+        controller.holding(0.5 * math.pi)
+    assert controller.state == before
+
+    class Failing(Recruitment):
+        def pressures(self, demand):
+            super().pressures(demand)
+            raise ZeroDivisionError("oh")
+
+    controller = recruited(rig, Failing)
+    before = controller.state
+    with pytest.raises(ZeroDivisionError):
+        controller.holding(ELBOW)
+    assert controller.state == before
 
 
 class Reordered(SmallPid):
