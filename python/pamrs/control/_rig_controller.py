@@ -425,18 +425,8 @@ class RigController(SampledController):
             If there is not an angle for each joint within its range, or no pressures up to the
             limit hold them, or none that the shares give.
         """
-        arm, joints, rest_length = self.model.arm, len(self.joints), self._rest_length
-        at = np.asarray(angle, dtype=np.float64)
-        if rest_length is not None:
-            at = rest_length - at
-        low, high = (np.broadcast_to(end, joints) for end in arm.angle_range)
-        if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
-            ends = (low, high) if rest_length is None else (rest_length - high, rest_length - low)
-            raise ParameterError(
-                f"angle = {angle!r} is not allowed: {joints} from {ends[0].tolist()} to "
-                f"{ends[1].tolist()} are needed"
-            )
-        rows: Any = float(at.ravel()[0]) if joints == 1 else at.ravel()
+        arm, joints = self.model.arm, len(self.joints)
+        rows = self._rows_held(angle)
         still = rows * 0.0
         c1, c2 = arm.torque.at(rows)
         torque = arm.inverse_dynamics(rows, still, still, still)
@@ -460,8 +450,24 @@ class RigController(SampledController):
         k = int(np.argmax(np.abs(moved) / limits))
         raise ParameterError(
             f"no pressures hold {self.tracked[k]} = {np.ravel(angle)[k]:g}: at those that the "
-            f"shares give it is moved with {moved[k] / SAMPLE:.3g} {unit_of(self._channels[1][k])}2"
+            f"shares give it is accelerated by {abs(moved[k]) / SAMPLE:.3g} "
+            f"{unit_of(self._channels[1][k])}2"
         )
+
+    def _rows_held(self, angle: ArrayLike) -> Any:
+        """The angles that are to be held as the model has them, within their ranges."""
+        joints, rest_length = len(self.joints), self._rest_length
+        at = np.asarray(angle, dtype=np.float64)
+        if rest_length is not None:
+            at = rest_length - at
+        low, high = (np.broadcast_to(end, joints) for end in self.model.arm.angle_range)
+        if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
+            ends = (low, high) if rest_length is None else (rest_length - high, rest_length - low)
+            raise ParameterError(
+                f"angle = {angle!r} is not allowed: {joints} from {ends[0].tolist()} to "
+                f"{ends[1].tolist()} are needed"
+            )
+        return float(at.ravel()[0]) if joints == 1 else at.ravel()
 
     def _check_drive(self, drive: Value, rows: Value, angle: ArrayLike) -> None:
         """Refuse angles whose drive is out of reach."""
