@@ -1,5 +1,5 @@
 """A small PID for the tests of everything around controllers, whose gains may be arrays, one for
-each plant of a batch; a rig with another valve.
+each plant of a batch; rigs with another valve or supply.
 """
 
 import numpy as np
@@ -19,6 +19,14 @@ def with_iso_valve(rig, fill, vent):
     table["flow"] = "iso_6358"
     for way, (conductance, ratio) in (("fill", fill), ("vent", vent)):
         table[f"{way}_conductance"], table[f"{way}_critical_ratio"] = conductance, ratio
+    return pamrs.Rig(rig.name, model)
+
+
+def with_regulator(rig, **changes):
+    """A rig whose only supply is a regulator that begins at what the supply held."""
+    model = rig.model
+    model["supply"].pop("volume", None)
+    model["supply"] |= {"kind": "regulator", "time_constant": 0.05, **changes}
     return pamrs.Rig(rig.name, model)
 
 

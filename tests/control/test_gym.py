@@ -16,6 +16,7 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 from pamrs.control import RigController, RigModel, closed_loop  # noqa: E402
 from pamrs.control import gym as gym_module  # noqa: E402
 from pamrs.control.trajectories import lift_hold_return  # noqa: E402
+from tests.control.helpers import with_regulator  # noqa: E402
 
 #: A plant that leaves the range of its model within a sample.
 BREAKING = {"joint_angle": 0.5, "joint_rate": -500.0}
@@ -214,6 +215,44 @@ def test_a_step_of_two_joints_is_the_simulators():
         assert info["error"] == pytest.approx(error)
         assert info["commands"] == pytest.approx(5.0 + 5.0 * action)
         last = action
+
+
+@pytest.mark.parametrize("name", ["shoulder", "throttled_supply"])
+def test_a_regulator_in_front_of_a_valve_is_no_action(name):
+    """In front of it, or behind a line and its volume: it holds what it begins with."""
+    rig = with_regulator(pamrs.rigs.named(name))
+    for env in (of(rig, SHORT), gym_module.RigVectorEnv(2, rig, SHORT)):
+        assert env.action_space.shape[-1] == 1
+        env.reset(seed=1)
+    env = of(rig, SHORT)
+    assert env.inputs == ("valve_command",)
+    env.reset()
+    simulator = pamrs.Simulator(rig, sample_time=0.02)
+    for _ in range(5):
+        seen, *_, info = env.step(np.ones(1, dtype=np.float32))
+        sample = simulator.step(10.0)
+        assert seen[0] == pytest.approx(sample["joint_angle"], rel=1e-6)
+        assert info["valve_command"] == 10.0
+    begins = rig.tables("supply")[""]["initial_pressure"]
+    assert sample["supply_pressure"] == pytest.approx(begins, rel=1e-3)
+
+
+def fed_by_a_chamber(pressure):
+    """The shoulder whose valve is fed by a vessel in the place of the supply."""
+    model = pamrs.rigs.named("throttled_supply").model
+    del model["supply"], model["line"]["feed"]
+    model["chamber"]["feed"] |= {"initial_pressure": pressure, "dead_volume": 0.015}
+    return pamrs.Rig("vessel", model)
+
+
+def test_a_vessel_may_feed_the_valve():
+    env = of(fed_by_a_chamber(9e5), SHORT)
+    names = [name for name in env.names if name.startswith("muscle_pressure")]
+    high = [env.observation_space.high[env.names.index(name)] for name in names]
+    assert high == [1.8e6] * 2
+    check_env(env, skip_render_check=True)
+    with pytest.raises(ParameterError, match="vessel.*begin with 0 Pa at most"):
+        of(fed_by_a_chamber(0.0), SHORT)
 
 
 def test_a_regulator_is_set_from_nothing_to_its_limit():

@@ -14,6 +14,7 @@ from pamrs.control import (
     ArmModel,
     Cascade,
     PressureLoop,
+    Recruitment,
     Reference,
     RigController,
     RigModel,
@@ -30,7 +31,7 @@ from pamrs.control.stability import (
 )
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
-from tests.control.helpers import CONDUCTANCE
+from tests.control.helpers import CONDUCTANCE, SmallPid, with_regulator
 
 PERIOD = 0.005
 ELBOW = math.radians(45.0)
@@ -241,6 +242,18 @@ def test_a_regulated_rig_has_its_set_pressure_as_input():
         assert moved == pytest.approx(x[:, k], abs=0.01 * np.abs(x[:, k]).max()), name
 
 
+@pytest.mark.parametrize("name", ["shoulder", "throttled_supply"])
+def test_a_regulator_in_front_of_a_valve_is_held(name):
+    """In front of it, or behind a line and its volume: the loop is that of the valve."""
+    rig = with_regulator(pamrs.rigs.named(name))
+    known = RigModel(rig)
+    controller = RigController(known, known.law("sliding", period=PERIOD))
+    model = linearise(rig, initial=controller.holding(ELBOW))
+    assert model.inputs == ("valve_command",)
+    assert "supply_pressure" not in model.states
+    assert margins(model, linear_controller(controller, model.point)).stable
+
+
 def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
     rig = even_valves("antagonistic_joint", ELBOW, stiffness=18.0)
 
@@ -264,6 +277,108 @@ def test_a_map_of_stable_gains_takes_rigs_of_several_valves():
     alone = spectral_radius(model, linear_controller(made(4e6), model.point), delay=0.005)
     assert region.radius[0, 1] >= alone > 1.0
     assert region.stable.tolist() == [[True, False]]
+
+
+def recruited(rig, share=Recruitment):
+    known = RigModel(rig)
+    return RigController(
+        known,
+        known.law("sliding", period=PERIOD),
+        shares=share(
+            known.torques_of("shoulder"),
+            known.pressure_limit,
+            period=PERIOD,
+            reach=math.radians(60.0),
+        ),
+    )
+
+
+@pytest.mark.parametrize("degrees", range(20, 120, 12))
+def test_what_a_share_of_groups_asks_for_holds_too(degrees):
+    """Pairs without air bow out and push a little, which the share does not count."""
+    rig, angle = pamrs.rigs.named("recruitment"), math.radians(degrees)
+    controller = recruited(rig)
+    before = controller.state
+    start = controller.holding(angle)
+    assert controller.state == before
+    assert start["muscle_pressure.pair_2"] == start["muscle_pressure.pair_3"] == 0.0
+    run = pamrs.simulate(
+        rig,
+        {name: np.full(501, 5.0) for name in rig.tables("valve")},
+        sample_time=0.001,
+        initial=start,
+    )
+    assert np.abs(run["joint_angle.shoulder"] - angle).max() < 1e-7
+    linearise(rig, initial=start)
+    # one pair holds the arm and what the others push, 3.5 N for each muscle at its lever
+    c1, c2 = RigModel(rig).torques_of("shoulder")[0].at(angle)
+    asked = c1 * start["muscle_pressure.pair_1"] + c2
+    pushed = (
+        4.0 * 3.5 * float(pamrs.Joint.from_model(rig.tables("joint")["shoulder"]).torque_arm(angle))
+    )
+    assert asked - RigModel(rig).arm.weight * math.sin(angle) == pytest.approx(pushed, rel=0.01)
+
+
+def test_a_regulator_and_a_pressure_that_is_prescribed_hold_too():
+    regulated = RigModel(pamrs.rigs.named("regulated_joint"), pressure_limit=1e6)
+    model = pamrs.rigs.shoulder().model
+    del model["valve"], model["supply"]
+    prescribed = RigModel(pamrs.Rig("prescribed", model), pressure_limit=1e6)
+    for known in (regulated, prescribed):
+        start = RigController(known, known.law("sliding", period=PERIOD)).holding(ELBOW)
+        held = np.full(501, start["muscle_pressure"])
+        name = "supply_command" if known is regulated else "pressure"
+        run = pamrs.simulate(known.rig, **{name: held}, sample_time=0.001, initial=start)
+        assert np.abs(run["joint_angle"] - ELBOW).max() < 1e-6
+
+
+def test_a_share_that_cannot_hold_is_named_and_changes_nothing():
+    rig = pamrs.rigs.named("recruitment").with_parameters({"arm.payload": 60.0})
+    controller = recruited(rig)  # one pair at first, and three could
+    before = controller.state
+    with pytest.raises(ParameterError, match=r"hold joint_angle.shoulder = 1.57.*by 4\.68 rad/s2"):
+        controller.holding(0.5 * math.pi)
+    assert controller.state == before
+
+    class Failing(Recruitment):
+        def pressures(self, demand):
+            super().pressures(demand)
+            raise ZeroDivisionError("oh")
+
+    controller = recruited(rig, Failing)
+    before = controller.state
+    with pytest.raises(ZeroDivisionError):
+        controller.holding(ELBOW)
+    assert controller.state == before
+
+
+class Reordered(SmallPid):
+    """Answers two valves, named in another order where the joint is too high, or one of them."""
+
+    answers = "inputs"
+    tracked = ("joint_angle.elbow",)
+
+    def __init__(self, one=False):
+        super().__init__(kp=2.0, ki=1.0, kd=0.0, period=PERIOD)
+        self.one = one
+
+    def update(self, time, measurement, reference):
+        angle = measurement["joint_angle.elbow"]
+        u = super().update(time, {"joint_angle": angle, "joint_rate": 0.0}, reference)
+        answer = {"flexor": u, "extensor": 10.0 - 2.0 * (u - 5.0)}
+        if angle > reference.angle:
+            answer = dict(list(answer.items())[::-1][: 1 if self.one else 2])
+        return {"valve_command": answer}
+
+
+def test_commands_are_taken_by_their_names():
+    point = {"joint_angle.elbow": 0.5}
+    found = linear_controller(Reordered(), point)
+    assert found.outputs == ("valve_command.flexor", "valve_command.extensor")
+    assert found.d[:, 0] == pytest.approx([-2.0, 4.0], rel=1e-6)
+    assert found.c[:, 0] == pytest.approx([1.0, -2.0], rel=1e-6)
+    with pytest.raises(ParameterError, match="answered valve_command.extensor: valve_command.fl"):
+        linear_controller(Reordered(one=True), point)
 
 
 def test_what_cannot_be_is_named(held):

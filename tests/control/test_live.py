@@ -20,6 +20,7 @@ from pamrs.control import (
     HysteresisCompensation,
     Parallel,
     RigController,
+    RigModel,
     closed_loop,
     sweep,
 )
@@ -28,7 +29,7 @@ from pamrs.control.simulated_device import FAULTS, SimulatedDevice, VirtualClock
 from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.errors import ParameterError
 from tests.control.cases import ARM, CONTROLLERS, DIAGNOSED, PAIR, REGULATED
-from tests.control.helpers import SmallPid
+from tests.control.helpers import SmallPid, with_regulator
 
 LIFT = lift_hold_return(*degrees(15, 50), ramp=2.0, hold=1.0, duration=5.0)
 
@@ -569,6 +570,41 @@ def test_every_valve_gets_its_safe_command_at_ctrl_c_and_after_an_error():
         assert device.written[-1] == (pytest.approx(1.0), dict.fromkeys(VALVES, 5.0))
 
 
+def test_a_driver_that_uses_up_its_commands_gets_all_of_them_again():
+    class Popping(SimulatedDevice):
+        failures = 2
+
+        def write(self, command):
+            if self.clock.now() >= 1.0 and self.failures:
+                self.failures -= 1
+                command.popitem()
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Popping(PAIR.rig, clock, lost_from=1.0)
+    controller = RigController(PAIR, PAIR.law("sliding", period=0.01))
+    run = run_live(device, controller, TURN, clock=clock, stamp="time", most_missed=3)
+    assert run.reason == "lost_sensor"
+    assert device.failures == 0
+    assert device.written[-1][1] == run.safe_command == dict.fromkeys(VALVES, 5.0)
+
+
+def test_a_driver_that_never_writes_is_told_with_every_command():
+    class Popping(SimulatedDevice):
+        def write(self, command):
+            if self.clock.now() >= 1.0:
+                command.popitem()
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Popping(PAIR.rig, clock, lost_from=1.0)
+    controller = RigController(PAIR, PAIR.law("sliding", period=0.01))
+    with pytest.raises(LiveError, match=r"safe commands {.*flexor': 5.0, .*extensor': 5.0} could"):
+        run_live(device, controller, TURN, clock=clock, stamp="time", most_missed=3)
+
+
 def test_each_command_is_kept_within_its_own_limits():
     free, _ = rig_live(PAIR)
     assert all(values.min() < 3.0 for values in free.command.values())
@@ -608,6 +644,40 @@ def test_a_controller_of_one_s_own_says_its_commands_by_the_safe_ones():
         run_live(
             OneValve(PAIR.rig, only), Both(period=0.01), TURN, clock=only, safe={VALVES[0]: 5.0}
         )
+
+
+@pytest.mark.parametrize("name", ["shoulder", "throttled_supply"])
+def test_a_regulator_in_front_of_a_valve_holds_what_it_begins_with(name):
+    """In front of it, or behind a line and its volume: the command is still that of the valve."""
+    rig = with_regulator(pamrs.rigs.named(name))
+    begins = rig.tables("supply")[""]["initial_pressure"]
+    run, device = live(rig)
+    alone = closed_loop(rig, SmallPid(period=0.01), LIFT, sample_time=0.001)
+    assert run.reason == "finished"
+    assert device.command == 5.0
+    assert run.channels["joint_angle"] == pytest.approx(alone.angle[:-1:10], abs=1e-9)
+    assert run.channels["supply_pressure"] == pytest.approx(np.full(500, begins))
+    model = RigModel(rig)
+    controller = RigController(model, model.law("sliding", period=0.01))
+    assert list(controller.command_ranges) == ["valve_command"]
+    clock = VirtualClock()
+    whole = run_live(SimulatedDevice(rig, clock), controller, LIFT, clock=clock)
+    alone = closed_loop(rig, controller, LIFT, sample_time=0.001)
+    assert whole.command == pytest.approx(alone.command["valve_command"][:-1:10], abs=1e-9)
+
+
+def test_a_regulator_in_front_of_a_valve_may_be_set_too():
+    rig, clock = with_regulator(pamrs.rigs.shoulder()), VirtualClock()
+    device = SimulatedDevice(rig, clock)
+    device.write({"valve_command": 5.0, "supply_command": 6e5})
+    clock.sleep(1.0)
+    device.write({"valve_command": 6.0})
+    clock.sleep(1.0)
+    assert device.read()["supply_pressure"] == pytest.approx(6e5, rel=1e-6)
+    assert device.command == 6.0
+    for wrong in ({"supply_command": 6e5}, {"valve_command": 5.0, "other": 1.0}, {}):
+        with pytest.raises(ParameterError, match="a number for each of valve_command is"):
+            device.write(wrong)
 
 
 class OneValve(SimulatedDevice):

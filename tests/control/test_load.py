@@ -164,6 +164,20 @@ def test_it_rests_where_it_is_held_and_has_a_linear_model():
     assert margins(model, linear).stable
 
 
+def test_rest_is_a_part_of_the_stroke():
+    """A limit of the shoulder's size, 1e-5 m/s, would let a mass pass that falls by 0.04 m/s2."""
+    start = RigController(MODEL, MODEL.law("sliding", period=PERIOD)).holding(0.25)
+    c1, _ = ARM.torque.at(ARM.rest_length - 0.25)
+    for acceleration, rests in ((1e-3, True), (1e-2, False)):
+        less = acceleration * RIG.tables("load")[""]["mass"] / c1
+        aside = {**start, "muscle_pressure": start["muscle_pressure"] - less}
+        if rests:
+            linearise(SMOOTH, initial=aside)
+            continue
+        with pytest.raises(ParameterError, match=r"length_rate is 2.*e-06 m/s.* does not rest"):
+            linearise(SMOOTH, initial=aside)
+
+
 def test_a_live_loop_and_many_plants_follow_a_length_too():
     controller = ByLength(PID(100.0, 100.0, period=0.01), RIG)
     alone = closed_loop(RIG, controller, LIFT, 2.0, sample_time=0.001)

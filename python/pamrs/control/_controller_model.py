@@ -107,29 +107,47 @@ def linear_controller(
     Raises
     ------
     ParameterError
-        If the side is unknown, the controller answers what is not a finite number, has a corner at
-        the point, or no measurement reaches its command: it is at a limit.
+        If the side is unknown, the controller answers what is not a finite number, or other
+        commands than at the point, has a corner there, or no measurement reaches its command: it
+        is at a limit.
     """
     if side not in SIDES:
         raise ParameterError(
             f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}"
         )
     whole_rig = controller.answers == "inputs"
-    kinds = (
-        [name for name in point if channel_of(name) in _WIDTHS]
-        if whole_rig
-        else [name for name in _OF_ONE if name in point]
+    inputs = tuple(
+        name
+        for name in (point if whole_rig else _OF_ONE)
+        if name in point and channel_of(name) in _WIDTHS
     )
-    inputs = tuple(kinds)
     reference = _resting(controller, point, angle)
     update = _Update(
         controller, dict(point), reference, _settled(controller, point, reference, state)
     )
     slopes, middle = _slopes(update, inputs, side)
     controller.reset()
-    n, m = len(update.paths), len(update.names)
+    n = len(update.paths)
     commands = middle[n:]
     whole = np.array([slope for slope, _ in slopes]).T
+    _refuse_deaf(update, whole, commands)
+    kept = _states(whole, n)
+    if side == "":
+        _refuse_corners(update, inputs, [step for _, step in slopes], kept)
+    read = _read(whole, n, kept) if whole_rig else list(range(len(inputs)))
+    columns = [n + k for k in read]
+    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, columns)]
+    c, d = whole[n:][:, kept], whole[n:][:, columns]
+    answer: Any = float(commands[0])
+    if whole_rig:
+        answer = dict(zip(update.names, commands.tolist(), strict=True))
+    named = tuple(inputs[k] for k in read)
+    return LinearController(a, b, c, d, named, controller.period, answer, update.names)
+
+
+def _refuse_deaf(update: _Update, whole: Array, commands: Array) -> None:
+    """Refuse slopes or commands that are not finite, and commands that no measurement moves."""
+    n = len(update.paths)
     if not (np.isfinite(whole).all() and np.isfinite(commands).all()):
         raise ParameterError(
             "the controller's command is not finite at the operating point: no linear model is "
@@ -144,26 +162,21 @@ def linear_controller(
             f"the controller answers {answered} whatever it measures: it is at a limit; give the "
             "state in which it holds the arm here"
         )
-    # an integral with a gain of zero is heard, but nothing moves it; it would count as a motion
-    # that never dies out
+
+
+def _states(whole: Array, n: int) -> list[int]:
+    """Those of n states that reach a command and are moved by a measurement: an integral with a
+    gain of zero is heard, but nothing moves it; it would count as a motion that never dies out.
+    """
     moved = heard(whole[:n, :n].T, np.abs(whole[:n, n:]).sum(axis=1))
     reach = np.abs(whole[n:, :n]).sum(axis=0)
-    kept = sorted(set(heard(whole[:n, :n], reach)) & set(moved))
-    if side == "":
-        _refuse_corners(update, inputs, [step for _, step in slopes], kept)
-    read = [
-        k
-        for k in range(len(inputs))
-        if not whole_rig or whole[[*kept, *range(n, n + m)], n + k].any()
-    ]
-    columns = [n + k for k in read]
-    a, b = whole[np.ix_(kept, kept)], whole[np.ix_(kept, columns)]
-    c, d = whole[n:][:, kept], whole[n:][:, columns]
-    answer: Any = float(commands[0])
-    if whole_rig:
-        answer = dict(zip(update.names, commands.tolist(), strict=True))
-    named = tuple(inputs[k] for k in read)
-    return LinearController(a, b, c, d, named, controller.period, answer, update.names)
+    return sorted(set(heard(whole[:n, :n], reach)) & set(moved))
+
+
+def _read(whole: Array, n: int, kept: list[int]) -> list[int]:
+    """Inputs that move a command, or one of the states that are kept."""
+    rows = [*kept, *range(n, whole.shape[0])]
+    return [k for k in range(whole.shape[1] - n) if whole[rows, n + k].any()]
 
 
 def _resting(controller: Controller, point: Mapping[str, float], angle: Any) -> Reference:
@@ -234,9 +247,22 @@ class _Update:
         """Every float of the state after the update, and behind them the commands."""
         self.controller.restore(state)
         answer: Any = self.controller.update(self.now, sample, self.reference)
-        commands = [answer] if self.names == ("",) else [value for _, value in commands_of(answer)]
         after = self.controller.state
-        return np.array([*(_at(after, path) for path in self.paths), *map(float, commands)])
+        return np.array(
+            [*(_at(after, path) for path in self.paths), *map(float, self._commands(answer))]
+        )
+
+    def _commands(self, answer: Any) -> list[Any]:
+        """Commands of an answer in the order of the names, whatever its own is."""
+        if self.names == ("",):
+            return [answer]
+        given = dict(commands_of(answer))
+        if set(given) != set(self.names):
+            raise ParameterError(
+                f"the controller answered {', '.join(given) or 'nothing'}: "
+                f"{', '.join(self.names)} are needed, as at the operating point"
+            )
+        return [given[name] for name in self.names]
 
 
 def _slopes(

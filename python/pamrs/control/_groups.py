@@ -11,7 +11,16 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Feed", "Group", "beyond_sine", "groups_of", "highest_pressure", "joints_of", "named"]
+__all__ = [
+    "Feed",
+    "Group",
+    "beyond_sine",
+    "direct_regulators",
+    "groups_of",
+    "highest_pressure",
+    "joints_of",
+    "named",
+]
 
 
 def named(word: str, name: str) -> str:
@@ -150,6 +159,36 @@ def groups_of(rig: Rig) -> tuple[Group, ...]:
     return tuple(found)
 
 
+def direct_regulators(rig: Rig) -> tuple[str, ...]:
+    """Names of the regulators by which a rig is driven: those whose air reaches muscles without a
+    valve, or that feed no valve. What lies between is passed: lines, and chambers without muscles.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    tuple of str
+    """
+    pulling = {ports["chamber"] for ports in rig.ports("muscle").values()}
+    lines = rig.ports("line")
+    ways = [
+        {ports["from"], ports["to"], named("line", name)} - {""} for name, ports in lines.items()
+    ]
+    taken = {ports["from"] for ports in rig.ports("valve").values()}
+    found = []
+    for name, table in rig.tables("supply").items():
+        reached, new = set(), {named("supply", name)}
+        while new:
+            reached |= new
+            here = new - pulling
+            new = set().union(*(way for way in ways if way & here)) - reached
+        if table.get("kind") == "regulator" and (reached & pulling or not reached & taken):
+            found.append(name)
+    return tuple(found)
+
+
 def highest_pressure(rig: Rig) -> float:
     """The largest gauge pressure that a controller may ask for by default [Pa]: what the supplies
     hold at first, or ``max_pressure`` of ``[limits]`` where that is less, or a regulator is set by
@@ -161,11 +200,9 @@ def highest_pressure(rig: Rig) -> float:
         If the rig says neither.
     """
     supplies = rig.tables("supply")
-    through_valves = {_short(ports["from"]) for ports in rig.ports("valve").values()}
+    direct = direct_regulators(rig)
     held = [
-        float(supply["initial_pressure"])
-        for name, supply in supplies.items()
-        if supply.get("kind") != "regulator" or name in through_valves
+        float(supply["initial_pressure"]) for name, supply in supplies.items() if name not in direct
     ]
     stated = rig.limits.get("max_pressure")
     if stated is not None:

@@ -13,12 +13,14 @@ these the commands of valves and regulators.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pamrs.channels import unit_of
 from pamrs.control._air import AirModel
+from pamrs.control._at_rest import resting
 from pamrs.control._groups import Group, named
 from pamrs.control._load import shortened
 from pamrs.control._protocol import (
@@ -28,15 +30,19 @@ from pamrs.control._protocol import (
     Value,
     check_answers_pressure,
 )
+from pamrs.control._rest import SAMPLE, after, closed, kept, slowest
 from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._sharing import CoContraction, Demand, Share, Together
 from pamrs.control._values import where as chosen
 from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.errors import ParameterError
-from pamrs.simulation import core_rig
+from pamrs.simulation import Simulator, core_rig
 
 __all__ = ["RigController"]
+
+_STEPS: Final = 20  # of Newton's method on the torque that holds; one or two are enough
+_STILL: Final = 1e-3  # of the rate below which a joint rests: a linear model is far from its limit
 
 
 class _Law(Stateful):
@@ -397,8 +403,10 @@ class RigController(SampledController):
         return wanted, idle
 
     def holding(self, angle: ArrayLike) -> dict[str, float]:
-        """Initial values at which the model rests: joints at their angles, chambers at the
-        pressures that the shares ask for there, regulators set to them.
+        """Initial values at which the model's rig rests: joints at their angles, chambers at the
+        pressures that the shares ask for there, regulators set to them. Where the rig does not rest
+        at them (a muscle without air that still pushes, which no share counts), the torque that the
+        shares are asked for is changed by Newton's method until it does.
 
         Parameters
         ----------
@@ -415,46 +423,100 @@ class RigController(SampledController):
         ------
         ParameterError
             If there is not an angle for each joint within its range, or no pressures up to the
-            limit hold them.
+            limit hold them, or none that the shares give.
         """
-        arm, joints, rest_length = self.model.arm, len(self.joints), self._rest_length
+        arm, joints = self.model.arm, len(self.joints)
+        rows = self._rows_held(angle)
+        still = rows * 0.0
+        c1, c2 = arm.torque.at(rows)
+        torque = arm.inverse_dynamics(rows, still, still, still)
+        self._check_drive(arm.pressure(torque, rows), rows, angle)
+        for _ in range(_STEPS):
+            drive = arm.pressure(torque, rows)
+            each = [
+                [float(value) for value in np.broadcast_to(values, joints)]
+                for values in (drive, c1 * drive + c2, rows)
+            ]
+            start = self._beginning(angle, self._asked(each))
+            moved, limits = self._drifting(start)
+            if np.all(np.abs(moved) < _STILL * limits):
+                return start
+            # what the shares do not know (a muscle without air that bows out) is torque that lacks
+            pushed = rows * 0.0 + (float(moved[0]) if joints == 1 else moved) / SAMPLE
+            torque = torque - (
+                arm.inverse_dynamics(rows, still, still, pushed)
+                - arm.inverse_dynamics(rows, still, still, still)
+            )
+        k = int(np.argmax(np.abs(moved) / limits))
+        raise ParameterError(
+            f"no pressures hold {self.tracked[k]} = {np.ravel(angle)[k]:g}: at those that the "
+            f"shares give it is accelerated by {abs(moved[k]) / SAMPLE:.3g} "
+            f"{unit_of(self._channels[1][k])}2"
+        )
+
+    def _rows_held(self, angle: ArrayLike) -> Any:
+        """The angles that are to be held as the model has them, within their ranges."""
+        joints, rest_length = len(self.joints), self._rest_length
         at = np.asarray(angle, dtype=np.float64)
         if rest_length is not None:
             at = rest_length - at
-        low, high = (np.broadcast_to(end, joints) for end in arm.angle_range)
+        low, high = (np.broadcast_to(end, joints) for end in self.model.arm.angle_range)
         if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
             ends = (low, high) if rest_length is None else (rest_length - high, rest_length - low)
             raise ParameterError(
                 f"angle = {angle!r} is not allowed: {joints} from {ends[0].tolist()} to "
                 f"{ends[1].tolist()} are needed"
             )
-        rows: Any = float(at.ravel()[0]) if joints == 1 else at.ravel()
-        still = rows * 0.0
-        drive = arm.pressure(arm.inverse_dynamics(rows, still, still, still), rows)
-        least, most = (np.broadcast_to(end, joints) for end in arm.limits(rows))
+        return float(at.ravel()[0]) if joints == 1 else at.ravel()
+
+    def _check_drive(self, drive: Value, rows: Value, angle: ArrayLike) -> None:
+        """Refuse angles whose drive is out of reach."""
+        joints = len(self.joints)
+        least, most = (np.broadcast_to(end, joints) for end in self.model.arm.limits(rows))
         for k, asked in enumerate(np.broadcast_to(drive, joints)):
             if not least[k] <= asked <= most[k]:
                 raise ParameterError(
                     f"no pressures hold {self.tracked[k]} = {np.ravel(angle)[k]:g}: a drive of "
                     f"{asked:.4g} Pa is needed, and {least[k]:.4g} to {most[k]:.4g} can be had"
                 )
-        c1, c2 = arm.torque.at(rows)
-        each = [
-            [float(value) for value in np.broadcast_to(values, joints)]
-            for values in (drive, c1 * drive + c2, rows)
-        ]
+
+    def _asked(self, each: Sequence[Sequence[Value]]) -> dict[str, Value]:
+        """Pressure of every chamber [Pa] for drives, torques and angles; the shares stay as they
+        are.
+        """
         groups, before = self.model.groups, self._before.take()
         rest, limit = [0.0] * len(groups), [self.model.pressure_limit] * len(groups)
-        wanted, _ = self._shared(0.0, each, rest, limit)
-        self._before.put_back(before)
+        try:
+            return self._shared(0.0, each, rest, limit)[0]
+        finally:
+            self._before.put_back(before)
+
+    def _beginning(self, angle: ArrayLike, pressures: Mapping[str, Value]) -> dict[str, float]:
+        """Initial values of angles and of pressures of the chambers."""
         start = dict(zip(self.tracked, np.ravel(angle).astype(float).tolist(), strict=True))
-        for group in groups:
-            pressure = float(wanted[group.chamber])
+        for group in self.model.groups:
+            pressure = float(pressures[group.chamber])
             start[named("muscle_pressure", group.chamber)] = pressure
             if group.feed.input == "supply_command":
                 start[named("supply_pressure", group.feed.name)] = pressure
             start |= {name: pressure for name in self._lines_to(group.chamber)}
         return start
+
+    def _drifting(self, start: Mapping[str, float]) -> tuple[np.ndarray, np.ndarray]:
+        """Rate of every joint [rad/s] a short sample after initial values, in the sense of the
+        model, and the rate below which it rests.
+        """
+        rig = resting(self.model.rig)
+        simulator = Simulator(rig, sample_time=SAMPLE, initial=start)
+        commands = {**closed(rig), **kept(rig, simulator.observe())}
+        for group in (*self.model.groups, *self.model.vented):
+            if group.feed.input == "pressure":
+                pressure = named("muscle_pressure", group.chamber)
+                commands[named("pressure", group.chamber)] = start.get(pressure, 0.0)
+        rates, limits = after(simulator, commands), slowest(rig)
+        names = self._channels[1]
+        sense = 1.0 if self._rest_length is None else -1.0
+        return sense * np.array([rates[n] for n in names]), np.array([limits[n] for n in names])
 
     def _lines_to(self, chamber: str) -> list[str]:
         """Names of the pressures in lines that end in a chamber."""

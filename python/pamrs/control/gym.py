@@ -7,14 +7,16 @@ hanging mass, behind valves or regulators is an environment: ``RigEnv(rig)``.
 **Task.** Follow a lift, hold and return to an angle that is drawn at each reset, of several joints
 one for each, or trajectories that are given. A mass that hangs is followed by its muscle's length.
 
-**Action.** One number for every valve and regulator, held for one sample: the opening of a valve,
-from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V); the set pressure of a regulator, from
--1 (ambient) to 1 (the pressure limit).
+**Action.** One number for every valve, and every regulator without a valve, held for one sample:
+the opening of a valve, from -1 (venting, 0 V) over 0 (closed) to 1 (filling, 10 V); the set
+pressure of a regulator, from -1 (ambient) to 1 (the pressure limit). A regulator that feeds a valve
+holds what it begins with.
 
 **Observation.** Joint angles [rad], joint rates [rad/s], chamber pressures [Pa, gauge], reference
 angles [rad] and their rates [rad/s], and the actions that were held last, which the reward asks
 for; the names of all are in ``env.names``. Kept within the bounds of the space: the stops with 0.2
-rad of give, 30 rad/s (0.05 m, 5 m/s of a length), vacuum and twice the supply or the limit.
+rad of give, 30 rad/s (0.05 m, 5 m/s of a length), vacuum and twice the largest pressure at first,
+or the limit.
 
 **Reward.** ``-(error^2 + effort * change^2)`` for each sample, summed over joints and actions:
 error [rad] (or [m]) after the step, change of the action since the last one. A plant that leaves
@@ -34,6 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted, unit_of
+from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import keywords_of
 from pamrs.control._values import positive_number
 from pamrs.control.trajectories import JointTrajectories, Trajectory, lift_hold_return
@@ -121,7 +124,12 @@ class _Task:
         sample_time = positive_number("sample_time", sample_time)
         self.trajectory = self._given(trajectory)
         self.sample_time, self.effort, self.penalty = sample_time, effort, penalty
-        self.inputs = tuple(core_rig(self.rig).inputs)
+        direct = {dotted("supply_command", name) for name in direct_regulators(self.rig)}
+        self.inputs = tuple(
+            name
+            for name in core_rig(self.rig).inputs
+            if channel_of(name) != "supply_command" or name in direct
+        )
         self.middle, self.range, most = self._commands(pressure_limit)
         length = 15.0 if self.trajectory is None else self.trajectory.duration
         self.samples = math.floor(length / sample_time + 1e-9)
@@ -176,8 +184,8 @@ class _Task:
 
     def _commands(self, limit: float | None) -> tuple[Array, Array, float]:
         """Middle and half range of every command, and the largest pressure [Pa]."""
-        supplies = self.rig.tables("supply")
-        most = max(float(table["initial_pressure"]) for table in supplies.values())
+        holding = [*self.rig.tables("supply").values(), *self.rig.tables("chamber").values()]
+        most = max(float(table.get("initial_pressure", 0.0)) for table in holding)
         ends = []
         for name in self.inputs:
             block = name.partition(".")[2]
@@ -194,6 +202,11 @@ class _Task:
             limit = positive_number("pressure_limit", limit)
             most = max(most, limit)
             ends.append((0.5 * limit, 0.5 * limit))
+        if not most > 0.0:
+            raise ParameterError(
+                f"rig {self.rig.name!r} is not allowed: its supplies and chambers begin with "
+                f"{most:g} Pa at most, and one above 0 is needed that feeds the valves"
+            )
         middle, half = np.array(ends).T
         return middle, half, most
 
@@ -309,7 +322,8 @@ class RigEnv(gymnasium.Env[Array32, Array32]):
     Raises
     ------
     ParameterError
-        If an argument is not allowed.
+        If an argument is not allowed; if the rig has nothing that moves, no command, or no pressure
+        above the ambient one to begin with.
     MissingPackageError
         On import, if gymnasium is not installed.
     """

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
+from pamrs.control._groups import direct_regulators
+from pamrs.control._rest import SAMPLE, after, closed, kept, slowest
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator, core_rig, initial_names
@@ -26,8 +28,6 @@ __all__ = ["LinearController", "LinearModel", "equilibrium", "linear_controller"
 
 Array = NDArray[np.float64]
 
-_SAMPLE: Final = 2.5e-4  # s
-_REST: Final = 1e-5  # rad/s, what a joint at rest may have after a sample
 SIDES: Final = ("mean", "fill", "vent")
 FRICTIONS: Final = ("rest", "moving")
 
@@ -191,7 +191,8 @@ def equilibrium(
     start = {**(initial or {}), dotted("joint_angle", joint): float(angle), rate: 0.0}
 
     def drifting(pressure: float) -> float:
-        return _after(rig, _filled(rig, start, chamber, pressure), _closed(rig))[rate]
+        begin = _filled(rig, start, chamber, pressure)
+        return after(Simulator(rig, sample_time=SAMPLE, initial=begin), closed(rig))[rate]
 
     most = max(float(table.get("initial_pressure", 0.0)) for table in rig.tables("supply").values())
     if not drifting(0.0) < 0.0 < drifting(most):
@@ -259,12 +260,7 @@ def linearise(
         without a linear model (play, dead zone, relay: the message names it), another joint does
         not rest, or a command moves nothing; if there is neither an angle nor ``initial``.
     """
-    if side not in SIDES:
-        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
-    if friction not in FRICTIONS:
-        raise ParameterError(
-            f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}"
-        )
+    _check_choices(side, friction)
     constant = _held_supplies(rig) if held is None else held
 
     def is_held(name: str) -> bool:
@@ -273,76 +269,96 @@ def linearise(
     moving = [name for name in rig.tables("supply") if not is_held(dotted("supply_pressure", name))]
     check_smooth(rig, supplies=bool(moving))
     rig = resting(without_dry_friction(rig) if friction == "moving" else rig)
+    start = _start(rig, angle, joint, chamber, initial)
+    simulator = Simulator(rig, sample_time=SAMPLE, initial=start)
+    first = simulator.observe()
+    commands = {**closed(rig), **kept(rig, first)}
+    _check_rest(rig, simulator, commands)
+    (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
+    free = [k for k, name in enumerate(states) if not is_held(name)]
+    read = [k for k, name in enumerate(outputs) if not is_held(name)]
+    driving = _driving(inputs, moving)
+    inputs = [inputs[k] for k in driving]
+    a, b, c = a[np.ix_(free, free)], b[np.ix_(free, driving)], c[np.ix_(read, free)]
+    named = [row for row, k in enumerate(free) if states[k] in outputs]
+    _check_driven(a, b, named, {name: commands[name] for name in inputs}, side)
+    # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
+    felt = np.abs(c).sum(axis=0)
+    felt[named] += 1.0
+    used = heard(a, felt)
+    names = tuple(states[free[k]] for k in used), tuple(inputs), tuple(outputs[k] for k in read)
+    return LinearModel(
+        a[np.ix_(used, used)], b[used], c[:, used], *names, {**first, **commands}, side
+    )
+
+
+def _check_choices(side: str, friction: str) -> None:
+    """Refuse what is no side of a valve, or no way to take dry friction."""
+    if side not in SIDES:
+        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
+    if friction not in FRICTIONS:
+        raise ParameterError(
+            f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}"
+        )
+
+
+def _start(
+    rig: Rig,
+    angle: float | None,
+    joint: str,
+    chamber: str,
+    initial: Mapping[str, float] | None,
+) -> dict[str, float]:
+    """The operating point: what holds an angle, or the initial values themselves."""
     if angle is not None:
-        start = equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
-    elif initial:
-        start = dict(initial)
-    else:
+        return equilibrium(rig, angle, joint=joint, chamber=chamber, initial=initial)
+    if not initial:
         raise ParameterError(
             "angle is missing: give the angle that the rig holds, or initial values that hold it "
             "(RigController.holding)"
         )
-    simulator = Simulator(rig, sample_time=_SAMPLE, initial=start)
-    first = simulator.observe()
-    commands = {**_closed(rig), **_kept(rig, first)}
-    _check_rest(simulator, commands)
-    (states, inputs, outputs), (a, b, c) = core_rig(rig).linearise(start, side)
-    free = [k for k, name in enumerate(states) if not is_held(name)]
-    read = [k for k, name in enumerate(outputs) if not is_held(name)]
-    driving = [
+    return dict(initial)
+
+
+def _driving(inputs: Sequence[str], moving: Sequence[str]) -> list[int]:
+    """Indices of the inputs that drive a rig: all but regulators whose pressure is held."""
+    return [
         k
         for k, name in enumerate(inputs)
         if channel_of(name) != "supply_command" or name.partition(".")[2] in moving
     ]
-    inputs = [inputs[k] for k in driving]
-    a, b, c = a[np.ix_(free, free)], b[np.ix_(free, driving)], c[np.ix_(read, free)]
-    named = [row for row, k in enumerate(free) if states[k] in outputs]
-    for k, name in enumerate(inputs):
-        if not set(heard(a.T, b[:, k])) & set(named):
+
+
+def _check_driven(
+    a: Array, b: Array, named: Sequence[int], commands: Mapping[str, float], side: str
+) -> None:
+    """Refuse a command that reaches none of the named states."""
+    for column, (name, value) in zip(b.T, commands.items(), strict=True):
+        if not set(heard(a.T, column)) & set(named):
             raise ParameterError(
-                f"{name} moves nothing about {commands[name]:g} {unit_of(name)} (side = "
-                f"{side!r}): no linear model is there"
+                f"{name} moves nothing about {value:g} {unit_of(name)} (side = {side!r}): no "
+                "linear model is there"
             )
-    # what an effect moves and nothing feels (a lag of no time, a share of nothing) is no state
-    felt = np.abs(c).sum(axis=0)
-    felt[named] += 1.0
-    kept = heard(a, felt)
-    names = tuple(states[free[k]] for k in kept), tuple(inputs), tuple(outputs[k] for k in read)
-    return LinearModel(
-        a[np.ix_(kept, kept)], b[kept], c[:, kept], *names, {**first, **commands}, side
-    )
 
 
 def _held_supplies(rig: Rig) -> tuple[str, ...]:
     """Supplies that change slowly, or not by a command: all but regulators without a valve."""
-    behind = {ports["from"] for ports in rig.ports("valve").values()}
+    direct = direct_regulators(rig)
     return tuple(
-        dotted("supply_pressure", name)
-        for name, table in rig.tables("supply").items()
-        if table.get("kind") != "regulator" or dotted("supply", name) in behind
+        dotted("supply_pressure", name) for name in rig.tables("supply") if name not in direct
     )
 
 
-def _kept(rig: Rig, sample: Mapping[str, float]) -> dict[str, float]:
-    """Every regulator set to the pressure that it has."""
-    return {
-        dotted("supply_command", name): sample[dotted("supply_pressure", name)]
-        for name, table in rig.tables("supply").items()
-        if table.get("kind") == "regulator"
-    }
-
-
-def _check_rest(simulator: Simulator, commands: Mapping[str, float]) -> None:
+def _check_rest(rig: Rig, simulator: Simulator, commands: Mapping[str, float]) -> None:
     """Refuse a state in which a joint or a load does not rest."""
-    state = simulator.state
-    block = simulator._advance(1, {name: np.array([value]) for name, value in commands.items()})
-    simulator.restore(state)
-    for name, values in block.items():
-        if channel_of(name) in ("joint_rate", "length_rate") and not abs(values[0]) < _REST:
+    rates = after(simulator, commands)
+    for name, limit in slowest(rig).items():
+        if not abs(rates[name]) < limit:
             raise ParameterError(
-                f"{name} is {values[0]:.3g} {unit_of(name)} a quarter of a millisecond after the "
-                "start: the joint does not rest; give initial values that hold it: those of "
-                "RigController.holding, or of equilibrium for each joint in turn, until none moves"
+                f"{name} is {rates[name]:.3g} {unit_of(name)} a quarter of a millisecond after the "
+                f"start, which is not below {limit:.2g}: it does not rest; give initial values "
+                "that hold it: those of RigController.holding, or of equilibrium for each joint in "
+                "turn, until none moves"
             )
 
 
@@ -355,21 +371,6 @@ def python_control() -> Any:
 
         raise missing_package(error, "control") from error
     return library
-
-
-def _after(rig: Rig, states: Mapping[str, float], inputs: Mapping[str, float]) -> dict[str, float]:
-    """Channels one short sample later."""
-    simulator = Simulator(rig, sample_time=_SAMPLE, initial=states)
-    block = simulator._advance(1, {name: np.array([value]) for name, value in inputs.items()})
-    return {name: float(values[0]) for name, values in block.items()}
-
-
-def _closed(rig: Rig) -> dict[str, float]:
-    """Every valve at its null."""
-    return {
-        dotted("valve_command", name): float(table["null_voltage"])
-        for name, table in rig.tables("valve").items()
-    }
 
 
 def _filled(

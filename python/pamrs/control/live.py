@@ -417,7 +417,8 @@ class _Loop:
         why, safe = "", self.commands.written(self.commands.safe)
         for _ in range(_SAFE_ATTEMPTS):
             try:
-                self.device.write(safe)
+                # a fresh one each time: a driver may use up what it is given, and fail half way
+                self.device.write(self.commands.written(self.commands.safe))
             except BaseException as error:  # a second Ctrl-C must not keep the valve open
                 why = (
                     f"; and the safe command {safe:g} could not be written: "

@@ -10,7 +10,8 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, dotted
+from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import commands_of, keywords_of
 from pamrs.control.live import Clock
 from pamrs.errors import ParameterError
@@ -73,9 +74,11 @@ class SimulatedDevice:
     """A rig behind ``read()`` and ``write(command)``; it moves with its clock, whatever the loop
     does.
 
-    A rig with one valve or regulator takes a number; one with several a mapping of all of them by
-    their names, ``{"valve_command.flexor": 5.0, "valve_command.extensor": 5.0}``. Until something
-    is written valves are at their null, and regulators hold what they begin with.
+    A rig with one valve, or one regulator without a valve, takes a number; one with several a
+    mapping of all of them by their names, ``{"valve_command.flexor": 5.0,
+    "valve_command.extensor": 5.0}``. Until something is written valves are at their null, and
+    regulators hold what they begin with. A regulator that feeds a valve goes on holding that unless
+    a mapping has it too.
 
     Parameters
     ----------
@@ -121,6 +124,7 @@ class SimulatedDevice:
         if not faults or any(fault not in FAULTS for fault in faults):
             raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
         self._held = _at_first(rig)
+        self._needed = _needed(rig, self._held)
         self.simulator = Simulator(rig, sample_time=sample_time, initial=initial)
         self.clock = clock
         self.written: list[tuple[float, Any]] = []
@@ -146,8 +150,11 @@ class SimulatedDevice:
 
     @property
     def command(self) -> Any:
-        """What is held: a number, or a mapping of names to one."""
-        return next(iter(self._held.values())) if len(self._held) == 1 else dict(self._held)
+        """What is held: a number, or a mapping of names to one; without a regulator that feeds a
+        valve, until a command has it.
+        """
+        told = {name: self._held[name] for name in self._needed}
+        return next(iter(told.values())) if len(told) == 1 else told
 
     def write(self, command: float | Mapping[str, float]) -> None:
         """Hold a command from now on.
@@ -162,20 +169,18 @@ class SimulatedDevice:
         ParameterError
             If it has not the commands of the rig.
         """
-        given = (
-            dict(commands_of(command))
-            if isinstance(command, Mapping)
-            else dict.fromkeys(self._held, command)
-        )
-        if set(given) != set(self._held) or (
-            not isinstance(command, Mapping) and len(self._held) > 1
-        ):
+        needed = self._needed
+        if isinstance(command, Mapping):
+            given = dict(commands_of(command))
+        else:
+            given = dict.fromkeys(needed, command) if len(needed) == 1 else {}
+        if not set(needed) <= set(given) <= set(self._held):
             raise ParameterError(
                 f"command = {command!r} is not allowed: a number for each of "
-                f"{', '.join(self._held)} is needed"
+                f"{', '.join(needed)} is needed"
             )
         self._advance()
-        self._held = {name: float(given[name]) for name in self._held}
+        self._held |= {name: float(value) for name, value in given.items()}
         self.written.append((self.clock.now() - self._began, self.command))
 
     def _sample(self) -> dict[str, float]:
@@ -206,3 +211,9 @@ def _at_first(rig: Rig) -> dict[str, float]:
             "is needed"
         )
     return found
+
+
+def _needed(rig: Rig, held: Mapping[str, float]) -> tuple[str, ...]:
+    """Commands that every write has: all but those of regulators that feed valves."""
+    direct = {dotted("supply_command", name) for name in direct_regulators(rig)}
+    return tuple(n for n in held if channel_of(n) == "valve_command" or n in direct)
