@@ -9,7 +9,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import available_blocks, prepare, residual
+from pamrs.diagnosis.prepare import available_blocks, begun_alike, prepare, residual
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
@@ -34,11 +34,13 @@ def stated(**tolerances: float) -> Rig:
 RIG = stated(length=0.2, alpha=0.0)
 
 
-def opened(true: Rig, role: str, seed: int, pressure: float) -> Recording:
-    """The outlet thrown open, 0.8 s at 500 Hz."""
+def opened(
+    true: Rig, role: str, seed: int, pressure: float, late: float = 0.0, duration: float = 0.8
+) -> Recording:
+    """The outlet thrown open, 0.8 s at 500 Hz; a late one begins while air flows."""
     start = {"muscle_pressure.left": pressure}
-    run = pamrs.simulate(true, sample_time=0.002, duration=0.8, initial=start)
-    channels = {name: run[name] for name in CHANNELS}
+    run = pamrs.simulate(true, sample_time=0.002, duration=duration + late, initial=start)
+    channels = {name: run[name][round(late / 0.002) :] for name in CHANNELS}
     return noisy(f"r{seed}", role, 0.002, channels, NOISE, [7, seed])
 
 
@@ -81,6 +83,61 @@ def test_sensitivities_are_those_of_differences() -> None:
         wanted = -(high - low) / (2e-4 * value)
         size = float(np.abs(wanted).max())
         np.testing.assert_allclose(slope[:, 0], wanted, atol=2e-2 * size)
+
+
+BALANCED = parse_rig(pamrs.rigs.template("long_tube"))
+
+
+@pytest.mark.parametrize("late", [0.02, 0.1, 0.3])
+@pytest.mark.parametrize("rig", [RIG, BALANCED])
+def test_what_shows_a_flow_before_the_recording_is_not_judged(rig: Rig, late: float) -> None:
+    """Nobody measured what flows along the tube as the recording begins: a true model leaves noise
+    where that is forgotten.
+    """
+    prepared = prepare(opened(rig, "fit", 0, 4e5, late, 3.0), rig, SETTINGS)
+    blocks, core = available_blocks(rig, CHANNELS, SETTINGS.prepare), core_rig(rig)
+    kept = begun_alike(blocks, core, prepared)
+    before, after = (residual(blocks[1], core, p, []) for p in (prepared, kept))
+    assert np.std(before.value[before.rows]) > 1.7 * before.noise
+    for block in blocks:
+        left = residual(block, core, kept, [])
+        assert 0.3 < kept.unsettled[block.channel] * prepared.dt < 2.3
+        assert np.std(left.value[left.rows]) < 1.15 * left.noise
+    last = kept.unsettled[blocks[1].channel]
+    assert not after.rows[:last].any()
+    assert after.rows[last:].any()
+
+
+@pytest.mark.parametrize("rig", [RIG, BALANCED])
+@pytest.mark.parametrize("right", [0.0, 2e5])
+@pytest.mark.parametrize("wrong", [{}, {"line.length": 8.6}])
+def test_a_tube_that_was_at_rest_loses_nothing(
+    rig: Rig, right: float, wrong: dict[str, float]
+) -> None:
+    """At one pressure all along, or opened as the recording begins; an opening tells the length, so
+    that it is judged whatever that is.
+    """
+    start = {"muscle_pressure.left": 2e5, "muscle_pressure.right": right}
+    true = rig.with_parameters(wrong)
+    run = pamrs.simulate(true, sample_time=0.002, duration=1.0, initial=start)
+    one = noisy("r", "fit", 0.002, {name: run[name] for name in CHANNELS}, NOISE, [7, 3])
+    blocks = available_blocks(rig, CHANNELS, SETTINGS.prepare)
+    kept = begun_alike(blocks, core_rig(rig), prepare(one, rig, SETTINGS))
+    assert kept.unsettled == {}
+
+
+def test_a_diagnosis_of_what_begins_in_a_flow_finds_nothing() -> None:
+    recordings = [
+        opened(RIG, role, seed, pressure, 0.1, 3.0)
+        for seed, (role, pressure) in enumerate((("fit", 2e5), ("fit", 4e5), ("held_out", 3e5)))
+    ]
+    found = pamrs.diagnose(pamrs.Case("hose", RIG, recordings, Path()))
+    assert found.verdict in ("none", "parameters")
+    assert not found.effects
+    told = [text for text in found.warnings if "were not judged" in text]
+    assert len(told) == 2
+    assert "what flowed through line before" in told[1]
+    assert "begins at rest" in told[1]
 
 
 @pytest.mark.slow

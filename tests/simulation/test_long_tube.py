@@ -57,9 +57,11 @@ def arrival(rig: pamrs.Rig) -> float:
     return float(run.time[k - 1] + 1e-4 * (3.01e5 - far[k - 1]) / (far[k] - far[k - 1]))
 
 
-@pytest.mark.parametrize(("more", "speed"), [("", SOUND), ("alpha = { value = 1, unit = '1' }", 1)])
+@pytest.mark.parametrize(
+    ("more", "speed"), [("", SOUND), ("alpha = { value = 1, unit = '1' }", math.sqrt(RT))]
+)
 def test_the_other_end_waits_for_length_over_speed_of_sound(more: str, speed: float) -> None:
-    exact = 8.0 / (speed if speed > 1 else math.sqrt(RT))
+    exact = 8.0 / speed
     errors = [abs(arrival(closed(8.0, n, more)) / exact - 1.0) for n in (4, 8, 16, 32, 64)]
     assert all(finer < coarse for coarse, finer in zip(errors, errors[1:], strict=False)), errors
     assert errors[2] < 0.06
@@ -91,10 +93,39 @@ def test_mass_is_conserved_and_the_balance_closes() -> None:
     assert abs(run.balance.residual) < 1e-9 * moved
     assert abs(run.balance.created) < 1e-9 * moved
     assert run["muscle_pressure.a"][-1] == pytest.approx(run["muscle_pressure.b"][-1], abs=1.0)
-    # sound is no energy balance of its own: what that makes up is said
-    adiabatic = pamrs.simulate(pamrs.rigs.named("long_tube"), sample_time=0.002, duration=0.2)
-    assert abs(adiabatic.balance.created) > 1e-6
-    assert "alpha = 1 of a tube" in str(adiabatic.balance)
+
+
+BALANCED = (
+    '[chamber.b]\ndead_volume = { value = 0.2, unit = "l" }\ngas = "energy_balance"\n'
+    'initial_pressure = { value = 1, unit = "bar" }\n'
+)
+
+
+@pytest.mark.parametrize("segments", [1, 6])
+def test_what_alpha_makes_up_is_said_and_by_what(segments: int) -> None:
+    """All along the tube, its inlet included: ``alpha R T`` for each kilogram in the place of ``R
+    T``.
+    """
+    text = HEAD + FED["a valve"].replace("segments = 6", f"segments = {segments}") + BALANCED
+    run = pamrs.simulate(parse_rig(text), 9.0, sample_time=0.002, duration=0.1)
+    inside = [*run.under("line_mass").values(), *run.under("segment_mass").values()]
+    gained = sum(float(mass[-1] - mass[0]) for mass in inside)
+    assert gained > 2e-5
+    assert run.balance.created == pytest.approx(0.4 * gained, rel=1e-9)
+    assert run.balance.laws == ("line",)
+    assert "line.alpha, the speed of sound" in str(run.balance)
+    assert "energy_balance" not in str(run.balance)
+
+
+def test_a_tube_between_chambers_makes_up_what_its_segments_do() -> None:
+    text = HEAD + chamber("a", 0.1, 5.0) + chamber("b", 0.3, 0.0) + hose(8.0, 12)
+    run = pamrs.simulate(parse_rig(text), sample_time=0.002, duration=0.2)
+    gained = sum(float(mass[-1] - mass[0]) for mass in run.under("segment_mass").values())
+    assert run.balance.created == pytest.approx(0.4 * gained, rel=1e-9)
+    assert run.balance.laws == ("line",)
+    both = pamrs.simulate(pamrs.rigs.named("long_tube"), sample_time=0.002, duration=0.2).balance
+    assert both.laws == ("chamber.left", "chamber.right", "line")
+    assert 'gas = "energy_balance" of a chamber is; and by line.alpha' in str(both)
 
 
 def test_a_new_rig_has_an_energy_balance_in_its_chambers_and_its_own_alpha_along_the_tube() -> None:
@@ -156,15 +187,32 @@ FED = {
 }
 
 
+#: Pressures between the segments and flows through them: no rest, and one against the arrow.
+FLOWING = {
+    "a valve": {
+        "line_pressure": 2.5e5,
+        **{f"segment_pressure.{k}": 2.5e5 - 2e4 * k for k in range(1, 6)},
+        **{f"segment_flow.{k}": 1e-3 - 1e-4 * k for k in range(1, 7)},
+    },
+    "a regulator": {
+        **{f"segment_pressure.{k}": 1e5 + 3e3 * k for k in range(1, 6)},
+        **{f"segment_flow.{k}": -2e-4 for k in range(1, 7)},
+    },
+    "a chamber": {"segment_flow.1": 8e-4},
+}
+
+
+@pytest.mark.parametrize("flowing", [False, True])
 @pytest.mark.parametrize("fed", FED)
-def test_every_channel_is_that_of_the_reference(fed: str) -> None:
+def test_every_channel_is_that_of_the_reference(fed: str, flowing: bool) -> None:
     rig = parse_rig(HEAD + FED[fed] + chamber("b", 0.2, 1.0))
+    start = FLOWING[fed] if flowing else {}
     wave = np.sin(0.3 * np.arange(41))
     commands = {
         "a valve": {"valve_command": 5.0 + 2.0 * wave},
         "a regulator": {"supply_command": 1e5 + 5e4 * wave},
     }
-    run = Run(rig, 0.005, 41, {}, commands.get(fed, {}))
+    run = Run(rig, 0.005, 41, start, commands.get(fed, {}))
     found = misses(run.core(2e-5), run.reference(1e-11))
     assert max(found.values()) < 2e-6, found
 
@@ -227,6 +275,44 @@ def test_an_orifice_has_none() -> None:
     text += 'discharge_area = { value = 1, unit = "mm2" }\n'
     with pytest.raises(PamrsError, match="segments"):
         parse_rig(text)
+
+
+@pytest.mark.parametrize(
+    "segments", ["", "segments = 0\n", 'segments = { value = 0, unit = "1" }\n']
+)
+def test_alpha_is_that_of_segments(segments: str) -> None:
+    """Without them it would do nothing, and a tolerance of it would be fitted in vain."""
+    text = HEAD + chamber("a", 1.0) + chamber("b", 1.0) + hose(2.0, 4)
+    alpha = 'alpha = { value = 1.2, unit = "1", tol = 0.1 }\n'
+    with_none = text.replace("segments = 4\n", segments)
+    with pytest.raises(PamrsError, match=r"line\.alpha is not allowed without segments"):
+        parse_rig(with_none + alpha)
+    plain = parse_rig(with_none)
+    assert "line.alpha" not in plain.parameters
+    with pytest.raises(PamrsError, match=r"no parameter 'line\.alpha'"):
+        plain.with_parameters({"line.alpha": 1.2})
+    assert parse_rig(text + alpha).parameter("line.alpha").tol == 0.1
+
+
+def test_alpha_comes_and_goes_with_segments() -> None:
+    rig = pamrs.rigs.named("long_tube")
+    none = rig.with_parameters({"line.segments": 0})
+    assert "line.alpha" not in none.parameters
+    assert "alpha    =" not in none.to_toml_text()
+    assert parse_rig(none.to_toml_text()).model == none.model
+    again = none.with_parameters({"line.alpha": 1.2, "line.segments": 8})
+    assert again.parameter("line.alpha").value == 1.2
+    assert again.parameter("line.alpha").tol == 0.0
+    assert none.with_parameters({"line.segments": 8}).parameter("line.alpha").value == 1.4
+    assert rig.with_parameters({"line.segments": 8}).parameter("line.alpha").tol == 0.02
+
+
+@pytest.mark.parametrize(("known", "told"), [("tol = 1", "tol"), ("unknown = true", "unknown")])
+def test_a_count_has_no_tolerance(known: str, told: str) -> None:
+    text = HEAD + chamber("a", 1.0) + chamber("b", 1.0) + hose(2.0, 4)
+    value = f'segments = {{ value = 4, unit = "1", {known} }}'
+    with pytest.raises(PamrsError, match=rf"line\.segments\.{told} is not allowed"):
+        parse_rig(text.replace("segments = 4", value))
 
 
 def test_a_tube_without_segments_is_told_nothing_of_them() -> None:

@@ -27,6 +27,7 @@ from pamrs.rig.schema import (
     Port,
     keys_of,
     kind_for,
+    of_kind,
     qualified,
     tables_of,
 )
@@ -226,7 +227,11 @@ class Reader:
                 )
         keys = keys_of(block, table)
         for key in BLOCKS[block]:
-            if key not in keys and _dig(table, key.where) is not None:
+            if key in keys or _dig(table, key.where) is None:
+                continue
+            if of_kind(block, table, key):
+                self.problem(f"{label}.{key.name} is not allowed without {key.needs}: {key.note}")
+            else:
                 kind, only = _shown(kind_for(block, table, key)), ", ".join(key.only)
                 self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")
         content = {key.name: self.value(label, key, _dig(table, key.where)) for key in keys}
@@ -319,11 +324,14 @@ class Reader:
         value = self.scalar(label, key.unit, number, unit, key.lower, key.upper)
         if value is None:
             return None
-        self.spread(f"{block}.{key.name}", label, key, unit, extra)
         if key.kind == "count":
+            for word in ("tol", "unknown"):
+                if extra.get(word):
+                    self.problem(f"{label}.{word} is not allowed: a count is known")
             if not value.is_integer():
                 self.problem(f"{label} = {value:g} is not allowed: a whole number is needed")
             return int(value)
+        self.spread(f"{block}.{key.name}", label, key, unit, extra)
         return value
 
     def quantity(

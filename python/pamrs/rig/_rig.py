@@ -321,7 +321,8 @@ class Rig:
         ----------
         values : mapping of str to float
             Dotted name -> SI value. Tolerances stay; an unknown parameter that gets a value stays
-            unknown.
+            unknown. With a count that becomes 0 go the parameters that need it, and with one that
+            no longer is they come, at their defaults where nothing is given.
 
         Returns
         -------
@@ -335,8 +336,10 @@ class Rig:
         """
         given = checked_table("values", values)
         model = _opened(self._model, {split_name(name)[:2] for name in given})
-        problems, numbers = [], {}
-        for name, value in given.items():
+        problems, numbers, gone = [], {}, set()
+        counts = [name for name in given if self._is_count(name)]  # which say what else there is
+        for name in [*counts, *(name for name in given if name not in counts)]:
+            value = given[name]
             table, key = self._scalar(model, name)
             whole = key.kind == "count"
             try:
@@ -346,10 +349,19 @@ class Rig:
                 continue
             numbers[name] = number
             table[key.name] = int(number) if whole else number
+            if whole:
+                gone |= _with_its_keys(name, table)
         if problems:
             raise ParameterError(joined(f"rig {self.name!r}", problems))
-        found = Rig(self.name, model, self._tolerances, self._effect_std, self.source, self._text)
+        known = {name: tol for name, tol in self._tolerances.items() if name not in gone}
+        found = Rig(self.name, model, known, self._effect_std, self.source, self._text)
         return found._with_origin(self, numbers)
+
+    @staticmethod
+    def _is_count(dotted: str) -> bool:
+        """Whether a dotted name is that of a count."""
+        block, _, own = split_name(dotted)
+        return any(key.kind == "count" for key in BLOCKS.get(block, ()) if key.name == own)
 
     # A rig that differs from another one by numbers only is not wired again: the core takes the
     # numbers.
@@ -546,6 +558,20 @@ class Rig:
 def _kind(entry: Entry) -> tuple[str, str, str]:
     """What an effect is beside its numbers."""
     return entry["id"], entry.get("at", ""), entry.get("form", "")
+
+
+def _with_its_keys(dotted: str, table: dict[str, Any]) -> set[str]:
+    """Give the table of a count what needs it, at its default, or take it away; dotted names of
+    what has gone.
+    """
+    block, name, count = split_name(dotted)
+    has, gone = keys_of(block, table), set()
+    for key in (key for key in BLOCKS[block] if key.needs == count):
+        if key in has:
+            table.setdefault(key.name, key.default)
+        elif table.pop(key.name, None) is not None:
+            gone.add(f"{qualified(block, name)}.{key.name}")
+    return gone
 
 
 def _opened(model: dict[str, Any], tables: set[tuple[str, str]]) -> dict[str, Any]:

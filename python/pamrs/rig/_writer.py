@@ -218,8 +218,8 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
 
 
 def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
-    waves = ("segments", "alpha") if not table.get("segments") else ()  # none: a usual tube
-    values = {key: value for key, value in table.items() if key not in ("kind", *waves)}
+    usual = () if table.get("segments") else ("segments",)  # none: the core need not be told
+    values = {key: value for key, value in table.items() if key not in ("kind", *usual)}
     ends = ports["line"][name]
     return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}
 

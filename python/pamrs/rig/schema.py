@@ -26,6 +26,7 @@ __all__ = [
     "keys_of",
     "kind_for",
     "kind_of",
+    "of_kind",
     "qualified",
     "split_name",
     "tables_of",
@@ -62,6 +63,8 @@ class Key(NamedTuple):
     only : tuple of str
         The kinds of the block (force model of a muscle, kind of a joint) that have this key; empty
         for all.
+    needs : str
+        A count of the block without which (0) it does not have this key; empty for none.
     note : str
         What it is, where the name does not say it.
     """
@@ -75,6 +78,7 @@ class Key(NamedTuple):
     choices: tuple[str, ...] = ()
     path: tuple[str, ...] = ()
     only: tuple[str, ...] = ()
+    needs: str = ""
     note: str = ""
 
     @property
@@ -321,6 +325,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             2.0,
             1.4,
             only=("tube",),
+            needs="segments",
             note="of the gas in its segments, 1.4 as in sound, 1 where the wall keeps it cold",
         ),
     ),
@@ -573,11 +578,26 @@ PORTS: Final[dict[str, tuple[Port, ...]]] = {
 
 
 def keys_of(block: str, content: Mapping[str, Any]) -> tuple[Key, ...]:
-    """The keys that a block of its kind has: force model of a muscle, kind of a joint."""
-    kinds = [kind_of(block, content), _further(block, content)]
+    """The keys that a block of its kind has: force model of a muscle, kind of a joint; those that
+    need a count where it is not 0.
+    """
     return tuple(
-        key for key in BLOCKS[block] if not key.only or any(kind in key.only for kind in kinds)
+        key
+        for key in BLOCKS[block]
+        if of_kind(block, content, key) and not (key.needs and _none(content.get(key.needs)))
     )
+
+
+def of_kind(block: str, content: Mapping[str, Any], key: Key) -> bool:
+    """Whether blocks of the kind of this one can have a key."""
+    kinds = [kind_of(block, content), _further(block, content)]
+    return not key.only or any(kind in key.only for kind in kinds)
+
+
+def _none(count: Any) -> bool:
+    """Whether a count is 0 or left out, in a file or in a model."""
+    number = count.get("value") if isinstance(count, Mapping) else count
+    return number is None or (isinstance(number, (int, float)) and number == 0)
 
 
 def kind_for(block: str, content: Mapping[str, Any], key: Key) -> Any:

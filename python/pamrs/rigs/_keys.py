@@ -60,6 +60,8 @@ def _line(key: Key, *, inner: bool) -> str:
         parts.append(f"default {_plain(key.default)}")
     if key.only:
         parts.append(f"only with {', '.join(key.only)}")
+    if key.needs:
+        parts.append(f"only with {key.needs}")
     if key.note:
         parts.append(key.note)
     return f"{name:<22} {'; '.join(parts)}"

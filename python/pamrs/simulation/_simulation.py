@@ -81,6 +81,9 @@ class Balance:
         Of the chambers with an energy balance: enthalpy that flows brought less what they took,
         heat from the walls, work of the gas ``p dV`` [J]; their internal energy ``p V/(kappa - 1)``
         grew by the first two less the third. None where no chamber has one.
+    laws : tuple of str
+        Blocks whose pressure follows constant coefficients that are not all 1, which make and lose
+        mass: chambers without an energy balance, tubes of segments.
     """
 
     supplied: float
@@ -94,6 +97,7 @@ class Balance:
     enthalpy: float | None = None
     heat: float | None = None
     gas_work: float | None = None
+    laws: tuple[str, ...] = ()
 
     @property
     def residual(self) -> float:
@@ -116,17 +120,27 @@ class Balance:
         """
         return self.joint_work / self.energy if self.energy > 0.0 else math.nan
 
+    def _made_by(self) -> str:
+        """What makes or loses mass, in words, and what would not."""
+        tubes = [name for name in self.laws if name.partition(".")[0] == "line"]
+        reasons = []
+        if len(tubes) < len(self.laws):
+            reasons.append(
+                "the constant gas coefficients, which are no energy balance; gas = "
+                '"energy_balance" of a chamber is'
+            )
+        if tubes:
+            alphas = ", ".join(f"{name}.alpha" for name in tubes)
+            reasons.append(f"{alphas}, the speed of sound in its segments; 1 makes up none")
+        return f" by {'; and by '.join(reasons)}" if reasons else ""
+
     def __str__(self) -> str:
         air = (
             f"air {1e3 * self.supplied:.4g} g supplied, {1e3 * self.vented:.4g} g vented, "
             f"{1e3 * self.implied:.4g} g more stored"
         )
         if abs(self.created) > 1e-3 * max(self.supplied, self.vented, 1e-12):
-            reason = (
-                "the constant gas coefficients, which are no energy balance; gas = "
-                '"energy_balance" of a chamber is, and alpha = 1 of a tube makes up none'
-            )
-            air += f" ({1e3 * self.created:+.4g} g by {reason})"
+            air += f" ({1e3 * self.created:+.4g} g{self._made_by()})"
         share = (
             f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
         )
@@ -283,6 +297,7 @@ class Simulation(Mapping[str, Array]):
             exergy=gain["exergy_supplied"],
             muscle_work=gain["muscle_work"],
             joint_work=gain["joint_work"],
+            laws=self._laws(),
             **{
                 name.removesuffix("_gained"): float(channels[name][-1] - channels[name][0])
                 for name in _HEAT_BALANCES
@@ -293,17 +308,7 @@ class Simulation(Mapping[str, Array]):
     def _implied(self) -> float:
         """Gain of mass by the gas law at the rest temperature [kg]."""
         gas = self.rig.tables("gas")[""]
-        total = sum(float(mass[-1] - mass[0]) for mass in self.under("line_mass").values())
-        for line, table in self.rig.tables("line").items():
-            if count := int(table.get("segments", 0)):
-                volume = math.pi / 4.0 * table["diameter"] ** 2 * table["length"] / count
-                for k in range(1, count):
-                    inside = self._channels[dotted(dotted("segment_pressure", line), str(k))]
-                    total += (
-                        float(inside[-1] - inside[0])
-                        * volume
-                        / (gas["gas_constant"] * gas["temperature"])
-                    )
+        total = self._implied_in_lines(gas["gas_constant"] * gas["temperature"])
         for name, volume in self.under("air_volume").items():
             zero = sensor_zero(self.rig, "pressure_zero", name)
             absolute = (
@@ -317,6 +322,38 @@ class Simulation(Mapping[str, Array]):
                 gas["gas_constant"] * gas["temperature"]
             )
         return total
+
+    def _implied_in_lines(self, rt: float) -> float:
+        """The same along the lines [kg], `rt` being ``R T``: the inlet of one without segments is
+        isothermal, so that its mass is what its pressure says.
+        """
+        total = 0.0
+        for line, table in self.rig.tables("line").items():
+            count = int(table.get("segments", 0))
+            inlet = dotted("line_pressure", line)
+            if not count:
+                mass = self._channels.get(dotted("line_mass", line), np.zeros(1))
+                total += float(mass[-1] - mass[0])
+                continue
+            segment = math.pi / 4.0 * table["diameter"] ** 2 * table["length"] / count
+            between = dotted("segment_pressure", line)
+            volumes = {dotted(between, str(k)): segment for k in range(1, count)}
+            if inlet in self._channels:
+                volumes[inlet] = table["inlet_volume"] + 0.5 * segment
+            for channel, volume in volumes.items():
+                pressure = self._channels[channel]
+                total += float(pressure[-1] - pressure[0]) * volume / rt
+        return total
+
+    def _laws(self) -> tuple[str, ...]:
+        """Blocks whose gas makes or loses mass: see :attr:`Balance.laws`."""
+        coefficients = ("alpha_in", "alpha_out", "alpha")  # a tube without segments has none
+        return tuple(
+            dotted(block, name)
+            for block in ("chamber", "line")
+            for name, table in self.rig.tables(block).items()
+            if any(table.get(key, 1.0) != 1.0 for key in coefficients)
+        )
 
     def _check_whole(self, what: str) -> None:
         """Refuse what needs every channel where some were not recorded."""

@@ -2,30 +2,56 @@
 
 A regulator whose outlet has no gauge begins a recording somewhere between what it feeds and what it
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
-bars apart. What its block predicts from either tells the samples that depend on it; these are not
-judged.
+bars apart. Along a tube of segments gas stands or flows: at rest its pressure is that of its ends,
+and a log that begins while air flows has a gradient there. What a block predicts from either tells
+the samples that depend on it; these are not judged.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import dotted
-from pamrs.diagnosis.prepare._blocks import Block, predicted
+from pamrs.diagnosis.prepare._before import Before
+from pamrs.diagnosis.prepare._blocks import Block, Tube, predicted
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 
 __all__ = ["begun_alike", "said_of_beginnings"]
 
+Array = NDArray[np.float64]
+
+#: Delays of a tube after which what flows through it is steady, and of these the last in which the
+#: pressures at its ends have moved.
+_STEADY: Final = 20.0
+_MOVING: Final = 0.5
+#: Share of its delay in which its end hears nothing of the other.
+_SILENT: Final = 0.6
+#: Least samples that tell how something moves.
+_LEAST: Final = 3
+#: Delays, and samples, in which ends that stand still are looked at; standard deviations of a trend
+#: that is seen.
+_STILL: Final = 4.0
+_LEAST_STILL: Final = 8
+_SEEN: Final = 3.0
+#: Noise levels by which the noise of the gauges alone sets two beginnings apart, at most: next to
+#: equal pressures little friction holds a flow.
+_BY_NOISE: Final = 10.0
+#: Log likelihood by which each end of a tube that was at rest tells it from one that was not.
+_TELLING: Final = math.log(1000.0)
+
 
 def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> Prepared:
     """A recording whose first samples are not judged in blocks that remember where a regulator
-    without a gauge stood.
+    without a gauge stood, or what flowed along a tube.
 
     Parameters
     ----------
@@ -41,33 +67,134 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
     Prepared
         With `unsettled`, the samples by the channel that each such block predicts.
     """
-    unsettled = {
-        block.channel: count
-        for block in blocks
-        if block.beside and (count := _remembered(block, core, prepared)) > 0
-    }
+    beginnings = _Beginnings(blocks, core, prepared)
+    counts = {block.channel: beginnings.remembered(block) for block in blocks}
+    unsettled = {channel: count for channel, count in counts.items() if count > 0}
     return replace(prepared, unsettled=unsettled) if unsettled else prepared
 
 
-def _remembered(block: Block, core: _core.Rig, prepared: Prepared) -> int:
-    """Samples up to the last one that shows where the regulators of a block began."""
-    commands = _set(block)
-    outlets = {
-        qualified("supply", name.partition(".")[2]): max(0.0, float(prepared.held[name][0]))
-        for name in commands
-    }
-    try:
-        apart = predicted(block, core, prepared, outlets) - predicted(block, core, prepared)
-    except SimulationError:
-        return 0  # the fit says what cannot be predicted
-    most = prepared.settings.prepare.outlet_noises * prepared.noise[block.channel]
-    seen = np.flatnonzero(np.abs(apart) > most)
-    return int(seen[-1]) + 1 if seen.size else 0
+class _Beginnings:
+    """What the blocks of a rig predict of one recording from different beginnings."""
+
+    def __init__(self, blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> None:
+        self.core, self.prepared = core, prepared
+        self.at = {block.channel: block for block in blocks}
+        self._kept: dict[tuple[str, bool], Array] = {}
+
+    def remembered(self, block: Block) -> int:
+        """Samples up to the last one that shows how what nobody measured in a block began."""
+        return max(
+            self._last(block, self._by_outlets(block)) if block.beside else 0,
+            self._last(block, self._by_tubes(block)) if block.tubes else 0,
+        )
+
+    def _last(self, block: Block, apart: Array) -> int:
+        """Samples up to the last one at which two predictions can be told apart."""
+        most = self.prepared.settings.prepare.outlet_noises * self.prepared.noise[block.channel]
+        seen = np.flatnonzero(np.abs(apart) > most)
+        return int(seen[-1]) + 1 if seen.size else 0
+
+    def _by_outlets(self, block: Block) -> Array:
+        """What it makes that regulators begin at what they are set to."""
+        prepared = self.prepared
+        outlets = {
+            qualified("supply", name.partition(".")[2]): max(0.0, float(prepared.held[name][0]))
+            for name in _set(block)
+        }
+        try:
+            return predicted(block, self.core, prepared, outlets) - self._from(block, moving=False)
+        except SimulationError:
+            return np.zeros(0)  # the fit says what cannot be predicted
+
+    def _by_tubes(self, block: Block) -> Array:
+        """What it makes that air flowed through tubes before; nothing where it did not."""
+        try:
+            apart = self._from(block, moving=True) - self._from(block, moving=False)
+            little = np.abs(apart).max() <= _BY_NOISE * self.prepared.noise[block.channel]
+            at_rest = all(
+                (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
+            )
+        except SimulationError:
+            return np.zeros(0)
+        return np.zeros(0) if at_rest else apart
+
+    def _stands_still(self, tube: Tube) -> bool:
+        """Whether neither end of a tube is seen to move as the recording begins."""
+        recording = self.prepared.recording
+        early = max(_LEAST_STILL, int(_STILL * tube.delay / self.prepared.dt))
+        names = [name for name in (tube.beginning, tube.end) if name in recording.channels]
+        for name in names:
+            rows = np.flatnonzero(recording.mask[name][:early])
+            if rows.size < _LEAST:
+                return False
+            way = rows - rows.mean()
+            trend = float(way @ recording.channels[name][rows]) / float(np.sqrt(way @ way))
+            if abs(trend) > _SEEN * self.prepared.noise[name]:
+                return False
+        return bool(names)
+
+    def _waits(self, tube: Tube) -> bool:
+        """Whether a tube at rest is opened as the recording begins: until its ends hear of each
+        other, `to` stands still, and neither moves as it would in a flow.
+        """
+        early = int(_SILENT * tube.delay / self.prepared.dt)
+        ends = [name for name in (tube.end, tube.beginning) if name in self.at]
+        tells = [told for name in ends if (told := self._tells(name, early)) is not None]
+        if tube.end not in ends or len(tells) < len(ends):
+            return False
+        fits, _ = tells[0]
+        likely = [more for _, more in tells]
+        return fits and min(likely) > _TELLING
+
+    def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
+        """Whether the first samples of a channel are those of a rest, and by which log likelihood
+        rather than those of a flow; None where there are too few of them.
+        """
+        rows = self.prepared.recording.mask[channel][:early]
+        if rows.sum() < _LEAST:
+            return None
+        read = self.prepared.recording.channels[channel][:early][rows]
+
+        def missed(moving: bool) -> float:
+            left = read - self._from(self.at[channel], moving=moving)[:early][rows]
+            return float(np.var(left)) * left.size / self.prepared.noise[channel] ** 2
+
+        rest, freedom = missed(False), read.size - 1
+        return rest < freedom + 3.0 * math.sqrt(2.0 * freedom), 0.5 * (missed(True) - rest)
+
+    def _from(self, block: Block, *, moving: bool) -> Array:
+        """Prediction of a block whose tubes began at rest, or as a flow leaves them."""
+        key = (block.name, moving)
+        if key not in self._kept:
+            longest = max((tube.delay for tube in block.tubes), default=0.0) / self.prepared.dt
+            before = Before(math.ceil(_STEADY * longest), math.ceil(_MOVING * longest))
+            self._kept[key] = predicted(
+                block, self.core, self.prepared, before=before if moving else None
+            )
+        return self._kept[key]
 
 
 def _set(block: Block) -> list[str]:
     """Commands of the regulators that a block is driven by."""
     return [name for name in block.drives if name.partition(".")[0] == "supply_command"]
+
+
+def _unmeasured(block: Block) -> str:
+    """What nobody measured in a block, in words, and what would tell it."""
+    told = []
+    if block.beside:
+        gauges = [dotted("supply_pressure", name.partition(".")[2]) for name in _set(block)]
+        told.append(
+            "they show where the regulator began, and nobody measured that (a gauge for "
+            f"{' or '.join(gauges)} would)"
+        )
+    if block.tubes:
+        tubes = " and ".join(tube.name for tube in block.tubes)
+        told.append(
+            f"they show what flowed through {tubes} before, and nobody measured that (a recording "
+            "that begins at rest needs not know)"
+        )
+    return ", or ".join(told)
 
 
 def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
@@ -93,10 +220,7 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             told = ", ".join(
                 f"{p.unsettled[block.channel] * p.dt:.3g} s of {p.recording.name}" for p in own
             )
-            regulators = [d.partition(".")[2] for d in _set(block)]
-            what = " or ".join(dotted("supply_pressure", name) for name in regulators)
             said.append(
-                f"block {block.name}: the first {told} were not judged: they show where the "
-                f"regulator began, and nobody measured that (a gauge for {what} would)"
+                f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
             )
     return said

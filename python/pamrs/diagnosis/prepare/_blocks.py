@@ -4,14 +4,17 @@ sensitivities.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
+from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.effects import CLOSURE_OF
@@ -19,9 +22,38 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import default_step
 
-__all__ = ["Block", "Residual", "available_blocks", "change", "predicted", "residual"]
+__all__ = [
+    "Before",
+    "Block",
+    "Residual",
+    "Tube",
+    "available_blocks",
+    "change",
+    "predicted",
+    "residual",
+]
 
 Array = NDArray[np.float64]
+
+
+class Tube(NamedTuple):
+    """A tube of segments, whose states nobody measures.
+
+    Attributes
+    ----------
+    name : str
+        Dotted name of the line.
+    beginning, end : str
+        Channels of the pressures at its ends ``from`` and ``to``, of which its gas begins at the
+        latter; empty where a valve feeds it or it leads to the ambient.
+    delay : float
+        Time that sound takes along it [s].
+    """
+
+    name: str
+    beginning: str
+    end: str
+    delay: float
 
 
 @dataclass(frozen=True)
@@ -46,6 +78,8 @@ class Block:
     beside : tuple of str
         Kinds of block that it simulates as well, since nobody measured them: a regulator whose
         outlet has no gauge.
+    tubes : tuple of Tube
+        Tubes of segments that begin or end at it.
     """
 
     name: str
@@ -56,6 +90,7 @@ class Block:
     step: float
     covers: str
     beside: tuple[str, ...] = ()
+    tubes: tuple[Tube, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -255,6 +290,24 @@ class _Map:
                 names |= {f"{full}.{key}" for key in keys}
         return names
 
+    def tubes_at(self, block: str) -> tuple[Tube, ...]:
+        """The tubes of segments among the ways at a block."""
+        gas = self.rig.tables("gas")[""]
+        ends, found = self.rig.ports("line"), []
+        full = (name for way in self.around(block) for name in (way.name, *way.between))
+        for name in dict.fromkeys(full):
+            kind, _, own = name.partition(".")
+            table = self.rig.tables(kind)[own]
+            if kind != "line" or not table.get("segments"):
+                continue
+            sound = math.sqrt(table["alpha"] * gas["gas_constant"] * gas["temperature"])
+            beginning, end = (
+                self.pressure(node) if node not in ("", "ambient") else ""
+                for node in (ends[own]["from"], ends[own]["to"])
+            )
+            found.append(Tube(name, beginning, end, table["length"] / sound))
+        return tuple(found)
+
     def chambers_at(self, block: str) -> set[str]:
         """Names of the chambers that a block's ways lead to, its own included."""
         ends = {block, *(end for way in self.around(block) for end in way.ends)}
@@ -290,6 +343,7 @@ class _Map:
             frozenset(names),
             step,
             covers + _called(name),
+            tubes=self.tubes_at(full),
         )
 
     def chamber(self, name: str) -> Block | None:
@@ -337,6 +391,7 @@ class _Map:
             step,
             covers + _called(name),
             ("supply",) if unread else (),
+            self.tubes_at(full),
         )
 
     def inlet(self, name: str) -> Block | None:
@@ -366,6 +421,7 @@ class _Map:
             self.settings.gas_step,
             ("regulator and valve" if unread else "valve and line inlet") + _called(name),
             ("supply",) if unread else (),
+            self.tubes_at(full),
         )
 
     def arm(self, joint: str) -> Block | None:
@@ -567,7 +623,11 @@ def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
 
 
 def predicted(
-    block: Block, core: _core.Rig, prepared: Prepared, outlets: dict[str, float] | None = None
+    block: Block,
+    core: _core.Rig,
+    prepared: Prepared,
+    outlets: dict[str, float] | None = None,
+    before: Before | None = None,
 ) -> Array:
     """A block's output over a recording, every window from its measured start.
 
@@ -582,6 +642,8 @@ def predicted(
     outlets : dict of str to float, optional
         Where regulators without a gauge begin [Pa, gauge], by their full names; at the pressure of
         what they feed by default.
+    before : Before, optional
+        What nobody measured begins as this leaves it, and not at rest.
 
     Returns
     -------
@@ -590,18 +652,26 @@ def predicted(
     """
     core = _there(core, prepared)
     starts = prepared.starts(block.window, block.drives)
+    commands = prepared.driving(mechanical=block.mechanical)
+    signals, lead = begun(block, prepared, starts), 0
+    if before is not None:
+        lead = before.samples
+        commands = before.commands(commands, prepared.n)
+        signals = before.signals(signals, prepared)
+        # what is measured starts anew at every sample of it
+        starts = [*range(lead), *(lead + start for start in starts)]
     prediction, _ = core.predict(
         block.name,
-        prepared.driving(mechanical=block.mechanical),
+        commands,
         prepared.dt,
         default_step(prepared.dt, longest=block.step),
         starts,
         [],
-        begun(block, prepared, starts),
-        prepared.n,
+        signals,
+        lead + prepared.n,
         outlets,
     )
-    return prediction
+    return prediction[lead:]
 
 
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:

@@ -1,0 +1,58 @@
+"""What went on before a recording began, as far as its first samples tell."""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import channel_of
+from pamrs.diagnosis.prepare._signals import Prepared
+
+__all__ = ["Before"]
+
+Array = NDArray[np.float64]
+
+#: How far a pressure is followed back to before a recording [Pa]: a rate at its edge is uncertain.
+_MOST_MOVED: Final = 2e4
+_PRESSURES: Final = ("muscle_pressure", "supply_pressure", "line_pressure")
+
+
+class Before(NamedTuple):
+    """What is taken to have gone on before a recording began: commands and pressures stood where
+    they begin, and lately the pressures moved as they begin to move.
+
+    Attributes
+    ----------
+    samples, moving : int
+        How many there were, and how many of them the pressures moved.
+    """
+
+    samples: int
+    moving: int
+
+    def commands(self, own: dict[str, Array], n: int) -> dict[str, Array]:
+        """Commands of a recording of `n` samples with those before it."""
+        return {
+            name: np.concatenate([np.full(self.samples * (values.size // n), values[0]), values])
+            for name, values in own.items()
+        }
+
+    def signals(
+        self, own: dict[str, tuple[Array, Array]], prepared: Prepared
+    ) -> dict[str, tuple[Array, Array]]:
+        """Channels and their time derivatives with those before them."""
+        back = prepared.dt * np.minimum(np.arange(self.samples, 0, -1), self.moving)
+        found = {}
+        for name, (value, slope) in own.items():
+            first, rate = (float(array[0]) for array in prepared.begun(name, [0]))
+            was = np.full(self.samples, first)
+            if channel_of(name) in _PRESSURES:
+                was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)
+                was = np.maximum(was, min(first, -_MOST_MOVED))
+            found[name] = (
+                np.concatenate([was, value]),
+                np.concatenate([np.gradient(was, prepared.dt), slope]),
+            )
+        return found
