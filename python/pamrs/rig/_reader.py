@@ -230,7 +230,9 @@ class Reader:
             if key in keys or _dig(table, key.where) is None:
                 continue
             if of_kind(block, table, key):
-                self.problem(f"{label}.{key.name} is not allowed without {key.needs}: {key.note}")
+                self.problem(
+                    f"{label}.{key.name} is not allowed without {key.needs}: it is {key.note}"
+                )
             else:
                 kind, only = _shown(kind_for(block, table, key)), ", ".join(key.only)
                 self.problem(f"{label}.{key.name} is not allowed with {kind}: only with {only}")

@@ -14,8 +14,6 @@ __all__ = ["Before"]
 
 Array = NDArray[np.float64]
 
-#: How far a pressure is followed back to before a recording [Pa]: a rate at its edge is uncertain.
-_MOST_MOVED: Final = 2e4
 _PRESSURES: Final = ("muscle_pressure", "supply_pressure", "line_pressure")
 
 
@@ -44,13 +42,14 @@ class Before(NamedTuple):
     ) -> dict[str, tuple[Array, Array]]:
         """Channels and their time derivatives with those before them."""
         back = prepared.dt * np.minimum(np.arange(self.samples, 0, -1), self.moving)
+        most = prepared.settings.prepare.most_moved
         found = {}
         for name, (value, slope) in own.items():
             first, rate = (float(array[0]) for array in prepared.begun(name, [0]))
             was = np.full(self.samples, first)
             if channel_of(name) in _PRESSURES:
-                was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)
-                was = np.maximum(was, min(first, -_MOST_MOVED))
+                was -= np.clip(rate * back, -most, most)
+                was = np.maximum(was, min(first, -most))
             found[name] = (
                 np.concatenate([was, value]),
                 np.concatenate([np.gradient(was, prepared.dt), slope]),

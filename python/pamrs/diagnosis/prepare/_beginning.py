@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,25 +27,6 @@ from pamrs.rig.schema import qualified
 __all__ = ["begun_alike", "said_of_beginnings"]
 
 Array = NDArray[np.float64]
-
-#: Delays of a tube after which what flows through it is steady, and of these the last in which the
-#: pressures at its ends have moved.
-_STEADY: Final = 20.0
-_MOVING: Final = 0.5
-#: Share of its delay in which its end hears nothing of the other.
-_SILENT: Final = 0.6
-#: Least samples that tell how something moves.
-_LEAST: Final = 3
-#: Delays, and samples, in which ends that stand still are looked at; standard deviations of a trend
-#: that is seen.
-_STILL: Final = 4.0
-_LEAST_STILL: Final = 8
-_SEEN: Final = 3.0
-#: Noise levels by which the noise of the gauges alone sets two beginnings apart, at most: next to
-#: equal pressures little friction holds a flow.
-_BY_NOISE: Final = 10.0
-#: Log likelihood by which each end of a tube that was at rest tells it from one that was not.
-_TELLING: Final = math.log(1000.0)
 
 
 def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> Prepared:
@@ -110,7 +90,8 @@ class _Beginnings:
         """What it makes that air flowed through tubes before; nothing where it did not."""
         try:
             apart = self._from(block, moving=True) - self._from(block, moving=False)
-            little = np.abs(apart).max() <= _BY_NOISE * self.prepared.noise[block.channel]
+            most = self.prepared.settings.prepare.still_noises
+            little = np.abs(apart).max() <= most * self.prepared.noise[block.channel]
             at_rest = all(
                 (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
             )
@@ -120,16 +101,18 @@ class _Beginnings:
 
     def _stands_still(self, tube: Tube) -> bool:
         """Whether neither end of a tube is seen to move as the recording begins."""
-        recording = self.prepared.recording
-        early = max(_LEAST_STILL, int(_STILL * tube.delay / self.prepared.dt))
+        recording, settings = self.prepared.recording, self.prepared.settings.prepare
+        least = settings.window_samples_per_state
+        early = max(2 * least, int(settings.still_delays * tube.delay / self.prepared.dt))
+        most = settings.still_deviations
         names = [name for name in (tube.beginning, tube.end) if name in recording.channels]
         for name in names:
             rows = np.flatnonzero(recording.mask[name][:early])
-            if rows.size < _LEAST:
+            if rows.size < least:
                 return False
             way = rows - rows.mean()
             trend = float(way @ recording.channels[name][rows]) / float(np.sqrt(way @ way))
-            if abs(trend) > _SEEN * self.prepared.noise[name]:
+            if abs(trend) > most * self.prepared.noise[name]:
                 return False
         return bool(names)
 
@@ -137,21 +120,23 @@ class _Beginnings:
         """Whether a tube at rest is opened as the recording begins: until its ends hear of each
         other, `to` stands still, and neither moves as it would in a flow.
         """
-        early = int(_SILENT * tube.delay / self.prepared.dt)
+        settings = self.prepared.settings.prepare
+        early = int(settings.silent_delays * tube.delay / self.prepared.dt)
         ends = [name for name in (tube.end, tube.beginning) if name in self.at]
         tells = [told for name in ends if (told := self._tells(name, early)) is not None]
         if tube.end not in ends or len(tells) < len(ends):
             return False
         fits, _ = tells[0]
         likely = [more for _, more in tells]
-        return fits and min(likely) > _TELLING
+        least = math.log(settings.rest_likelihood)
+        return fits and min(likely) > least
 
     def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
         """Whether the first samples of a channel are those of a rest, and by which log likelihood
         rather than those of a flow; None where there are too few of them.
         """
         rows = self.prepared.recording.mask[channel][:early]
-        if rows.sum() < _LEAST:
+        if rows.sum() < self.prepared.settings.prepare.window_samples_per_state:
             return None
         read = self.prepared.recording.channels[channel][:early][rows]
 
@@ -167,7 +152,11 @@ class _Beginnings:
         key = (block.name, moving)
         if key not in self._kept:
             longest = max((tube.delay for tube in block.tubes), default=0.0) / self.prepared.dt
-            before = Before(math.ceil(_STEADY * longest), math.ceil(_MOVING * longest))
+            settings = self.prepared.settings.prepare
+            before = Before(
+                math.ceil(settings.flow_delays * longest),
+                math.ceil(settings.moving_delays * longest),
+            )
             self._kept[key] = predicted(
                 block, self.core, self.prepared, before=before if moving else None
             )

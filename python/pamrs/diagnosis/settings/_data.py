@@ -185,8 +185,71 @@ class PrepareSettings(SettingsGroup):
         above=0.0,
         reason="how far the beginning of a regulator without a gauge, at the pressure of what it "
         "feeds or at what it is set to, may move a sample that is judged; less than the noise, "
-        "since all samples of a beginning move the same way",
+        "since all samples of a beginning move the same way; the same of a tube of segments, "
+        "at rest or with a flow before",
         origin="docs/decisions/0092",
+    )
+    flow_delays: float = setting(
+        20.0,
+        unit="delays of the tube",
+        above=0.0,
+        reason="how long air flows through a tube of segments before a recording where it is taken "
+        "not to have been at rest: until the flow is steady",
+        origin="judgement",
+    )
+    moving_delays: float = setting(
+        0.5,
+        unit="delays of the tube",
+        least=0.0,
+        reason="how long of these the pressures at its ends have moved as they begin to move in "
+        "the recording: a flow swings on while they are equal",
+        origin="docs/decisions/0109: 2.8 noises were left without",
+    )
+    most_moved: float = setting(
+        2e4,
+        unit="Pa",
+        least=0.0,
+        reason="how far a pressure is followed back to before a recording: a rate at its edge is "
+        "uncertain",
+        origin="judgement",
+    )
+    silent_delays: float = setting(
+        0.6,
+        unit="delays of the tube",
+        above=0.0,
+        reason="how long its ends hear nothing of each other: a front is smeared over segments",
+        origin="docs/decisions/0109",
+    )
+    still_delays: float = setting(
+        4.0,
+        unit="delays of the tube",
+        above=0.0,
+        reason="how long its ends are looked at for whether they stand still",
+        origin="judgement",
+    )
+    still_noises: float = setting(
+        10.0,
+        unit="noise levels",
+        above=0.0,
+        reason="how far a flow before a recording may move a sample where the ends of a tube of "
+        "segments are not seen to move: next to equal pressures little friction holds it, and the "
+        "noise of the gauges alone makes so much of it",
+        origin="docs/decisions/0109: 3 to 6 at rest, 65 and more in a flow",
+    )
+    still_deviations: float = setting(
+        3.0,
+        unit="standard deviations",
+        above=0.0,
+        reason="trend of a pressure that is seen as its recording begins",
+        origin="judgement",
+    )
+    rest_likelihood: float = setting(
+        1000.0,
+        unit="1",
+        above=1.0,
+        reason="how much more likely a tube at rest makes the first samples at each of its ends "
+        "than a flow, where it is opened as the recording begins",
+        origin="docs/decisions/0109: e^75 and more there, up to e^5 where a swing turns",
     )
     arm_window: float = setting(
         2.5,
