@@ -4,6 +4,8 @@ are tested in the core.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -128,7 +130,9 @@ def test_parameters_of_one_name_are_the_same_in_every_form(effect: str, form: st
     chosen = info.form(form)
     assert chosen.equation
     for parameter in chosen.parameters:
-        assert parameter == known[parameter.name]
+        # what is usual of it may be another: a push is harder than what pulls all the time
+        own, other = (replace(p, prior=None) for p in (parameter, known[parameter.name]))
+        assert own == other
         assert parameter.starts
         assert parameter.lower <= parameter.default <= parameter.upper
         assert parse_unit(parameter.unit).scale == 1.0

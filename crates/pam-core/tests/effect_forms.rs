@@ -495,6 +495,14 @@ fn a_base_gives_way_by_its_compliance() {
     let expected = link - w * w * c * weight;
     let found = run.last("joint_rate") / 1e-4;
     assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
+    // With play between its sides the link stands further, and the spring pulls as before.
+    let play = 0.04;
+    let loose = [&base[..], &[("play", play)]].concat();
+    let spec = EffectSpec { form: "with_play".into(), ..effect("base_flexibility", &loose) };
+    let run = pendulum(vec![spec], 2, 1e-4, 1.0, 0.0);
+    let link = -moment * (1.0 - c * weight - 0.5 * play).sin() / (0.634 + 9.07 * 0.81);
+    let (found, expected) = (run.last("joint_rate") / 1e-4, link - w * w * c * weight);
+    assert!((found / expected - 1.0).abs() < 5e-3, "{found} {expected}");
     // A stiff mounting is none.
     let stiff = [("compliance", 1e-12), ("natural_frequency", 6.0), ("damping_ratio", 0.5)];
     let last = |effects| pendulum(effects, 500, 1e-3, 1.0, 0.0).last("joint_angle");

@@ -251,6 +251,17 @@ pub const FORMS: &[Typical] = &[
         &[("half_width", 0.0), ("half_width_venting", 0.0)],
     ),
     formed(
+        "base_flexibility",
+        "with_play",
+        &[
+            ("compliance", 1e-4),
+            ("natural_frequency", 8.0),
+            ("damping_ratio", 0.3),
+            ("play", 0.01),
+        ],
+        &[("compliance", 0.0)],
+    ),
+    formed(
         "valve_hysteresis",
         "play_with_slope",
         &[("half_width", 0.01), ("slope", 0.3)],
