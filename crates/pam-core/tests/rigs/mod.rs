@@ -253,12 +253,7 @@ pub const FORMS: &[Typical] = &[
     formed(
         "base_flexibility",
         "with_play",
-        &[
-            ("compliance", 1e-4),
-            ("natural_frequency", 8.0),
-            ("damping_ratio", 0.3),
-            ("play", 0.01),
-        ],
+        &[("compliance", 1e-4), ("natural_frequency", 8.0), ("damping_ratio", 0.3), ("play", 0.01)],
         &[("compliance", 0.0)],
     ),
     formed(
