@@ -237,13 +237,15 @@ def same_dimension(first: str, second: str) -> bool:
     Returns
     -------
     bool
-        True if one converts into the other. The angle counts only where nothing else is left.
+        True if one converts into the other. The angle counts only where nothing else is left; and
+        turns in a second, Hz, are no angular speed, rad/s: they differ by 2 pi.
     """
     one, two = parse_unit(first).dimension, parse_unit(second).dimension
     if one[:-1] != two[:-1]:
         return False
-    compound = any(one[:-1])
-    return compound or one[-1] == two[-1]
+    compound, same_angle = any(one[:-1]), one[-1] == two[-1]
+    turns = one[:-1] == _HZ[:-1] and any(unit.endswith("Hz") for unit in (first, second))
+    return same_angle or (compound and not turns)
 
 
 def _checked(unit: str, dimension: str) -> Unit:

@@ -88,6 +88,9 @@ def test_every_law_follows_a_length(kind):
     assert rms(run)[0] < 1.15 * FOUND[kind]
     found = run.metrics()
     assert found.rms == pytest.approx(float(np.sqrt(np.mean(run.error**2))), rel=0.01)
+    assert found.unit == "m"
+    with pytest.raises(ParameterError, match="'deg' is not allowed: one of m"):
+        run.metrics(unit="deg")
 
 
 def test_what_is_left_of_a_feedforward_is_the_lag_of_its_pressure():

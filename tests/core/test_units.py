@@ -108,6 +108,17 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     assert unit.scale > 0.0
 
 
+def test_turns_in_a_second_are_no_angular_speed() -> None:
+    """They differ by 2 pi, and nobody can tell which was meant."""
+    for turns, angular in (("Hz", "rad/s"), ("kHz", "rpm"), ("Hz", "deg/s")):
+        assert not same_dimension(turns, angular)
+        assert not same_dimension(angular, turns)
+    with pytest.raises(ParameterError, match="a unit like 'Hz' is needed"):
+        to_si(20.0, "rad/s", "Hz")
+    assert same_dimension("1/s", "Hz")
+    assert same_dimension("1/s", "rad/s")
+
+
 def test_the_angle_counts_only_alone() -> None:
     assert same_dimension("N m/rad", "N m")
     assert not same_dimension("rad", "1")

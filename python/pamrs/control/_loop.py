@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, rate_of
+from pamrs.channels import channel_of, rate_of, unit_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control.metrics import Metrics, evaluate
@@ -90,15 +90,15 @@ class ClosedLoop:
         """Reference minus angle [rad]."""
         return np.asarray(self.reference.angle - self.angle, dtype=np.float64)
 
-    def metrics(self, joint: str | None = None, *, unit: str = "rad") -> Metrics:
+    def metrics(self, joint: str | None = None, *, unit: str | None = None) -> Metrics:
         """Errors, curvature and phases, see :func:`pamrs.control.metrics.evaluate`.
 
         Parameters
         ----------
         joint : str, optional
             Name of the joint, where several are tracked.
-        unit : {"rad", "deg"}
-            Of the angle in nu and omega.
+        unit : {"rad", "deg"}, optional
+            Of the angle in nu and omega; rad by default. A length is in m.
 
         Returns
         -------
@@ -107,8 +107,8 @@ class ClosedLoop:
         Raises
         ------
         ParameterError
-            If the unit is unknown, the run has less than three rows, or several joints are tracked
-            and none of them is named.
+            If the unit is not one of what is tracked, the run has less than three rows, or several
+            joints are tracked and none of them is named.
         """
         wanted, trajectory, channel = self.reference.angle, self.trajectory, self.joint
         if isinstance(trajectory, JointTrajectories):
@@ -120,13 +120,19 @@ class ClosedLoop:
             k = names.index(joint)
             channel, wanted = self.joints[k], np.asarray(wanted)[k]
             trajectory = trajectory.of_joint[joint]
+        own = unit_of(channel)
+        allowed = ("rad", "deg") if own == "rad" else (own,)
+        if unit is not None and unit not in allowed:
+            raise ParameterError(
+                f"unit = {unit!r} is not allowed: one of {', '.join(allowed)} is needed"
+            )
         return evaluate(
             self.time,
             wanted,
             self.channels[channel],
             rate=self.channels.get(rate_of(channel)),
             parts=trajectory.phases,
-            unit=unit,
+            unit=unit or own,
         )
 
     def to_pandas(self) -> pd.DataFrame:

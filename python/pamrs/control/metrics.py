@@ -90,7 +90,7 @@ def squared_error(
         Rising [s].
     reference, angle : array_like, shape (samples,) or (n, samples)
         [rad]
-    unit : {"rad", "deg"}
+    unit : {"rad", "deg", "m"}
         Of the error in the result.
 
     Returns
@@ -105,7 +105,7 @@ def squared_error(
         and its result is NaN), or the unit is unknown.
     """
     t, e = _error(time, reference, angle)
-    return plain(angle_factor(unit) ** 2 * integral(t, e * e))
+    return plain(_factor(unit) ** 2 * integral(t, e * e))
 
 
 def curvature(
@@ -121,7 +121,7 @@ def curvature(
         [rad]
     rate : array_like, like ``angle``, optional
         [rad/s], where it is known; else central differences of the angle.
-    unit : {"rad", "deg"}
+    unit : {"rad", "deg", "m"}
         Of the angle's axis.
 
     Returns
@@ -383,7 +383,7 @@ def evaluate(
         Of the angle [rad/s], for the curvature.
     parts : mapping of str to (float, float), optional
         As for :func:`phases`.
-    unit : {"rad", "deg"}
+    unit : {"rad", "deg", "m"}
         Of the angle in nu and omega.
 
     Returns
@@ -421,11 +421,16 @@ def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Arr
     return t, np.asarray(r - y, dtype=np.float64)
 
 
+def _factor(unit: str) -> float:
+    """How many of a unit are in a radian, or in a metre of a length."""
+    return 1.0 if unit == "m" else angle_factor(unit)
+
+
 def _rate(
     time: ArrayLike, angle: ArrayLike, rate: ArrayLike | None, unit: str
 ) -> tuple[Array, Array]:
     """Checked time and rate in the unit per second."""
-    factor = angle_factor(unit)
+    factor = _factor(unit)
     t, y = checked(time, "angle", angle)
     if t.size < 3:
         raise ParameterError(f"time has {t.size} samples; a curvature needs three at least")
