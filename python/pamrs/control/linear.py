@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
 
@@ -178,8 +178,10 @@ def equilibrium(
     joints = rig.tables("joint")
     if joint not in joints or chamber not in rig.tables("chamber") or not rig.tables("valve"):
         raise ParameterError(
-            f"rig {rig.name!r} needs a valve, the joint {joint!r} and the chamber {chamber!r}; "
-            "name those it has"
+            f"rig {rig.name!r}: an angle alone says where one joint rests on one chamber behind a "
+            f"valve; it has {_said('joint', joints)}, {_said('chamber', rig.tables('chamber'))} "
+            f"and {_said('valve', rig.tables('valve'))}. Name one of each, or give initial=, such "
+            "as RigController.holding(...)"
         )
     low, high = (joints[joint][key] for key in ("min_angle", "max_angle"))
     if not low < angle < high:
@@ -339,6 +341,14 @@ def _check_driven(
                 f"{name} moves nothing about {value:g} {unit_of(name)} (side = {side!r}): no "
                 "linear model is there"
             )
+
+
+def _said(kind: str, names: Collection[str]) -> str:
+    """The blocks of a kind that a rig has, in words."""
+    known = [name for name in names if name]
+    if known:
+        return f"{kind} {', '.join(known)}"
+    return f"one {kind}" if names else f"no {kind}"
 
 
 def _held_supplies(rig: Rig) -> tuple[str, ...]:

@@ -95,9 +95,12 @@ def _effects() -> list[str]:
                 f"#   at                   name of the one {info.at} that it acts on; default "
                 f"{info.everywhere}"
             )
-        for parameter in info.parameters:
-            unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
-            lines.append(
-                f"#   parameters.{parameter.name}: number{unit}, default {parameter.default:g}"
-            )
+        for form in info.forms:
+            if form is not info.forms[0]:
+                lines.append(f'#   form = "{form.name}"')
+            for parameter in form.parameters:
+                unit = "" if parameter.unit == "1" else f" [{parameter.unit}]"
+                lines.append(
+                    f"#   parameters.{parameter.name}: number{unit}, default {parameter.default:g}"
+                )
     return lines
