@@ -523,8 +523,7 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
     for which the line has to be cut, is offered by a plan alone.
     """
     has = core_rig(rig).channels
-    found = [name for name in sensors if name in has and name not in own]
-    return [name for name in found if name != "line_pressure"]
+    return [name for name in sensors if name in has and name not in (*own, "line_pressure")]
 
 
 def experiments_of(

@@ -533,8 +533,7 @@ def _singles(
     )
 
     if screened.strong:
-        every = {e: ranked[e] for places in worth for e in places}
-        chosen, near = _shortlisted(trial, worth, every, baseline, weight)
+        chosen, near = _shortlisted(trial, worth, ranked, baseline, weight)
     else:
         chosen, near = [], {}
         for rank, places in enumerate(worth[: settings.most_singles]):
@@ -566,7 +565,7 @@ def _begun(scores: Iterable[Score]) -> list[Start]:
 def _shortlisted(
     trial: Attempts,
     worth: list[list[str]],
-    every: dict[str, list[Score]],
+    ranked: dict[str, list[Score]],
     baseline: Fit,
     weight: Weight,
 ) -> tuple[list[str], dict[str, list[Start]]]:
@@ -591,13 +590,13 @@ def _shortlisted(
     def most(effect: str) -> float:
         return weight(short[effect][0]) if short.get(effect) else -math.inf
 
-    best_of = {e: _best_of_each_kind(every[e]) for places in worth for e in places}
-    begin({places[0]: _begun(best_of[places[0]]) for places in worth})
+    best_of = {places[0]: _best_of_each_kind(ranked[places[0]]) for places in worth}
+    begin({effect: _begun(best) for effect, best in best_of.items()})
     first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
-        {p[0]: _begun(s for s in every[p[0]] if s not in best_of[p[0]]) for p in first}
+        {p[0]: _begun(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
         | {
-            e: _begun(every[e])
+            e: _begun(ranked[e])
             for places in first[: settings.effects_with_starts]
             for e in places[1:]
         }
