@@ -9,7 +9,13 @@ recording.
 from __future__ import annotations
 
 from pamrs.simulation._batch import Batch, BatchRun, Failure
-from pamrs.simulation._driving import has_frame, initial_names, input_names, regulators_of
+from pamrs.simulation._driving import (
+    has_frame,
+    initial_names,
+    input_names,
+    regulators_of,
+    switching_valves,
+)
 from pamrs.simulation._replay import differences, replay
 from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
 from pamrs.simulation._simulation import (
@@ -39,6 +45,7 @@ __all__ = [
     "initial_names",
     "input_names",
     "regulators_of",
+    "switching_valves",
     "replay",
     "simulate",
     "simulate_batch",

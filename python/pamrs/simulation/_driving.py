@@ -28,6 +28,7 @@ __all__ = [
     "inputs_of",
     "keywords",
     "regulators_of",
+    "switching_valves",
     "sensor_zero",
     "signals_of",
 ]
@@ -353,6 +354,11 @@ def has_frame(rig: Rig) -> bool:
 def regulators_of(rig: Rig) -> list[str]:
     """Names of the supplies that are regulators."""
     return [name for name, table in rig.tables("supply").items() if table["kind"] == "regulator"]
+
+
+def switching_valves(rig: Rig) -> list[str]:
+    """Names of the valves that switch."""
+    return [name for name, table in rig.tables("valve").items() if table["spool"] == "switching"]
 
 
 def sensor_zero(rig: Rig, key: str, block: str) -> float:

@@ -48,7 +48,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
 from pamrs.effects import CATALOGUE
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig, has_frame, regulators_of
+from pamrs.simulation import core_rig, has_frame, regulators_of, switching_valves
 
 __all__ = ["plan_diagnosis"]
 
@@ -294,7 +294,7 @@ def _check_rig(rig: Rig) -> None:
         if several
         else "",
         "its valve switches; valves that open by degrees can be planned"
-        if any(table["spool"] == "switching" for table in rig.tables("valve").values())
+        if switching_valves(rig)
         else "",
         "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned"
         if regulators_of(rig)

@@ -23,7 +23,7 @@ from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
-from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
+from pamrs.simulation import Simulation, Simulator, regulators_of, simulate, switching_valves
 
 __all__ = ["Experiment", "Range", "is_sealed", "library", "pressure_range", "trial_of"]
 
@@ -641,7 +641,7 @@ def library(
             f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for "
             "rigs of one chain"
         )
-    if any(table["spool"] == "switching" for table in rig.tables("valve").values()):
+    if switching_valves(rig):
         raise DiagnosisError(
             f"rig {rig.name!r} has a valve that switches; experiments are made for valves that "
             "open by degrees"
