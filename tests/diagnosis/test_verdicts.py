@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
@@ -104,6 +106,35 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
     assert judged[0].probability("pressure_lag") > 0.8
     assert case_probabilities(judged, SETTINGS.verdict)["pressure_lag"] > 0.7
     assert judged[1].probability("pressure_lag") > 0.9
+
+
+def with_encoder(found: Group, size: float) -> Group:
+    """The group with a value of the encoder's error in its hypothesis."""
+    fit = found.candidates[0].fit
+    values = {"encoder_error.sine": size}
+    own = [
+        replace(c, fit=replace(fit, effects=c.effects, values=values))
+        if c.names == ("encoder_error",)
+        else c
+        for c in found.candidates
+    ]
+    return replace(found, candidates=own)
+
+
+def test_what_two_groups_have_is_paid_for_once() -> None:
+    """The price of an effect, and of a value that is rare, is that of one effect."""
+    gas = {"encoder_error": 0.95, "unlisted": 0.05}
+    arm = {"sensors.pressure_zero": 0.9, "encoder_error": 0.05, "unlisted": 0.05}
+
+    def of_arm(size: float) -> float:
+        judged, _ = said(
+            with_encoder(group("chamber", gas), size), with_encoder(group("arm", arm), size)
+        )
+        return judged[1].probability("encoder_error")
+
+    alone = judge([group("arm", arm)], SETTINGS)[0].probability("encoder_error")
+    usual, rare = of_arm(0.0), of_arm(0.2)  # 20 standard deviations of what is usual
+    assert alone < usual < 0.5 < rare
 
 
 def test_open_sets_stand_beside_what_is_settled() -> None:

@@ -113,6 +113,17 @@ def test_how_far_a_value_is(name: str, value: float, distance: float | None) -> 
     assert found.outside(1.0) == pytest.approx(math.log(expected))
 
 
+def test_of_two_that_leave_less_than_forms_do_the_one_that_leaves_less() -> None:
+    """A hundredth of a strong mismatch is far above the noise, although a right name in another
+    form may leave it; of a mismatch near the noise it is next to nothing.
+    """
+    creep, damping = hypothesis(CREEP, 1e-6), hypothesis(DAMPING, 1e-6)
+    near = weighed(creep, damping)
+    far = weighed(hypothesis(CREEP, 1e-2), damping)
+    assert far["muscle_creep"] < 0.2 * near["muscle_creep"]
+    assert far["muscle_rate_damping"] > 0.7
+
+
 def test_what_a_set_is_not_trusted_with_falls_to_its_part() -> None:
     """A push beside a damping may be anything: it is not trusted, and takes nothing from the
     damping, which by itself explains more than half.

@@ -18,12 +18,9 @@ import math
 import os
 import time
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
-
-from threadpoolctl import threadpool_limits
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
@@ -231,7 +228,7 @@ def diagnose(
     gas = [b for b in blocks if not b.mechanical]
     motion = [b for b in blocks if b.mechanical]
     with _in_range(case.name):
-        groups = _examined(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
+        groups = examine(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
         groups = [calibrated(group, chosen.verdict) for group in groups]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
@@ -255,24 +252,6 @@ def diagnose(
     return replace(
         diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
     )
-
-
-def _examined(
-    inner: Problem, outer: Problem, nominal: Rig, parts: list[list[Block]], say: Say
-) -> list[Group]:
-    """The groups of the gas and of what moves, which share no parameter: both at the same time."""
-
-    def one(part: list[Block]) -> list[Group]:
-        return examine(inner, outer, nominal, part, say)
-
-    # two processors are kept busy by recordings and parts; threads of the linear algebra would only
-    # wait for each other
-    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(len(parts)) as pool:
-        try:
-            return [group for groups in pool.map(one, parts) for group in groups]
-        except BaseException:
-            inner.stopped.set()
-            raise
 
 
 def _check_rig(case: Case) -> None:

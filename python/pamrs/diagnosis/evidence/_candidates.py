@@ -5,9 +5,11 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 
+from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
     Fit,
     Key,
@@ -72,6 +74,8 @@ class Candidate:
     places : float
         Logarithm of how many places its effects could have been said to act at: by so much each is
         less probable before any data.
+    densities : callable
+        Logarithms of the density of what it leaves, by block and stretch of time.
     """
 
     effects: tuple[str, ...]
@@ -83,6 +87,7 @@ class Candidate:
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
     places: float = 0.0
+    densities: Callable[[], Densities] = field(default=dict, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,7 +103,11 @@ class Candidate:
         """How far outside its tolerances what is wrong is: the logarithm of how many times the
         walls, of each parameter.
         """
-        return sum(math.log(max(1.0, self._distance(name) / walls)) for name in self.wrong)
+        return sum(self.outside_of(name, walls) for name in self.wrong)
+
+    def outside_of(self, name: str, walls: float) -> float:
+        """The same of one of its wrong parameters."""
+        return math.log(max(1.0, self._distance(name) / walls))
 
     def _distance(self, name: str) -> float:
         """How far a parameter is from its nominal value in tolerances; of one that cannot be
@@ -370,6 +379,19 @@ class Attempts:
             gap,
             _scatter(effects, self.inner, found),
             places=sum(math.log(len(self.terms_of(id_of(e)))) for e in effects),
+            densities=cache(partial(self._densities, found.residuals, outside)),
+        )
+
+    def _densities(
+        self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
+    ) -> Densities:
+        """Logarithms of the density of what a set leaves of its recordings and of the others."""
+        return log_densities(
+            self.inner.blocks,
+            (self.inner.recordings, inside),
+            (self.outer.recordings, outside),
+            self.noise_level,
+            self.settings.evidence,
         )
 
     def terms_of(self, effect: str) -> list[str]:

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
+from pamrs.diagnosis.evidence._weighing import paid_for
 from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
 from pamrs.effects import exclude, is_effect
 from pamrs.findings import HEALTHY
@@ -134,20 +135,59 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
         Odds of what is shared, probabilities from which something is named or left open.
     """
     own = [_own(group, settings) for group in groups]
+    several = _in_several(own)
+    paid = [_paid(group, several, settings) for group in groups]
     beside: list[dict[str, float]] = [{} for _ in groups]
     for choice in itertools.product(*(p.items() for p in own)):
-        effects = [n for key, _ in choice for n in key.split("+") if n not in WITHOUT_NAME]
-        if not _together(effects):
+        keys = [key for key, _ in choice]
+        names = [n for key in keys for n in key.split("+") if n not in WITHOUT_NAME]
+        if not _together(names):
             continue  # one effect everywhere and at a place of its own
-        weight = math.prod(p for _, p in choice) * settings.verdict.shared_odds ** (
-            len(effects) - len(set(effects))
-        )
+        weight = math.prod(p for _, p in choice)
+        for name in several:
+            prices = [
+                prices.get((key, name), 0.0)
+                for key, prices in zip(keys, paid, strict=True)
+                if name in key.split("+")
+            ]
+            weight *= _odds_shared(prices, settings.verdict)
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
     return [
         _judged(group, _normalised(found), settings.verdict)
         for group, found in zip(groups, beside, strict=True)
     ]
+
+
+def _in_several(own: Sequence[Mapping[str, float]]) -> set[str]:
+    """Names that hypotheses of several groups have."""
+    named = [set(_names(found)) for found in own]
+    return {name for one, two in itertools.combinations(named, 2) for name in one & two}
+
+
+def _paid(
+    group: Group, names: set[str], settings: DiagnosisSettings
+) -> dict[tuple[str, str], float]:
+    """What each set of a group lost by each of these names before any data, as far as it counts."""
+    if group.mismatch is None or group.below_noise:
+        return {}
+    certainty = settings.verdict.certainty
+    return {
+        (c.key, name): certainty * paid_for(c, name, settings)
+        for c in group.candidates
+        for name in names & set(c.names)
+    }
+
+
+def _odds_shared(prices: Sequence[float], settings: VerdictSettings) -> float:
+    """Odds of one name in so many groups of blocks to as many names, by what each paid for it.
+
+    What is there once is paid for once: the dearest price stays, the others are given back.
+    """
+    if len(prices) < 2:
+        return 1.0
+    again = sum(prices) - max(prices)
+    return settings.shared_odds ** (len(prices) - 1) * math.exp(again)
 
 
 def _together(names: list[str]) -> bool:

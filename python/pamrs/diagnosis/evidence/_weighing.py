@@ -11,6 +11,7 @@ from scipy.stats import chi2
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
+from pamrs.diagnosis.evidence._predictive import bootstrapped
 from pamrs.diagnosis.fit import Problem, form_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
@@ -21,9 +22,11 @@ __all__ = [
     "capped",
     "explains",
     "log_weight",
+    "paid_for",
     "penalty",
     "price",
     "probability_cap",
+    "room_beside",
     "same_recordings",
     "share_left",
     "stands",
@@ -182,9 +185,42 @@ def weigh(
         weights |= {c: share * fine[c] for c in alike}
     weights = _between_places(weights, suspects, evidence)
     out = _trusted_parts(weights, trusted)
+    lost = _lost_by_priors(plain, evidence)
+    priors = {
+        c: math.log(max(trusted[c], 1e-300)) - _before(c, settings) - against[c] - lost[c]
+        for c in named
+    }
+    out = _with_prediction(out, priors, suspects, evidence)
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
+
+
+def _with_prediction(
+    out: Mapping[str, float],
+    priors: Mapping[Candidate, float],
+    suspects: list[Block],
+    settings: EvidenceSettings,
+) -> dict[str, float]:
+    """Probabilities of sets by what each leaves, and by how well each predicts, in equal parts.
+
+    The two err in other places: what is left counts few independent looks of the whole, prediction
+    many stretches of time, each with its own correlation. Together the sets keep the probability
+    that they have against what has no name. ``priors`` are logarithms of what each set weighs
+    before any stretch.
+    """
+    whole = sum(out.values())
+    densities = [c.densities() for c in priors]
+    if whole <= 0.0 or not all(b.name in d for b in suspects for d in densities):
+        return dict(out)
+    scores = np.array([np.concatenate([d[b.name] for b in suspects]) for d in densities])
+    if scores.size == 0:
+        return dict(out)
+    shares = bootstrapped(scores, np.array(list(priors.values())), settings)
+    found = {key: (1.0 - settings.predictive_share) * p for key, p in out.items()}
+    for c, share in zip(priors, shares, strict=True):
+        found[c.key] += settings.predictive_share * whole * float(share)
+    return found
 
 
 def _plain(
@@ -445,20 +481,25 @@ def same_recordings(
 def _beside_values(
     scores: dict[Candidate, float], settings: EvidenceSettings
 ) -> dict[Candidate, float]:
-    """Scores of effects and of wrong values made comparable: what the priors of the other
-    parameters lose counts between the two.
+    """Scores of effects and of wrong values made comparable, by what their priors lose."""
+    lost = _lost_by_priors(scores, settings)
+    return {c: score - lost[c] for c, score in scores.items()}
+
+
+def _lost_by_priors(
+    scores: Mapping[Candidate, float], settings: EvidenceSettings
+) -> dict[Candidate, float]:
+    """What the priors of the other parameters lose, which counts between effects and wrong values.
 
     A value that is wrong lets the others go back to where they were expected; sets of effects keep
     their order among each other, since what moves beside them is the form of their equations as
     well.
     """
     if not any(c.wrong for c in scores):
-        return scores
+        return dict.fromkeys(scores, 0.0)
     effects = [c for c in scores if not c.wrong]
     shared = strained(max(effects, key=lambda c: scores[c]), settings) if effects else 0.0
-    return {
-        c: score - (strained(c, settings) if c.wrong else shared) for c, score in scores.items()
-    }
+    return {c: strained(c, settings) if c.wrong else shared for c in scores}
 
 
 def strained(candidate: Candidate, settings: EvidenceSettings) -> float:
@@ -549,21 +590,25 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
     contact is met near an end of the motion, and what acts over most of the range is none; other
     parameters lose by how many times they are outside the range of usual values, for certain.
     """
-    lost = 0.0
-    forms = {effect: form_in(candidate.fit.rig, effect) for effect in candidate.fit.effects}
-    for name, value in _effect_values(candidate):
-        usual = usual_values(name, forms)
-        if usual is not None:
-            lost += math.log1p(((value - usual[0]) / usual[1]) ** 2)
+    lost = sum(_rare(candidate, name, settings) for name in candidate.fit.effect_values)
     for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
         lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
-    for name, value in _effect_values(candidate):
-        expected = find_parameter(name).expected
-        if expected is not None:
-            (low, high), wide = expected, 2.0 * candidate.fit.std.get(name, 0.0)
-            times = max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)
-            outside = math.log(times) / math.log(settings.range_factor)
-            lost += min(0.5 * outside**2, settings.most_range_price)
+    return lost
+
+
+def _rare(candidate: Candidate, name: str, settings: EvidenceSettings) -> float:
+    """What a set loses by the value of one parameter of an effect."""
+    lost, value = 0.0, candidate.fit.values[name]
+    effect = name.partition(".")[0]
+    usual = usual_values(name, {effect: form_in(candidate.fit.rig, effect)})
+    if usual is not None:
+        lost += math.log1p(((value - usual[0]) / usual[1]) ** 2)
+    expected = find_parameter(name).expected
+    if expected is not None:
+        (low, high), wide = expected, 2.0 * candidate.fit.std.get(name, 0.0)
+        times = max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)
+        outside = math.log(times) / math.log(settings.range_factor)
+        lost += min(0.5 * outside**2, settings.most_range_price)
     return lost
 
 
@@ -593,19 +638,66 @@ def _score(
     """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is
     granted to the forms of equations.
     """
-    total, evidence = 0.0, settings.evidence
+    lost = _lost_by_left(candidate, baseline, suspects, share, settings.evidence)
+    return -lost - _before(candidate, settings)
+
+
+def _lost_by_left(
+    candidate: Candidate,
+    baseline: Candidate,
+    suspects: list[Block],
+    share: float,
+    settings: EvidenceSettings,
+) -> float:
+    """What a set loses by what it leaves, ``share`` of the mismatch being granted to forms."""
+    total = 0.0
     once = candidate.fitted == candidate.held_out  # the same recordings twice
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
-            total -= 0.25 * evidence.looks * math.log(1.0 + left + share * excess)
+            total += 0.25 * settings.looks * math.log(1.0 + left + share * excess)
+            # of two that leave less than forms may, the one that leaves less is the more probable
+            total += 0.25 * settings.looks_within * math.log(1.0 + left)
             # of a mismatch near the noise the noise says how much may be left, of a strong one the
             # forms
             spread = math.hypot(
-                now[block.name].scatter, evidence.form_error * excess, evidence.noise_error
+                now[block.name].scatter, settings.form_error * excess, settings.noise_error
             )
-            total -= min(0.5 * (left / spread) ** 2, evidence.decided) * (0.5 if once else 1.0)
-    return total - price(candidate, settings) - evidence.further_price * (len(candidate.names) - 1)
+            total += min(0.5 * (left / spread) ** 2, settings.decided) * (0.5 if once else 1.0)
+    return total
+
+
+def _before(candidate: Candidate, settings: DiagnosisSettings) -> float:
+    """What a set loses before any data: its price, and that of every name beyond the first."""
+    further = settings.evidence.further_price * (len(candidate.names) - 1)
+    return price(candidate, settings) + further
+
+
+def room_beside(
+    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
+) -> float:
+    """By how much the logarithm of a set's weight could rise with something beside it, which left
+    nothing at all.
+    """
+    share = settings.form_share
+    least = sum(
+        0.25 * settings.looks * math.log(1.0 + share * max(0.0, was[block.name].ratio - 1.0))
+        for was in (baseline.fitted, baseline.held_out)
+        for block in suspects
+    )
+    return _lost_by_left(candidate, baseline, suspects, share, settings) - least
+
+
+def paid_for(candidate: Candidate, name: str, settings: DiagnosisSettings) -> float:
+    """What a set loses by one of its names before any data: by the parameters of an effect and
+    their values, or by how far a parameter of the file is wrong.
+    """
+    evidence = settings.evidence
+    if name in candidate.wrong:
+        return evidence.wrong_price + candidate.outside_of(name, settings.fit.most_tolerances)
+    own = [n for n in candidate.fit.effect_values if n.partition(".")[0] == name]
+    counted = sum(not find_parameter(n).repeats for n in own)
+    return evidence.parameter_price * counted + sum(_rare(candidate, n, evidence) for n in own)
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:

@@ -6,8 +6,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
+
+from threadpoolctl import threadpool_limits
 
 from pamrs.diagnosis.evidence import (
     Attempts,
@@ -49,13 +52,14 @@ from pamrs.diagnosis.search._sets import (
     Weight,
     beside_wrong,
     left_everywhere,
+    no_room_beside,
     settles,
     several,
     without_needless,
 )
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
-from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData, id_of, info_of
+from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData, exclude, id_of, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -66,12 +70,15 @@ Say = Callable[[str], None]
 
 
 def examine(
-    fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
+    fitted: Problem, held: Problem, nominal: Rig, parts: list[list[Block]], say: Say
 ) -> list[Group]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
-    The blocks are one group, unless no name explains all of them and one does explain a block in
-    which alone it acts: then that block is a group of its own.
+    Each part is examined by itself, all at the same time; then what one names is tried in the
+    others where it acts there as well, from the values that it has: one effect may be easily found
+    in one place and hardly in another. The blocks of a part are one group, unless no name explains
+    all of them and one does explain a block in which alone it acts: then that block is a group of
+    its own.
 
     Parameters
     ----------
@@ -79,10 +86,37 @@ def examine(
         Recordings to fit and held-out ones (the same when there are no others).
     nominal : Rig
         Nominal model.
-    blocks : list of Block
-        Blocks that share parameters.
+    parts : list of list of Block
+        Blocks that share parameters, part by part.
     say : callable
         Receives progress.
+    """
+
+    def begin(blocks: list[Block]) -> _Mismatch | Group:
+        return _begun_with(fitted, held, nominal, blocks, say)
+
+    def end(part: _Mismatch | Group) -> list[Group]:
+        if isinstance(part, Group):
+            return [part]
+        others = [p for p in begun if p is not part and not isinstance(p, Group)]
+        return part.beside([start for p in others for start in p.leading]).groups(say)
+
+    # two processors are kept busy by recordings and parts; threads of the linear algebra would only
+    # wait for each other
+    with threadpool_limits(1, user_api="blas"), ThreadPoolExecutor(len(parts)) as pool:
+        try:
+            begun = list(pool.map(begin, parts))
+            return [group for groups in pool.map(end, begun) for group in groups]
+        except BaseException:
+            fitted.stopped.set()
+            raise
+
+
+def _begun_with(
+    fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
+) -> _Mismatch | Group:
+    """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
+    noise, the group that they are.
     """
     inner, outer = replace(fitted, blocks=blocks), replace(held, blocks=blocks)
     names = " and ".join(b.name for b in blocks)
@@ -97,10 +131,10 @@ def examine(
         common = _together(refit.trial, refit.start)
         if common is not None:
             tell("one baseline leaves noise in all recordings")
-            return [_healthy(refit, common)]
+            return _healthy(refit, common)
     if not refit.trial.suspects:
-        return [_quiet(refit, say, tell)]
-    return _explained(refit, say, tell)
+        return _quiet(refit, say, tell)
+    return _explained(refit, tell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,10 +254,8 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
 
 
-def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
-    """A group that keeps a mismatch, with every hypothesis that was tried for it; in parts where
-    names explain parts of it.
-    """
+def _explained(refit: _Refit, tell: Say) -> _Mismatch:
+    """A mismatch with every hypothesis that was tried for it."""
     trial, start = refit.trial, refit.start
     suspects, now, settings = trial.suspects, start.fitted, trial.settings
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
@@ -252,20 +284,92 @@ def _explained(refit: _Refit, say: Say, tell: Say) -> list[Group]:
     )
     candidates = _hypotheses(refit, screened, mistaken, transient, terms, tell)
     candidates, weighed = _weighed(trial, candidates, terms, tell)
-    if marginal:
-        none = settings.search.marginal_probability
-        weighed |= {"": none * weighed["unlisted"], "unlisted": (1.0 - none) * weighed["unlisted"]}
-    group = replace(
-        refit.group(candidates, weighed, mismatch),
-        inclusion=inclusion(
-            screened, settings.search.least_gain, settings.search.partner_share, settings
-        ),
-        predicted_gain=_predicted_gain(
-            screened, now[mismatch.name], settings.search.marginal_excess
-        ),
-    )
-    parts = _apart(group, trial, terms) if weighed["unlisted"] > settings.search.split_from else []
-    return parts or [_with_form(group, refit, say, tell)]
+    return _Mismatch(refit, mismatch, screened, terms, marginal, candidates, weighed, tell)
+
+
+@dataclass(frozen=True, eq=False)
+class _Mismatch:
+    """What some blocks keep after the refit, with the hypotheses that were tried for it.
+
+    Attributes
+    ----------
+    refit : _Refit
+        The refit of their parameters.
+    block : Block
+        The one that keeps most.
+    screened : Screen
+        Signatures of the effects.
+    terms : _Terms
+        What hypotheses are weighed by.
+    marginal : bool
+        Whether so little is left that the noise level may as well have been estimated too low.
+    candidates : list of Candidate
+        The baseline first, then every hypothesis.
+    weighed : dict of str to float
+        Their probabilities.
+    tell : callable
+        Receives progress.
+    """
+
+    refit: _Refit
+    block: Block
+    screened: Screen
+    terms: _Terms
+    marginal: bool
+    candidates: list[Candidate]
+    weighed: dict[str, float]
+    tell: Say
+
+    @property
+    def leading(self) -> list[Start]:
+        """The lasting effects of the hypothesis that leads, as they were fitted; none where nothing
+        is as probable as what has no name.
+        """
+        trial, named = self.refit.trial, [c for c in self.candidates if c.names]
+        best = max(named, key=lambda c: _odds(self.weighed, c), default=None)
+        if best is None or _odds(self.weighed, best) <= self.weighed.get("unlisted", 0.0):
+            return []
+        lasting = best.fit.events is None
+        return [trial.start_of(best.fit, e) for e in best.effects] if lasting else []
+
+    def beside(self, starts: list[Start]) -> _Mismatch:
+        """The same with what other blocks name tried here, where it acts: alone, and beside what
+        leads here.
+        """
+        trial, start = self.refit.trial, self.candidates[0]
+        acting = [s for s in starts if any(acts_in(s.effect, b) for b in trial.suspects)]
+        if not acting:
+            return self
+        self.tell("trying " + ", ".join(s.effect for s in acting) + ", which other blocks have")
+        named = [c for c in self.candidates if c.effects and c.fit.events is None]
+        best = max(named, key=lambda c: _odds(self.weighed, c), default=None)
+        found: list[Candidate | None] = []
+        for one in acting:
+            found.append(trial.fitted([one], start.fit, trial.white))
+            if best is not None and not exclude(one.effect, best.effects):
+                own = [trial.start_of(best.fit, e) for e in best.effects]
+                found.append(trial.together([*own, one], best.fit, best.wrong))
+        candidates = _one_of_each([*self.candidates, *(c for c in found if c is not None)])
+        candidates, weighed = _weighed(trial, candidates, self.terms, self.tell)
+        return replace(self, candidates=candidates, weighed=weighed)
+
+    def groups(self, say: Say) -> list[Group]:
+        """The blocks as one group, or in parts where names explain parts of them."""
+        refit, weighed, settings = self.refit, dict(self.weighed), self.refit.trial.settings.search
+        if self.marginal:
+            none, unlisted = settings.marginal_probability, weighed["unlisted"]
+            weighed |= {"": none * unlisted, "unlisted": (1.0 - none) * unlisted}
+        now = refit.start.fitted[self.block.name]
+        group = replace(
+            refit.group(self.candidates, weighed, self.block),
+            inclusion=inclusion(
+                self.screened, settings.least_gain, settings.partner_share, refit.trial.settings
+            ),
+            predicted_gain=_predicted_gain(self.screened, now, settings.marginal_excess),
+        )
+        unlisted = weighed["unlisted"] > settings.split_from
+        parts = _apart(group, refit.trial, self.terms) if unlisted else []
+        return parts or [_with_form(group, refit, say, self.tell)]
 
 
 @dataclass(frozen=True)
@@ -318,7 +422,7 @@ def _hypotheses(
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
     that are wrong.
     """
-    trial, start, evidence = refit.trial, refit.start, refit.trial.settings.evidence
+    trial, start = refit.trial, refit.start
 
     alone = partial(
         log_weight,
@@ -333,10 +437,7 @@ def _hypotheses(
     value = max(mistaken, key=alone, default=None)
     leads = value is not None and all(alone(c) <= alone(value) for c in singles)
     weight = partial(alone, value=value if leads else None)
-    least = trial.settings.search.transient_from
-    if transient and all(
-        share_left(c, start, trial.compared, evidence) > least for c in (*singles, *mistaken)
-    ):
+    if transient and not any(no_room_beside(c, trial, start) for c in (*singles, *mistaken)):
         tell(f"looking for what happens at times of its own ({', '.join(transient)})")
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)

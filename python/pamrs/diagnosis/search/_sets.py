@@ -10,7 +10,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import Attempts, Candidate, explains, share_left, significant
+from pamrs.diagnosis.evidence import (
+    Attempts,
+    Candidate,
+    explains,
+    room_beside,
+    share_left,
+    significant,
+)
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
@@ -22,6 +29,7 @@ __all__ = [
     "Weight",
     "beside_wrong",
     "left_everywhere",
+    "no_room_beside",
     "settles",
     "several",
     "without_needless",
@@ -391,13 +399,20 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     What a single effect leaves may be no more than the difference between its equation and the
     truth; a value of the rig file that was wrong leaves noise.
     """
-    evidence = trial.settings.evidence
-    if explains(candidate, start, trial.compared, evidence):
+    if explains(candidate, start, trial.compared, trial.settings.evidence):
         return True
     if not candidate.effects:
         return False  # another value leaves nothing to the form of an equation
-    little = share_left(candidate, start, trial.compared, evidence) < evidence.form_share
-    return little and not _untouched(candidate, start, trial)
+    return no_room_beside(candidate, trial, start) and not _untouched(candidate, start, trial)
+
+
+def no_room_beside(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+    """Whether even an effect of one parameter that left nothing beside a hypothesis would weigh
+    less with it than the hypothesis does alone.
+    """
+    evidence = trial.settings.evidence
+    least = evidence.further_price + evidence.parameter_price
+    return room_beside(candidate, start, trial.compared, evidence) < least
 
 
 def left_everywhere(candidate: Candidate) -> float:

@@ -57,6 +57,51 @@ class EvidenceSettings(SettingsGroup):
         reason="independent looks that a block's residual counts for",
         origin="docs/decisions/0014: tuned on seed 501",
     )
+    looks_within: float = setting(
+        1.0,
+        unit="1",
+        least=0.0,
+        reason="the same of what is left below what a form is granted: of two "
+        "equations that leave less than forms do, the one that leaves less",
+        origin="docs/decisions/0114: seeds 11301 and 11501",
+    )
+    predictive_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the probability of names that goes by the density of recordings under "
+        "each hypothesis, stretch by stretch; the rest goes by how much each leaves",
+        origin="docs/decisions/0114: the mean of the two is better than either",
+    )
+    predictive_order: int = setting(
+        4,
+        unit="1",
+        least=1,
+        reason="order of the autoregression of what a hypothesis leaves",
+        origin="docs/decisions/0114: 1, 2, 4 and 8 do alike",
+    )
+    predictive_stretch: float = setting(
+        3.0,
+        unit="s",
+        above=0.0,
+        reason="length of the stretches that are drawn: longer than what a start of a joint does",
+        origin="docs/decisions/0114: 3 and 6 s do alike",
+    )
+    predictive_draws: int = setting(
+        1000,
+        unit="1",
+        least=1,
+        reason="draws of the bootstrap",
+        origin="judgement: a share is then known to 2 %",
+    )
+    predictive_seed: int = setting(
+        0,
+        unit="1",
+        least=0,
+        reason="seed of the bootstrap",
+        origin="any",
+    )
     parameter_price: float = setting(
         0.5,
         unit="log odds",

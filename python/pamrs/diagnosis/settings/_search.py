@@ -188,17 +188,6 @@ class SearchSettings(SettingsGroup):
         "with the effects that leave least",
         origin="docs/decisions/0053: it takes a fifth, as a further effect has to",
     )
-    transient_from: float = setting(
-        0.04,
-        unit="1",
-        least=0.0,
-        reason=(
-            "share of the mismatch that every persistent effect leaves, from which transient ones "
-            "are looked for"
-        ),
-        origin="docs/decisions/0053: what settles a mismatch leaves less; creep fitted to its end "
-        "leaves 7 % of a payload that is poured",
-    )
     transient_beside: float = setting(
         0.08,
         unit="1",
