@@ -241,6 +241,14 @@ class PairPlant(Solver):
         half = load / (gf - ge)
         return level + half, level - half
 
+    def normalised(self, commands: tuple[float, float]) -> tuple[float, float]:
+        """Commands [V] of both valves as parts of half their strokes, -1..1."""
+        return self.flexor.normalised(commands[0]), self.extensor.normalised(commands[1])
+
+    def derivative(self, state: Sequence[float], opening: tuple[float, float]) -> State:
+        """Time derivative of the state at signed openings of both valves (before their lags)."""
+        return self._rhs(list(state), opening)
+
     def tick(self, y: State) -> State:
         """State after what effects do once per sample (relays, largest values, play)."""
         if not any(plant.ticks for plant in self.plants):
