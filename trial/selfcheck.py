@@ -37,10 +37,12 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float]:
     return dict(zip(names, (float(e) for e in error), strict=True))
 
 
-def _opening(plant: Plant | PairPlant, index: int) -> Any:
-    """Opening of the valve, or of both of a pair, in one of the tenths of a second of a check."""
-    move = 0.5 * math.sin(0.9 * index)
-    move = round((move + 0.25 * (index < 15)) / DAC_STEP) * DAC_STEP
+def _opening(plant: Plant | PairPlant, index: int, step: float = 0.0) -> Any:
+    """Opening of the valve, or of both of a pair, in one of the tenths of a second of a check; the
+    command comes in steps [V] where one is given.
+    """
+    move = 0.5 * math.sin(0.9 * index) + 0.25 * (index < 15)
+    move = round(move / step) * step if step else move
     if isinstance(plant, PairPlant):
         return plant.normalised((5.0 + move, 5.0 - 0.8 * move + 0.1))
     return plant.normalised(5.0 + move)
@@ -67,7 +69,7 @@ def against_lsoda(plant: Plant | PairPlant, seconds: float = 3.0) -> float:
     other = list(y)
     step, worst = 1.0e-3, 0.0
     for i in range(round(seconds / 0.1)):
-        opening = _opening(plant, i)
+        opening = _opening(plant, i, DAC_STEP)
         y, step = plant.advance(y, opening, 0.1, step)
 
         def slope(_: float, state: Any, x: Any = opening) -> list[float]:
