@@ -21,7 +21,7 @@ from trial.pair.plant import PairPlant, pair_parameters
 from trial.pair.recording import CHANNELS, PairPath
 from trial.plant import Plant
 from trial.second.bench import Bench
-from trial.second.cases import make
+from trial.second.cases import _truths, make
 from trial.second.design import PAIRS, ROUND, Spec, possible, specs
 from trial.second.errors import KINDS, pair_errors, stated_lines
 from trial.second.families import BY_LABEL, KNOWN, LATER, OTHER
@@ -322,6 +322,18 @@ def test_a_case_tells_where_its_effects_act_and_loads(case, tmp_path):
     assert loaded.rig.model_error["transmission"]
     wanted = {*CHANNELS, "valve_command.flexor", "valve_command.extensor"}
     assert set(loaded.recordings[0].channels) == wanted
+
+
+def test_truths_at_both_sides_are_those_that_are_alike():
+    spec = spec_of("multisine", duration=0.5)
+    bench = bench_of(spec)
+    form = BY_LABEL["muscle_creep/one_branch"]
+    drawn = form.draw(np.random.default_rng(1), Setting(1, 1.0))
+    told = {at: _truths(form, Placed(drawn, at), bench) for at in PLACES}
+    # one value of a muscle's stiffness cannot be that of two muscles and of one
+    assert told["flexor"]["stiffness"] == drawn.stiffness / 2.0
+    assert told["extensor"]["stiffness"] == drawn.stiffness
+    assert told[BOTH] == {"time_constant": drawn.time_constant[0]}
 
 
 @pytest.mark.parametrize("missing", ["supply_pressure", "command"])

@@ -27,10 +27,10 @@ class PairBench(Bench):
     def numbers(self, model: dict[str, Any]) -> PairParameters:
         return pair_parameters(model)
 
-    def numbers_at(self, effect: Effect | Placed) -> Parameters:
+    def numbers_at(self, effect: Effect | Placed) -> tuple[Parameters, ...]:
         assert isinstance(effect, Placed)
         own: PairParameters = self.par
-        return own.of(effect.sides[0] if effect.sides else "")
+        return tuple(own.of(side) for side in effect.sides or ("",))
 
     def floors(self) -> Array:
         return self.noise.floor()[list(KINDS)]

@@ -83,10 +83,9 @@ class Bench:
         """Numbers of the plant of a model."""
         return parameters_of(model, self.rig)
 
-    def numbers_at(self, effect: Effect | Placed) -> Parameters:
-        """Numbers of the part of the plant in which an effect acts."""
-        own: Parameters = self.par
-        return own
+    def numbers_at(self, effect: Effect | Placed) -> tuple[Parameters, ...]:
+        """Numbers of each part of the plant in which an effect acts."""
+        return (self.par,)
 
     def floors(self) -> Array:
         """Noise of every channel."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -99,8 +100,6 @@ def _chosen(
 def _entry(form: Form, effect: Acting, reached: float, spec: Spec, bench: Bench) -> dict[str, Any]:
     """What the key says of one effect."""
     at = place_of(effect)
-    inner: Any = effect.effect if isinstance(effect, Placed) else effect
-    truths = form.truths(inner, bench.numbers_at(effect)) if form.truths else {}
     return {
         "id": form.family,
         **({"at": at} if at else {}),
@@ -111,8 +110,19 @@ def _entry(form: Form, effect: Acting, reached: float, spec: Spec, bench: Bench)
         "wanted": spec.strength,
         "reached": reached,
         "parameters": effect.to_dict(),
-        "catalogue_parameters": truths,
+        "catalogue_parameters": _truths(form, effect, bench),
     }
+
+
+def _truths(form: Form, effect: Acting, bench: Bench) -> dict[str, float]:
+    """Parameters that the catalogue names the same way; at both sides those that are alike there,
+    since what it says of one muscle depends on how many there are.
+    """
+    inner: Any = effect.effect if isinstance(effect, Placed) else effect
+    if form.truths is None:
+        return {}
+    first, *others = (form.truths(inner, par) for par in bench.numbers_at(effect))
+    return {k: v for k, v in first.items() if all(math.isclose(v, o[k]) for o in others)}
 
 
 def _baseline(spec: Spec, noise: Noise) -> tuple[Bench, dict[str, float], dict[str, float]]:
