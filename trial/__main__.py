@@ -15,16 +15,18 @@ from .blocks import blocks_page
 from .concealed import WRONG, make_case, write
 from .effects import KINDS, LISTED
 from .pictures import figure
-from .plan import MANIFEST, PLANS, specs, write_plan
+from .plan import MANIFEST, specs, write_plan
+from .plan import PLANS as FIRST_PLANS
 from .report import about, checked, report, run_of
 from .score import score
 from .second.cases import complete as second_complete
 from .second.cases import make as second_make
+from .second.design import PLANS as STRATA_PLANS
 from .second.design import ROUND
 from .second.design import specs as second_specs
 from .second.inserted import all_inserted
 from .second.inserted import table as insertion_table
-from .second.marks import is_second, marks
+from .second.marks import is_second, marks, plan_of
 from .second.pooled import page as pooled_page
 from .second.pooled import pooled
 from .second.tables import markdown as second_markdown
@@ -35,7 +37,8 @@ from .strength import LABELS, MEASURES
 from .summary import markdown, target_table
 from .targets import targets
 
-SECOND = "second"
+#: plans of strata, as the help names them
+_STRATA = ", ".join(STRATA_PLANS)
 _MEASURE = (
     "what the multiple of the noise is of: all that the effect moves, or what a refit of the "
     "baseline leaves of it"
@@ -73,7 +76,7 @@ def _add_write(add: Add) -> None:
         "write", help="write the cases, keys and manifest of a plan; goes on where it was stopped"
     )
     whole.add_argument("folder", type=Path, help="gets cases/, keys/ and manifest.json")
-    whole.add_argument("--plan", choices=(*PLANS, SECOND), default="full")
+    whole.add_argument("--plan", choices=(*FIRST_PLANS, *STRATA_PLANS), default="full")
     whole.add_argument("--cases", type=int, help="how many (default: the whole plan)")
     whole.add_argument("--seed", type=int, required=True)
     whole.add_argument(
@@ -84,12 +87,12 @@ def _add_write(add: Add) -> None:
         "--measure",
         choices=MEASURES,
         default="reach",
-        help=f"{_MEASURE}; plan {SECOND} always: what is left",
+        help=f"{_MEASURE}; plans {_STRATA} always: what is left",
     )
     whole.add_argument(
         "--rig",
         type=Path,
-        help=f"nominal rig file (default: the shoulder; plan {SECOND} has several)",
+        help=f"nominal rig file (default: the shoulder; plans {_STRATA} have several)",
     )
     whole.set_defaults(run=_write)
 
@@ -101,10 +104,10 @@ def _write(args: argparse.Namespace) -> None:
     def told(name: str, done: int, total: int) -> None:
         print(f"{name} written, {done} of {total}", file=sys.stderr, flush=True)
 
-    if args.plan == SECOND:
+    if args.plan in STRATA_PLANS:
         if args.rig is not None:
-            raise ValueError(f"plan {SECOND} has rigs of its own: leave --rig out")
-        chosen = second_specs(args.seed, args.cases or 25 * ROUND, args.duration)
+            raise ValueError(f"plan {args.plan} has rigs of its own: leave --rig out")
+        chosen = second_specs(args.seed, args.cases or 25 * ROUND, args.duration, args.plan)
         manifest = write_plan(
             args.folder,
             chosen,
@@ -220,15 +223,15 @@ def _add_score(add: Add) -> None:
         help="effect ids that the diagnosis may name, comma separated",
     )
     mark.add_argument("--markdown", type=Path, help="write the tables here")
-    mark.add_argument("--json", type=Path, help=f"of plan {SECOND}: write the scores here")
+    mark.add_argument("--json", type=Path, help=f"of plans {_STRATA}: write the scores here")
     mark.add_argument(
-        "--first", type=int, help=f"of plan {SECOND}: only the first so many cases, by name"
+        "--first", type=int, help=f"of plans {_STRATA}: only the first so many cases, by name"
     )
     mark.add_argument(
         "--command",
         dest="words",
         default="python -m trial score",
-        help=f"of plan {SECOND}: what makes the tables, as they say",
+        help=f"of plans {_STRATA}: what makes the tables, as they say",
     )
     mark.add_argument("--figure", type=Path, help="draw the figure here (needs matplotlib)")
     mark.set_defaults(run=_score)
@@ -236,7 +239,7 @@ def _add_score(add: Add) -> None:
 
 def _score_second(args: argparse.Namespace) -> None:
     """Score keys of the second plan, which must be those of the manifest where there is one."""
-    folder, head = args.keys.parent, ["# Second plan\n"]
+    folder, head = args.keys.parent, [f"# {plan_of(args.keys).capitalize()} plan\n"]
     if (folder / MANIFEST).is_file():
         digest, count = checked(folder)
         head += about(folder, digest, count, run_of(args.results, digest), args.words)
@@ -264,7 +267,7 @@ def _score(args: argparse.Namespace) -> None:
 
 
 def _add_pool(add: Add) -> None:
-    several = add("pool", help=f"tables of several scored trials of plan {SECOND} together")
+    several = add("pool", help=f"tables of several scored trials of plans {_STRATA} together")
     several.add_argument(
         "scores", type=Path, nargs="+", help="what `score --json` wrote, one file for each trial"
     )
@@ -282,8 +285,8 @@ def _pool(args: argparse.Namespace) -> None:
 def _add_insert(add: Add) -> None:
     again = add(
         "insert",
-        help=f"of plan {SECOND}: diagnose each missed case again with its truth inserted, and say "
-        "whether the search or the weighing failed",
+        help=f"of plans {_STRATA}: diagnose each missed case again with its truth inserted, and "
+        "say whether the search or the weighing failed",
     )
     again.add_argument("folder", type=Path, help="the trial: cases/ and keys/")
     again.add_argument(
@@ -298,7 +301,7 @@ def _insert(args: argparse.Namespace) -> None:
         print(line, file=sys.stderr, flush=True)
 
     if not is_second(args.folder / "keys"):
-        raise ValueError(f"{args.folder}: no keys of plan {SECOND} in its folder keys")
+        raise ValueError(f"{args.folder}: no keys of plans {_STRATA} in its folder keys")
     results = args.results or args.folder / "results"
     text = insertion_table(all_inserted(args.folder, results, told))
     print(text)

@@ -178,6 +178,23 @@ class Tendon:
         return y - (self.offset - y) * x / math.sqrt(self.tendon**2 - (self.offset - y) ** 2)
 
 
+class Pulley:
+    """A tendon over a wheel: contraction [m] and moment arm [m/rad]; the angle [rad] counts the way
+    in which the muscle pulls.
+    """
+
+    def __init__(self, spec: dict[str, Any]) -> None:
+        self.radius, self.rest = float(spec["radius"]), float(spec["rest_angle"])
+
+    def contraction(self, angle: float) -> float:
+        """Contraction [m] of the muscles at a joint angle [rad]."""
+        return self.radius * (angle - self.rest)
+
+    def arm(self, angle: float) -> float:
+        """Moment arm [m], the same at every angle."""
+        return self.radius
+
+
 class Straight:
     """A muscle that lifts a mass without a joint: the coordinate is its own shortening [m]."""
 
@@ -193,14 +210,19 @@ class Straight:
         return 1.0
 
 
-@lru_cache(maxsize=4)
+_PULLS: dict[str, type[Tendon] | type[Pulley] | type[Straight]] = {
+    "mass": Straight,
+    "pulley": Pulley,
+}
+
+
+@lru_cache(maxsize=8)
 def _rows(muscle: str, tendon: str, count: int) -> tuple[Array, Array]:
     """Knots [rad] and exact quantities of the joint, see :meth:`JointTables.exact`; the arguments
     are JSON.
     """
     spec, joint = json.loads(muscle), json.loads(tendon)
-    straight = joint.get("kind") == "mass"
-    shapes, pull = Muscle(spec), Straight(joint) if straight else Tendon(joint)
+    shapes, pull = Muscle(spec), _PULLS.get(joint.get("kind", ""), Tendon)(joint)
     step, below, above = grid_of(joint)
     knots = float(joint["rest_angle"]) + step * np.arange(-below, above + 1)
     return knots, np.array([JointTables.exact(shapes, pull, count, float(t)) for t in knots])
@@ -254,7 +276,9 @@ class JointTables:
         self.cells = cells
 
     @staticmethod
-    def exact(muscle: Muscle, tendon: Tendon | Straight, count: int, angle: float) -> Array:
+    def exact(
+        muscle: Muscle, tendon: Tendon | Pulley | Straight, count: int, angle: float
+    ) -> Array:
         """Quantities at one angle [rad] without interpolation.
 
         Gas torque per pressure without and per modulus scale, elastic torque per modulus scale, air

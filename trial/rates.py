@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from .effects import HeatTransfer
 
 if TYPE_CHECKING:
-    from .plant import Plant, State
+    from .plant import Plant
+    from .solver import State
 
 #: coefficients of one cell of the joint's tables: gas torque, elastic torque, volume, contraction,
 #: wall area
@@ -25,30 +26,39 @@ Place = tuple[Cell, float, float]
 
 def rates_of(plant: Plant) -> Callable[[State, float], State]:
     """Time derivative of the state at a signed opening of the valve."""
-    place, gas, muscles, motion = (
-        place_of(plant),
-        gas_of(plant),
-        muscles_of(plant),
-        motion_of(plant),
-    )
-    spool, follows = plant.port("spool"), plant.ports("follow")
+    half, motion = half_of(plant), motion_of(plant)
     ambient, clock, width = plant.par.ambient, plant.i_clock, plant.size
 
     def rates(y: State, x: float) -> State:
-        pg = y[0] - ambient
         d = [0.0] * width
         if clock >= 0:
             d[clock] = 1.0
+        motion(y, y[0] - ambient, half(y, x, d), d)
+        return d
+
+    return rates
+
+
+def half_of(plant: Plant) -> Callable[[State, float, State], float]:
+    """The part of a plant from its tank to its muscles: their torque [N m] at a signed opening of
+    the valve; it sets the rates of the pressures and of what it has itself.
+    """
+    place, gas, muscles = place_of(plant), gas_of(plant), muscles_of(plant)
+    spool, follows = plant.port("spool"), plant.ports("follow")
+    ambient = plant.par.ambient
+
+    def half(y: State, x: float, d: State) -> float:
+        pg = y[0] - ambient
         at = place(y[2], pg)
         if spool is not None:
             x = spool(x, y, d)
         gas(y, x, at, d)
-        motion(y, pg, muscles(y, pg, at, d), d)
+        torque = muscles(y, pg, at, d)
         for follow in follows:
             follow(y[0], y, d)
-        return d
+        return torque
 
-    return rates
+    return half
 
 
 def place_of(plant: Plant) -> Callable[[float, float], Place]:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from .effects import RECORDING_PERIOD
+from .effects import RECORDING_PERIOD, Effects
 from .excitation import Controller, Excitation, build
-from .plant import Plant, State
+from .plant import Plant
+from .solver import State
 
 Array = NDArray[np.floating]
 SAMPLE_TIME = 0.005
@@ -46,9 +47,8 @@ class Noise:
 class Record:
     """One recording of n samples.
 
-    Command (n,) [V]; `logged` (n, 3) with noise and `clean` (n, 3) without, in the order of
-    :data:`CHANNELS`, gauge Pa and rad; the true states at the samples, and the pressure of the tank
-    at the start [gauge Pa].
+    Command (n,) [V], of two valves (n, 2); `logged` with noise and `clean` without, (n, 3) in the
+    order of :data:`CHANNELS`, or (n, 4) of a pair, gauge Pa and rad; true states at the samples.
     """
 
     time: Array
@@ -186,22 +186,24 @@ def run(
         for opening, span in path.spans(u, begin + i * sample_time):
             y, step = plant.advance(y, opening, span, step)
     time = sample_time * np.arange(n)
-    true = _late(plant, time, np.array(clean))
+    true = late(plant.effects, time, np.array(clean))
     return Record(time, np.array(sent), np.round((true + white) / grid) * grid, true, states)
 
 
-def _late(plant: Plant, time: Array, clean: Array) -> Array:
-    """Channels as a log with another clock holds them."""
-    for effect in plant.effects:
+def late(effects: Effects, time: Array, clean: Array, kinds: tuple[int, ...] = (0, 1, 2)) -> Array:
+    """Channels as a log with another clock holds them; `kinds` gives the number of each among
+    :data:`CHANNELS`.
+    """
+    for effect in effects:
         warp = effect.warp()
         if warp is not None:
-            shift = np.array([warp(float(t)) for t in time])
+            shift = np.array([warp(float(t)) for t in time])[:, list(kinds)]
             clean = np.column_stack(
                 [
                     PchipInterpolator(time, clean[:, j])(
                         np.clip(time - shift[:, j], time[0], time[-1])
                     )
-                    for j in range(3)
+                    for j in range(len(kinds))
                 ]
             )
     return clean
@@ -254,7 +256,7 @@ def follow(
         for opening, span in path.spans(command[i], begin + i * sample_time):
             for _ in range(parts):
                 y = bare.classical(y, opening, span / parts)
-    return _late(bare, record.time, np.array(found))
+    return late(bare.effects, record.time, np.array(found))
 
 
 def reach(moved: Array, noise: Noise) -> dict[str, float]:

@@ -33,13 +33,32 @@ def _si(entry: Any) -> Any:
     return [factor * v for v in value] if isinstance(value, list) else factor * value
 
 
+def _sections(raw: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Tables of a rig file; those of a block with a name, as ``[valve.flexor]``, by both."""
+    found: dict[str, dict[str, Any]] = {}
+    for section, table in raw.items():
+        if not isinstance(table, dict):
+            continue
+        if table and all(isinstance(e, dict) and "value" not in e for e in table.values()):
+            found.update({f"{section}.{name}": entry for name, entry in table.items()})
+        else:
+            found[section] = table
+    return found
+
+
+def split(name: str) -> tuple[str, str]:
+    """Section and key of a dotted name; the section of a block with a name has a dot itself."""
+    section, _, key = name.rpartition(".")
+    return section, key
+
+
 def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
     """Nominal model and tolerances of a rig file.
 
     Returns
     -------
     model : dict
-        Nested sections with SI values.
+        Nested sections with SI values, of blocks with a name by their dotted name.
     tolerance : dict
         Standard deviation in SI by dotted name, for parameters that have one.
     """
@@ -47,9 +66,7 @@ def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
         raw = tomllib.load(stream)
     model: dict[str, Any] = {}
     tolerance: dict[str, float] = {}
-    for section, table in raw.items():
-        if not isinstance(table, dict):
-            continue
+    for section, table in _sections(raw).items():
         model[section] = {}
         for key, entry in table.items():
             if isinstance(entry, dict) and "value" not in entry:
@@ -93,7 +110,7 @@ def to_parameters(model: dict[str, Any], **kind: Any) -> Parameters:
         muscle=muscle,
         count=int(model["muscle"]["count"]),
         modulus_scale=model["muscle"]["modulus_scale"],
-        joint={k: v for k, v in model["joint"].items() if k != "kind" or v == "mass"},
+        joint={k: v for k, v in model["joint"].items() if k != "kind" or v in ("mass", "pulley")},
         inertia=arm["inertia"],
         first_moment=arm["first_moment"],
         length=arm["length"],
@@ -145,6 +162,6 @@ def draw_parameters(
             moved[str(name)] = float(rng.choice([-1.0, 1.0]) * rng.uniform(1.5, 2.5))
     moved.update(wrong or {})
     for name, z in moved.items():
-        section, key = name.split(".")
+        section, key = split(name)
         true[section][key] = model[section][key] + z * tolerance[name]
     return true, moved

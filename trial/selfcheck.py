@@ -12,8 +12,11 @@ from scipy.integrate import solve_ivp
 
 from .effects import TYPES, Effects, draw
 from .excitation import DAC_STEP
+from .pair.places import BOTH, Placed, has_place
+from .pair.plant import PairPlant
 from .plant import Plant
 from .rigfile import default_rig, read_rig, to_parameters
+from .second.rigs import nominal_pair
 
 
 def against_golden(plant: Plant, path: Path) -> dict[str, float]:
@@ -34,32 +37,42 @@ def against_golden(plant: Plant, path: Path) -> dict[str, float]:
     return dict(zip(names, (float(e) for e in error), strict=True))
 
 
-def against_fine(plant: Plant, seconds: float = 10.0) -> float:
+def _opening(plant: Plant | PairPlant, index: int, step: float = 0.0) -> Any:
+    """Opening of the valve, or of both of a pair, in one of the tenths of a second of a check; the
+    command comes in steps [V] where one is given.
+    """
+    move = 0.5 * math.sin(0.9 * index) + 0.25 * (index < 15)
+    move = round(move / step) * step if step else move
+    if isinstance(plant, PairPlant):
+        return plant.normalised((5.0 + move, 5.0 - 0.8 * move + 0.1))
+    return plant.normalised(5.0 + move)
+
+
+def against_fine(plant: Plant | PairPlant, seconds: float = 10.0) -> float:
     """Largest difference of pressures and angle over their range from a run with a tolerance of
     1e-12.
     """
     found = []
+    shown = 4 if isinstance(plant, PairPlant) else 3
     for rtol in (1.0e-8, 1.0e-12):
         y, step, rows = plant.rest(13.8e5 + plant.par.ambient), 1.0e-3, []
         for i in range(round(seconds / 0.1)):
-            command = 5.0 + 0.5 * math.sin(0.9 * i) + 0.25 * (i < 15)
-            y, step = plant.advance(y, plant.normalised(command), 0.1, step, rtol)
-            rows.append(y[:3])
+            y, step = plant.advance(y, _opening(plant, i), 0.1, step, rtol)
+            rows.append(y[:shown])
         found.append(np.array(rows))
     return float((np.abs(found[0] - found[1]).max(axis=0) / np.ptp(found[1], axis=0)).max())
 
 
-def against_lsoda(plant: Plant, seconds: float = 3.0) -> float:
+def against_lsoda(plant: Plant | PairPlant, seconds: float = 3.0) -> float:
     """Largest difference from scipy's LSODA (rtol 1e-10), relative to the size of each state."""
     y = plant.rest(13.8e5 + plant.par.ambient)
     other = list(y)
     step, worst = 1.0e-3, 0.0
     for i in range(round(seconds / 0.1)):
-        command = 5.0 + round((0.5 * math.sin(0.9 * i) + 0.25 * (i < 15)) / DAC_STEP) * DAC_STEP
-        opening = plant.normalised(command)
+        opening = _opening(plant, i, DAC_STEP)
         y, step = plant.advance(y, opening, 0.1, step)
 
-        def slope(_: float, state: Any, x: float = opening) -> list[float]:
+        def slope(_: float, state: Any, x: Any = opening) -> list[float]:
             return plant.derivative(state.tolist(), x)
 
         kwargs: dict[str, Any] = {
@@ -112,6 +125,17 @@ def selfcheck(golden: Path | None = None) -> str:
     for name in TYPES:
         error = against_lsoda(Plant(parameters, Effects(draw(name, 1.0, rng))))
         lines.append(f"LSODA with {name}: {error:.1e}")
+        if not error < 1.0e-5:
+            bad.append(lines[-1])
+    pair = nominal_pair().par
+    error = against_fine(PairPlant(pair))
+    lines.append(f"pair, steps a tenth as long: {error:.1e} of range")
+    if not error < 1.0e-7:
+        bad.append(lines[-1])
+    for name, kind in TYPES.items():
+        at = BOTH if has_place(name, kind.block) else ""
+        error = against_lsoda(PairPlant(pair, (Placed(draw(name, 1.0, rng), at),)))
+        lines.append(f"pair, LSODA with {name}: {error:.1e}")
         if not error < 1.0e-5:
             bad.append(lines[-1])
     if bad:

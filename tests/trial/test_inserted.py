@@ -93,7 +93,7 @@ def test_keys_of_another_plan_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["insert", str(tmp_path)]) == 2
-    assert "no keys of plan second" in capsys.readouterr().err
+    assert "no keys of plans second" in capsys.readouterr().err
 
 
 def test_a_case_that_is_none_says_why(tmp_path: Path) -> None:

@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..effects import Effect, Effects
-from ..plant import Plant
+from ..pair.places import Placed
+from ..plant import Parameters, Plant
 from ..recording import CHANNELS, Array, Noise, Record, follow, run
+from ..rigfile import split
 from ..strength import FIRST, STRENGTHS
 from .design import Spec
 from .drive import Driver, course
@@ -28,13 +30,13 @@ def put(model: dict[str, Any], values: dict[str, float]) -> dict[str, Any]:
     """Copy of a nested model with other values, by dotted name."""
     changed = {k: dict(v) if isinstance(v, dict) else v for k, v in model.items()}
     for name, value in values.items():
-        section, key = name.split(".")
+        section, key = split(name)
         changed[section][key] = value
     return changed
 
 
 class Bench:
-    """The recordings of one case.
+    """The recordings of one case on a rig with one valve or none.
 
     Parameters
     ----------
@@ -48,84 +50,115 @@ class Bench:
         Transducers.
     """
 
+    channels: tuple[str, ...] = CHANNELS
+
     def __init__(
         self, spec: Spec, true: dict[str, Any], tolerance: dict[str, float], noise: Noise
     ) -> None:
         self.spec, self.true, self.tolerance, self.noise = spec, true, tolerance, noise
         self.rig, self.step = RIGS[spec.rig], spec.lab.sample_time
-        self.par = parameters_of(true, self.rig)
+        self.par: Any = self.numbers(true)
         roles = [role for _, role in spec.recordings]
         self.fit = [i for i, role in enumerate(roles) if role == "fit"]
         self.held = [i for i, role in enumerate(roles) if role != "fit"] or self.fit
-        self.floor = noise.floor()
-        _, _, believed = nominal(spec.rig)
+        self.floor = self.floors()
         self.drives: list[tuple[Any, Any, Array | None]] = []
         self.supply: list[float] = []
-        start = self.par.supply_pressure
         sigma = tolerance.get("supply.initial_pressure", 0.0)
         for i, (name, _) in enumerate(spec.recordings):
             own = np.random.default_rng([spec.seed, i, 77])
-            if spec.rig == "blow_down":
-                n = round(spec.duration / self.step)
-                self.supply.append(start * (1.0 - 0.12 * i) + float(own.uniform(-1.0, 1.0)) * sigma)
-                self.drives.append((None, None, np.full(n, -1.0)))
-                continue
-            self.supply.append(start + float(own.uniform(-1.0, 1.0)) * sigma)
-            shape = course(self.rig, name, spec.duration, self.step, own)
-            driver = Driver(believed, self.rig, self.step * spec.lab.held, own)
-            self.drives.append((shape, driver, None))
+            off = float(own.uniform(-1.0, 1.0)) * sigma
+            self.supply.append(self.begins(i) + off)
+            self.drives.append(self.drive(name, own))
         self._columns: dict[str, dict[int, Array]] = {}
 
-    def run(
-        self, effects: Sequence[Effect], model: dict[str, Any] | None = None
-    ) -> dict[int, Record]:
+    def begins(self, index: int) -> float:
+        """Pressure of the tank, or of a volume that empties, with which a recording begins [gauge
+        Pa].
+        """
+        start = float(self.par.supply_pressure)
+        return start * (1.0 - 0.12 * index) if self.spec.rig == "blow_down" else start
+
+    def numbers(self, model: dict[str, Any]) -> Any:
+        """Numbers of the plant of a model."""
+        return parameters_of(model, self.rig)
+
+    def numbers_at(self, effect: Effect | Placed) -> tuple[Parameters, ...]:
+        """Numbers of each part of the plant in which an effect acts."""
+        return (self.par,)
+
+    def floors(self) -> Array:
+        """Noise of every channel."""
+        return self.noise.floor()
+
+    def drive(self, name: str, rng: np.random.Generator) -> tuple[Any, Any, Array | None]:
+        """Course, controller and, of an open loop, the commands of a recording."""
+        if self.spec.rig == "blow_down":
+            n = round(self.spec.duration / self.step)
+            return None, None, np.full(n, -1.0)
+        shape = course(self.rig, name, self.spec.duration, self.step, rng)
+        period = self.step * self.spec.lab.held
+        return shape, Driver(nominal(self.spec.rig)[2], self.rig, period, rng), None
+
+    def run(self, effects: Sequence[Any], model: dict[str, Any] | None = None) -> dict[int, Record]:
         """Every recording of the plant with effects; of another model than the true one."""
-        par = self.par if model is None else parameters_of(model, self.rig)
-        plant = Plant(par, Effects(*effects))
+        plant = self.plant(self.par if model is None else self.numbers(model), effects)
         found: dict[int, Record] = {}
-        for i, (shape, driver, command) in enumerate(self.drives):
-            rng = np.random.default_rng([self.spec.seed, i, 78])
-            start = None
-            if command is not None:
-                start = plant.initial(self.supply[i] + par.ambient, 2.0e5, 0.0, 0.0, 1000.0 * i)
-                shape, driver = _still(len(command)), _nobody
-            found[i] = run(
-                plant, shape, driver, command, self.supply[i], self.noise, rng, i,
-                self.step, self.spec.lab.held, start,
-            )  # fmt: skip
+        for i in range(len(self.drives)):
+            found[i] = self.recorded(plant, i)
             if not np.isfinite(found[i].clean).all():
                 raise ArithmeticError("the run left the numbers")
         return found
 
+    def plant(self, numbers: Any, effects: Sequence[Any] = ()) -> Any:
+        """The plant of some numbers with effects."""
+        return Plant(numbers, Effects(*effects))
+
+    def recorded(self, plant: Any, index: int) -> Record:
+        """One recording of a plant."""
+        shape, driver, command = self.drives[index]
+        rng = np.random.default_rng([self.spec.seed, index, 78])
+        start = None
+        if command is not None:
+            begin = self.supply[index] + plant.par.ambient
+            start = plant.initial(begin, 2.0e5, 0.0, 0.0, 1000.0 * index)
+            shape, driver = _still(len(command)), _nobody
+        return run(
+            plant, shape, driver, command, self.supply[index], self.noise, rng, index,
+            self.step, self.spec.lab.held, start,
+        )  # fmt: skip
+
     def against(self, records: dict[int, Record], model: dict[str, Any]) -> Measured:
         """How far records lie from the plant of a model without effects, in every channel."""
-        bare = Plant(parameters_of(model, self.rig))
-        return {i: (r, r.clean - self._follow(bare, r, i)) for i, r in records.items()}
+        bare = self.plant(self.numbers(model))
+        return {i: (r, r.clean - self.followed(bare, r, i)) for i, r in records.items()}
 
-    def _follow(
-        self, plant: Plant, record: Record, index: int, shift: tuple[float, float] = (0.0, 0.0)
+    def followed(
+        self, plant: Any, record: Record, index: int, name: str = "", step: float = 0.0
     ) -> Array:
+        """Readings of a plant without effects that follows a record; `name` is a parameter of it
+        that is off by a step.
+        """
+        # a zero of a transducer also moves the state that a window seems to start from
+        key = split(name)[1]
+        sign = {"pressure_zero": (-step, 0.0), "angle_zero": (0.0, -step)}
+        shift = sign.get(key, (0.0, step if key == "length_zero" else 0.0))
         return follow(plant, record, index, shift, sample_time=self.step)
 
     def prepare(self) -> None:
         """Sensitivities to every parameter, on the recordings of the plant without effects."""
         plain = self.run(())
-        base = Plant(self.par)
-        every = self.every
-        start = {i: self._follow(base, r, i)[::every] for i, r in plain.items()}
+        every, base = self.every, self.plant(self.par)
+        start = {i: self.followed(base, r, i)[::every] for i, r in plain.items()}
         for name, sigma in self.tolerance.items():
-            section, key = name.split(".")
+            section, key = split(name)
             if key == "initial_pressure":
                 continue
             step = _STEP * sigma
-            plant = Plant(
-                parameters_of(put(self.true, {name: self.true[section][key] + step}), self.rig)
-            )
-            # a zero of a transducer also moves the state that a window seems to start from
-            sign = {"pressure_zero": (-step, 0.0), "angle_zero": (0.0, -step)}
-            shift = sign.get(key, (0.0, step if key == "length_zero" else 0.0))
+            moved = put(self.true, {name: self.true[section][key] + step})
+            plant = self.plant(self.numbers(moved))
             self._columns[name] = {
-                i: (self._follow(plant, r, i, shift)[::every] - start[i]) / _STEP
+                i: (self.followed(plant, r, i, name, step)[::every] - start[i]) / _STEP
                 for i, r in plain.items()
             }
 
@@ -159,11 +192,11 @@ class Bench:
         z = np.linalg.lstsq(
             np.vstack([matrix, np.eye(size)]), np.concatenate([rows, np.zeros(size)]), rcond=None
         )[0]
-        worst = np.zeros(3)
+        worst = np.zeros(len(self.channels))
         for i in self.held:
             rest = thin[i] - sum(v * self._columns[n][i] for v, n in zip(z, names, strict=True))
             worst = np.maximum(worst, np.sqrt((rest**2).mean(axis=0)) / self.floor)
-        return {CHANNELS[i]: float(worst[i]) for i in shown}
+        return {self.channels[i]: float(worst[i]) for i in shown}
 
     @property
     def shown(self) -> list[int]:
@@ -173,7 +206,7 @@ class Bench:
             found.append(1)
         return [*found, 2] if "muscle" in self.rig.blocks else found
 
-    def scale(self, effect: Effect, target: float) -> tuple[float, float]:
+    def scale(self, effect: Effect | Placed, target: float) -> tuple[float, float]:
         """Factor on an effect, and what a refit then leaves of it alone [noises].
 
         The size nearest to the target of those that the plant survives, within what is physical.

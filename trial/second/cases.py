@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,16 @@ import numpy as np
 
 from ..concealed import Case, stored_key
 from ..effects import Effect, Setting
-from ..recording import CHANNELS, Noise
-from ..rigfile import draw_parameters
+from ..pair.bench import PairBench
+from ..pair.places import BOTH, SIDES, Placed
+from ..recording import Noise
+from ..rigfile import draw_parameters, split
 from .bench import Bench, put
 from .design import Spec
-from .errors import ModelError, model_errors, stated_lines
+from .errors import model_errors, pair_errors, stated_lines
 from .families import BY_LABEL, UNLISTED, Form
 from .labs import Hole, holes, noise_of, table
-from .rigs import RIGS, nominal
+from .rigs import PAIR, RIGS, stated
 
 SCHEMA = "pamrs.trial-key/2"
 #: noises that a parameter far off is to leave
@@ -33,7 +36,21 @@ _SENSORS = {
 }
 
 
-def block_of(effect: Effect) -> str:
+#: an effect; of a pair with its place
+Acting = Effect | Placed
+
+
+def place_of(effect: Acting) -> str:
+    """Where an effect of a pair acts; empty where that is no question."""
+    return effect.at if isinstance(effect, Placed) else ""
+
+
+def bench_of(spec: Spec, true: dict[str, Any], tolerance: dict[str, float], noise: Noise) -> Bench:
+    """The recordings of a case on its rig; arguments as those of :class:`Bench`."""
+    return (PairBench if spec.rig == PAIR else Bench)(spec, true, tolerance, noise)
+
+
+def block_of(effect: Acting) -> str:
     """Block of the rig in which an effect shows: supply, chamber or arm."""
     return _SENSORS.get(effect.id) or _SHOWS.get(effect.block, "arm")
 
@@ -47,7 +64,7 @@ def case_toml(recordings: tuple[tuple[str, str], ...]) -> str:
 
 def _chosen(
     spec: Spec, bench: Bench, rng: np.random.Generator
-) -> tuple[list[Effect], list[dict[str, Any]]]:
+) -> tuple[list[Acting], list[dict[str, Any]]]:
     """The effects of a case at their sizes, and what the key says of each."""
     setting = Setting(
         len(spec.recordings),
@@ -56,14 +73,15 @@ def _chosen(
         bench.par.payload or 10.0,
         bench.par.coulomb,
     )
-    effects: list[Effect] = []
+    effects: list[Acting] = []
     told: list[dict[str, Any]] = []
-    for label in spec.forms:
+    for i, label in enumerate(spec.forms):
         form = BY_LABEL[label]
-        best: tuple[float, Effect] | None = None
+        best: tuple[float, Acting] | None = None
         # an effect that does not come into play in these recordings is drawn again
         for _ in range(2):
-            effect = form.draw(rng, setting)
+            drawn = form.draw(rng, setting)
+            effect = Placed(drawn, spec.places[i]) if spec.rig == PAIR else drawn
             try:
                 factor, reached = bench.scale(effect, spec.strength)
             except ArithmeticError:
@@ -79,10 +97,12 @@ def _chosen(
     return effects, told
 
 
-def _entry(form: Form, effect: Effect, reached: float, spec: Spec, bench: Bench) -> dict[str, Any]:
+def _entry(form: Form, effect: Acting, reached: float, spec: Spec, bench: Bench) -> dict[str, Any]:
     """What the key says of one effect."""
+    at = place_of(effect)
     return {
         "id": form.family,
+        **({"at": at} if at else {}),
         "form": form.name,
         "mark": form.mark,
         "first_catalogue": form.first,
@@ -90,8 +110,19 @@ def _entry(form: Form, effect: Effect, reached: float, spec: Spec, bench: Bench)
         "wanted": spec.strength,
         "reached": reached,
         "parameters": effect.to_dict(),
-        "catalogue_parameters": form.truths(effect, bench.par) if form.truths else {},
+        "catalogue_parameters": _truths(form, effect, bench),
     }
+
+
+def _truths(form: Form, effect: Acting, bench: Bench) -> dict[str, float]:
+    """Parameters that the catalogue names the same way; at both sides those that are alike there,
+    since what it says of one muscle depends on how many there are.
+    """
+    inner: Any = effect.effect if isinstance(effect, Placed) else effect
+    if form.truths is None:
+        return {}
+    first, *others = (form.truths(inner, par) for par in bench.numbers_at(effect))
+    return {k: v for k, v in first.items() if all(math.isclose(v, o[k]) for o in others)}
 
 
 def _baseline(spec: Spec, noise: Noise) -> tuple[Bench, dict[str, float], dict[str, float]]:
@@ -99,14 +130,14 @@ def _baseline(spec: Spec, noise: Noise) -> tuple[Bench, dict[str, float], dict[s
     the first of those that the spec proposes of which a refit leaves enough to be seen, else the
     one that leaves most.
     """
-    model, tolerance, _ = nominal(spec.rig)
+    model, tolerance = stated(spec.rig)
     drawn = {k: v for k, v in tolerance.items() if not k.endswith("initial_pressure")}
     best: tuple[float, Bench, dict[str, float], dict[str, float]] | None = None
     for one in spec.wrong or (None,):
         wrong = dict([one]) if one else {}
         rng = np.random.default_rng([spec.seed, 20260704])
         true, moved = draw_parameters("none", model, drawn, rng, wrong)
-        bench = Bench(spec, true, tolerance, noise)
+        bench = bench_of(spec, true, tolerance, noise)
         left = max((max(_wrong_left(bench, n, model).values()) for n in wrong), default=0.0)
         if best is None or left > best[0]:
             best = left, bench, moved, wrong
@@ -118,7 +149,7 @@ def _baseline(spec: Spec, noise: Noise) -> tuple[Bench, dict[str, float], dict[s
 
 def _wrong_left(bench: Bench, name: str, model: dict[str, Any]) -> dict[str, float]:
     """What a parameter that is far off leaves, all others refitted [noises by channel]."""
-    section, key = name.split(".")
+    section, key = split(name)
     plain = bench.against(bench.run(()), put(bench.true, {name: model[section][key]}))
     return bench.left(plain, (name,))
 
@@ -127,8 +158,7 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
     """Make one case in memory; the same spec gives the same bytes. `rig` is not used: a spec names
     its own.
     """
-    model = nominal(spec.rig)[0]
-    kind = RIGS[spec.rig]
+    model, kind = stated(spec.rig)[0], RIGS[spec.rig]
     noise = noise_of(spec.lab, kind, np.random.default_rng([spec.seed, 20260701]))
     bench, moved, wrong = _baseline(spec, noise)
     true = bench.true
@@ -136,13 +166,15 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
     gear = not {"tendon_compliance", "moment_arm_error"} & {e.id for e in effects}
     weight = bench.par.weight if "muscle" in kind.blocks else 0.0
     own = np.random.default_rng([spec.seed, 20260703])
-    errors = model_errors(kind, spec.percent, weight, own, gear)
+    erring: Any = pair_errors if spec.rig == PAIR else model_errors
+    errors: list[Any] = erring(kind, spec.percent, weight, own, gear)
     effects, errors, shrunk = _survives(bench, effects, errors)
     records = bench.run([*effects, *errors])
     terms = _terms(bench, told, effects, errors, wrong, model)
     files, lost = _tables(spec, bench, records)
     key: dict[str, Any] = {
         "schema": SCHEMA,
+        **({"plan": spec.plan} if spec.plan else {}),
         "case": spec.name,
         "spec": spec.to_dict(),
         "verdict": _verdict(spec, errors),
@@ -151,12 +183,12 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
         "model_error": {
             "percent": spec.percent,
             "stated": spec.stated,
-            "sizes": {e.id.split(".")[1]: {**e.to_dict(), "block": block_of(e)} for e in errors},
+            "sizes": {_named(e): {**e.to_dict(), "block": block_of(e)} for e in errors},
         },
         "wrong_parameters": {
             name: {
-                "nominal": model[name.split(".")[0]][name.split(".")[1]],
-                "value": true[name.split(".")[0]][name.split(".")[1]],
+                "nominal": _value(model, name),
+                "value": _value(true, name),
                 "tolerances": z,
             }
             for name, z in wrong.items()
@@ -175,9 +207,20 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
 
 
+def _value(model: dict[str, Any], name: str) -> Any:
+    """A value of a nested model by its dotted name."""
+    section, key = split(name)
+    return model[section][key]
+
+
+def _named(error: Acting) -> str:
+    """Name of a model error in the key: its block or channel, with the side of a pair."""
+    return ".".join(filter(None, (error.id.split(".")[1], place_of(error))))
+
+
 def _survives(
-    bench: Bench, effects: list[Effect], errors: list[ModelError]
-) -> tuple[list[Effect], list[ModelError], float]:
+    bench: Bench, effects: list[Acting], errors: list[Any]
+) -> tuple[list[Acting], list[Any], float]:
     """Effects and errors that can be run together: all effects smaller by the last number where
     they cannot.
     """
@@ -196,8 +239,8 @@ def _survives(
 def _terms(
     bench: Bench,
     told: list[dict[str, Any]],
-    effects: list[Effect],
-    errors: list[ModelError],
+    effects: list[Acting],
+    errors: list[Any],
     wrong: dict[str, float],
     model: dict[str, Any],
 ) -> list[dict[str, Any]]:
@@ -206,29 +249,47 @@ def _terms(
     """
     found: list[dict[str, Any]] = []
 
-    def add(block: str, kind: str, name: str, left: dict[str, float]) -> None:
-        found.append({"block": block, "kind": kind, "id": name, "left": left})
+    def add(block: str, kind: str, name: str, left: dict[str, float], at: str = "") -> None:
+        place = {"at": at} if at else {}
+        found.append({"block": block, "kind": kind, "id": name, **place, "left": left})
 
     for entry, effect in zip(told, effects, strict=True):
         left = bench.left(bench.against(bench.run([effect]), bench.true))
-        add(str(entry["block"]), "effect", str(entry["id"]), left)
+        add(str(entry["block"]), "effect", str(entry["id"]), left, place_of(effect))
     for block in ("supply", "chamber", "arm"):
         if group := [e for e in errors if block_of(e) == block]:
             left = bench.left(bench.against(bench.run(group), bench.true))
             add(block, "model_error", f"model_error.{block}", left)
     for name in wrong:
         block = _SHOWS.get(name.split(".")[0], "arm")
-        add(block, "parameter", name, _wrong_left(bench, name, model))
-    for block, channel in _CHANNEL.items():
+        side = name.split(".")[1]
+        at = side if side in SIDES else ""
+        add(block, "parameter", name, _wrong_left(bench, name, model), at)
+    for block in _CHANNEL:
         group_ = [t for t in found if t["block"] == block]
-        whole = sum(t["left"].get(channel, 0.0) ** 2 for t in group_)
         for term in group_:
-            part = term["left"].get(channel, 0.0) ** 2
-            term["share"] = part / whole if whole > 0.0 else None
+            term["share"] = _share(term, group_, bench.channels)
     return found
 
 
-def _verdict(spec: Spec, errors: list[ModelError]) -> str:
+def _share(
+    term: dict[str, Any], group: list[dict[str, Any]], channels: tuple[str, ...]
+) -> float | None:
+    """Share of a term of all that is left in the channel of its block; at both sides of a pair the
+    mean of both.
+    """
+    own = [c for c in channels if c.split(".")[0] == _CHANNEL[term["block"]]]
+    if len(own) > 1 and term.get("at", BOTH) in SIDES:
+        own = [c for c in own if c.endswith(f".{term['at']}")]
+    found = []
+    for channel in own:
+        whole = sum(t["left"].get(channel, 0.0) ** 2 for t in group)
+        if whole > 0.0:
+            found.append(term["left"].get(channel, 0.0) ** 2 / whole)
+    return sum(found) / len(found) if found else None
+
+
+def _verdict(spec: Spec, errors: list[Any]) -> str:
     """The right verdict on the whole case."""
     marks = [BY_LABEL[f].mark for f in spec.forms]
     if any(m != UNLISTED for m in marks):
@@ -244,7 +305,7 @@ def _tables(
     """CSV files by name, and the samples that each lost."""
     files: dict[str, str] = {}
     lost: dict[str, Any] = {}
-    channels = [CHANNELS[i] for i in bench.shown]
+    channels = [bench.channels[i] for i in bench.shown]
     for i, (name, _) in enumerate(spec.recordings):
         rng = np.random.default_rng([spec.seed, i, 79])
         gone: list[Hole] = holes(spec.lab, len(records[i].time), channels, rng)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..excitation import DAC_STEP, Excitation, build
 from ..plant import Plant
-from .rigs import RigKind
+from .rigs import PAIR, RigKind
 
 Array = NDArray[np.floating]
 FREE = "free_log"
@@ -49,14 +49,14 @@ def course(
         if name == FREE
         else build(name, duration, sample_time, rng)
     )
-    low, top = _range(rig)
+    low, top = range_of(rig)
     share = (shape.reference - _FROM) / (_TO - _FROM)
     return Excitation(low + (top - low) * share, shape.sealed, shape.dither, shape.vent)
 
 
-def _range(rig: RigKind) -> tuple[float, float]:
+def range_of(rig: RigKind) -> tuple[float, float]:
     """Range of the reference in the plant's units."""
-    turns = rig.name in ("shoulder", "elbow", "regulated_joint")
+    turns = rig.name in ("shoulder", "elbow", "regulated_joint", PAIR)
     return (math.radians(rig.low), math.radians(rig.top)) if turns else (rig.low, rig.top)
 
 
@@ -82,7 +82,7 @@ class Driver:
     ) -> None:
         self.null, self.period = nominal.par.null_voltage, period
         self.regulated, self.most = nominal.par.feed == "regulator", rig.most
-        low, top = _range(rig)
+        low, top = range_of(rig)
         self.grid = np.linspace(low, top, 61)
         rigid = nominal.par.kind == "rigid"
         hold = rig.most * self.grid if rigid else [nominal.holding_pressure(a) for a in self.grid]
@@ -133,4 +133,4 @@ class Driver:
         return self.quantise(min(max(command, self.null - 2.5), self.null + 1.5))
 
 
-__all__ = ["FREE", "Driver", "course", "free_log"]
+__all__ = ["FREE", "Driver", "course", "free_log", "range_of"]

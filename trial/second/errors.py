@@ -14,7 +14,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..effects.base import Effect, Env, Port, State
-from .rigs import RigKind
+from ..pair.places import SIDES, Placed, has_place
+from .rigs import PAIR, RigKind
 
 
 @dataclass(frozen=True)
@@ -204,20 +205,38 @@ def model_errors(
     return [e for e in made if type(e) not in missing and e.rms > 0.0]
 
 
-def stated_lines(rig: RigKind, errors: list[ModelError], percent: float) -> str:
-    """The model error as a rig file states it; empty where there is none."""
+def pair_errors(
+    rig: RigKind, percent: float, weight: float, rng: np.random.Generator, gear: bool = True
+) -> list[Placed]:
+    """The model error of a pair: curves of its own at either side, and those of what they share."""
+    found = [
+        Placed(error, side)
+        for side in SIDES
+        for error in model_errors(rig, percent, weight, rng, gear)
+        if has_place(error.id, error.block)
+    ]
+    shared = model_errors(rig, percent, weight, rng, gear)
+    return [*found, *(Placed(error) for error in shared if not has_place(error.id, error.block))]
+
+
+def stated_lines(rig: RigKind, errors: list[Any], percent: float) -> str:
+    """The model error as a rig file states it; empty where there is none. Of a pair one line says
+    it of both sides.
+    """
     lifts = rig.name == "hanging_mass"
-    lines = []
-    for error in errors:
+    gear = "transmission" if rig.name == PAIR else "joint"
+    lines: dict[str, None] = {}
+    for placed in errors:
+        error: Any = placed.effect if isinstance(placed, Placed) else placed
         name = error.id.split(".")[1]
         if isinstance(error, Cogging):
-            lines.append(f'{"load" if lifts else "arm"} = "{0.5 * percent:g} %"')
+            lines[f'{"load" if lifts else "arm"} = "{0.5 * percent:g} %"'] = None
         elif isinstance(error, EncoderError):
             size = f"{1e3 * error.rms:g} mm" if lifts else f"{math.degrees(error.rms):g} deg"
-            lines.append(f'{"length" if lifts else "joint_angle"} = "{size}"')
+            lines[f'{"length" if lifts else "joint_angle"} = "{size}"'] = None
         elif error.unit == "1":
-            block = "joint" if isinstance(error, ArmError) else name
-            lines.append(f'{block} = "{100.0 * error.rms:g} %"')
+            block = gear if isinstance(error, ArmError) else name
+            lines[f'{block} = "{100.0 * error.rms:g} %"'] = None
         else:
-            lines.append(f'{name} = "{error.rms:g} {error.unit}"')
+            lines[f'{name} = "{error.rms:g} {error.unit}"'] = None
     return "\n\n[model_error]\n" + "\n".join(lines) + "\n" if lines else ""

@@ -14,8 +14,10 @@ import numpy as np
 
 from ..effects import TYPES, Effect, Setting
 from ..effects.base import REFERENCE_DENSITY, uniform
+from ..pair.places import Placed
 from ..plant import Parameters
 from . import forms as more
+from . import later
 
 KNOWN, OTHER, UNLISTED = "known", "other", "unlisted"
 MARKS = (KNOWN, OTHER, UNLISTED)
@@ -39,7 +41,7 @@ class Form:
     @property
     def block(self) -> str:
         """Block of the plant in which it acts."""
-        return TYPES[self.family].block
+        return (TYPES.get(self.family) or later.TYPES[self.family]).block
 
     @property
     def label(self) -> str:
@@ -213,11 +215,28 @@ _NO_CATALOGUE = (
     "exhaust_back_pressure",
     "moment_arm_error",
 )
+#: families and forms of the plans after the second, whose cases stay the same
+LATER: tuple[Form, ...] = (
+    Form("com_offset", "moment", KNOWN, _own(later.OffsetMass), False,
+         lambda e, p: {"angle": e.angle}),
+    Form("com_offset", "sagging", OTHER, _own(later.SaggingMass)),
+    Form("com_offset", "liquid", OTHER, _own(later.LiquidMass)),
+    Form("sensor_lag", "delay", KNOWN, _own(later.LateAngle), False,
+         lambda e, p: {"delay": e.late}),
+    Form("sensor_lag", "first_order", OTHER, _own(later.FilteredAngle)),
+    Form("sensor_lag", "jitter", OTHER, _own(later.JitteringAngle)),
+    Form("parameter_drift", "exponential", KNOWN, _own(later.WarmingUp), False,
+         lambda e, p: {"change": e.change, "time_constant": e.time_constant}),
+    Form("parameter_drift", "straight", KNOWN, _own(later.Ageing), False,
+         lambda e, p: {"change": e.change}),
+    Form("parameter_drift", "by_work", OTHER, _own(later.WarmedByWork)),
+    Form("parameter_drift", "room", OTHER, _own(later.WarmingRoom)),
+)  # fmt: skip
 FORMS = (*_KNOWN, *_OTHER, *(Form(n, "plain", UNLISTED, _plain(n)) for n in _NO_CATALOGUE))
-BY_LABEL = {f.label: f for f in FORMS}
+BY_LABEL = {f.label: f for f in (*FORMS, *LATER)}
 #: those that nobody can tell apart, or that share a port: no two of a set stand in one case
 APART = (
-    {"input_path_lag", "pressure_lag", "clock_skew"},
+    {"input_path_lag", "pressure_lag", "clock_skew", "sensor_lag"},
     {"tendon_compliance", "moment_arm_error"},
     {"payload_swing", "base_flexibility"},
 )
@@ -233,6 +252,6 @@ LIMITS = {
 }  # fmt: skip
 
 
-def most(effect: Effect) -> float:
+def most(effect: Effect | Placed) -> float:
     """Largest factor on an effect that is still physical."""
     return min(effect.most(), LIMITS.get(effect.id, 1.0e6))

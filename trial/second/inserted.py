@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from ..pair.places import SIDES
 from .families import UNLISTED
 from .marks import mark, result_of
 
@@ -77,7 +78,11 @@ def missed(keys: Path, results: Path) -> Iterator[tuple[dict[str, Any], dict[str
 
 def truth_of(key: dict[str, Any]) -> str:
     """Names of a key that a diagnosis may say, joined by ``+``."""
-    listed = [str(e["id"]) for e in key["effects"] if e["mark"] != UNLISTED]
+    listed = [
+        f"{e['id']}@{e['at']}" if e.get("at") in SIDES else str(e["id"])
+        for e in key["effects"]
+        if e["mark"] != UNLISTED
+    ]
     return "+".join(dict.fromkeys([*listed, *key["wrong_parameters"]]))
 
 

@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from ..pair.places import SIDES
 from ..recording import Noise, Record
-from .rigs import RigKind
+from .rigs import PAIR, RigKind
 
 RATES = (50, 100, 200, 500, 1000)
 BITS = (10, 12, 14, 16)
@@ -86,12 +87,17 @@ def holes(lab: Lab, count: int, channels: list[str], rng: np.random.Generator) -
     return found
 
 
+Columns = dict[str, tuple[str, Any]]
+
+
 def table(
     record: Record, rig: RigKind, lab: Lab, lost: list[Hole], rest_length: float
 ) -> tuple[str, list[str]]:
     """A recording as CSV, and its channels."""
+    if rig.name == PAIR:
+        return _csv(_pair_columns(record), record, lab, lost)
     p, ps, angle = (record.logged[:, i] for i in range(3))
-    columns: dict[str, tuple[str, Any]] = {}
+    columns: Columns = {}
     if rig.name == "regulated_joint":
         columns["supply_command"] = ("supply_command [bar]", record.command)
     elif rig.name != "blow_down":
@@ -103,7 +109,26 @@ def table(
         columns["length"] = ("length [mm]", 1e3 * (rest_length - angle))
     elif "muscle" in rig.blocks:
         columns["joint_angle"] = ("joint_angle [deg]", np.degrees(angle))
-    for name in [n for n in columns if n == lab.missing or n.endswith(lab.missing or "-")]:
+    return _csv(columns, record, lab, lost)
+
+
+def _pair_columns(record: Record) -> Columns:
+    """Columns of a pair: what a side has carries its name."""
+    found: Columns = {}
+    for j, side in enumerate(SIDES):
+        name = f"valve_command.{side}"
+        found[name] = (f"{name} [V]", record.command[:, j])
+    found["supply_pressure"] = ("supply_pressure [bar]", record.logged[:, 2] / 1e5)
+    for j, side in enumerate(SIDES):
+        name = f"muscle_pressure.{side}"
+        found[name] = (f"{name} [bar]", record.logged[:, j] / 1e5)
+    found["joint_angle.elbow"] = ("joint_angle.elbow [deg]", np.degrees(record.logged[:, 3]))
+    return found
+
+
+def _csv(columns: Columns, record: Record, lab: Lab, lost: list[Hole]) -> tuple[str, list[str]]:
+    """Columns as CSV without the channel that nobody logged and what was lost, and their names."""
+    for name in [n for n in columns if n.split(".")[0].endswith(lab.missing or "-")]:
         del columns[name]
     cells = [[f"{v:.5f}" for v in values.tolist()] for _, values in columns.values()]
     names, rows = list(columns), set(range(len(record.time)))

@@ -9,9 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ..pair.places import BOTH, SIDES
 from ..score import HEALTHY, RESULTS, gap_of
 from .cases import SCHEMA
-from .design import STRENGTHS
+from .design import SECOND, STRENGTHS
 from .families import KNOWN, OTHER, UNLISTED
 
 #: noises that must be left for the targets to ask for a name: 3, less what the search for a size
@@ -47,7 +48,8 @@ class Mark:
     effect or a right parameter is named, or, without model error, unlisted physics. `calm`, of
     healthy cases whose model error is stated: `none` or `parameters`. `inside` and `shares`:
     whether intervals hold the truth, and shares of terms are right. `claims`: leading probability
-    of each group of blocks, and whether its hypothesis is true.
+    of each group of blocks, and whether its hypothesis is true. `placed`, of right names of effects
+    that act at a side of a pair: the place is right.
     """
 
     case: str
@@ -69,23 +71,27 @@ class Mark:
     seconds: float | None = None
     claims: tuple[tuple[float, bool], ...] = ()
     blocks: tuple[BlockMark, ...] = ()
+    placed: bool | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON of a score."""
-        told = dict(self.__dict__)
+        """For the JSON of a score; without the place where that is no question."""
+        told = {k: v for k, v in self.__dict__.items() if k != "placed" or v is not None}
         told["blocks"] = [b.__dict__ for b in self.blocks]
         return told
 
 
 @dataclass(frozen=True)
 class _Truth:
-    """What a key conceals: ids of families by block, parameters far off, unlisted by block."""
+    """What a key conceals: ids of families by block, parameters far off, unlisted by block; places
+    by id. A block of a side of a pair has its name, as `chamber.flexor`.
+    """
 
     listed: tuple[tuple[str, str], ...]
     unlisted: tuple[str, ...]
     wrong: dict[str, Any]
     wrong_block: dict[str, str]
     error: dict[str, float]
+    at: dict[str, str] = field(default_factory=dict)
 
     @property
     def names(self) -> set[str]:
@@ -106,6 +112,29 @@ class _Told:
     parameters: list[dict[str, Any]] = field(default_factory=list)
 
 
+def covered(names: Iterable[str]) -> set[str]:
+    """Blocks of a rig that some of its own are, as :func:`place`, and with the sides of a pair: one
+    without a name stands for both.
+    """
+    found = set()
+    for name in names:
+        block, side = next(iter(place([name]))), name.partition(".")[2]
+        found |= {block, *(f"{block}.{s}" for s in SIDES if side in ("", s))}
+    return found
+
+
+def _where(block: str, at: str) -> tuple[str, ...]:
+    """A block of the rig, or that of each side at which an effect acts in it."""
+    if block != "chamber" or not at:
+        return (block,)
+    return tuple(f"{block}.{side}" for side in (SIDES if at == BOTH else (at,)))
+
+
+def family(name: str) -> str:
+    """A name without its place: of ``leak_muscle@flexor`` the first part."""
+    return name.partition("@")[0]
+
+
 def place(names: Iterable[str]) -> set[str]:
     """Where blocks of a rig are: supply, chamber (with valve and line) or arm (with all others)."""
     found = set()
@@ -122,7 +151,12 @@ def _number(value: Any) -> float | None:
 
 
 def _truth(key: dict[str, Any]) -> _Truth:
-    listed = tuple((str(e["id"]), str(e["block"])) for e in key["effects"] if e["mark"] != UNLISTED)
+    listed = tuple(
+        (str(e["id"]), block)
+        for e in key["effects"]
+        if e["mark"] != UNLISTED
+        for block in _where(str(e["block"]), e.get("at", ""))
+    )
     error = {
         t["block"]: max(t["left"].values(), default=0.0)
         for t in key["terms"]
@@ -130,25 +164,36 @@ def _truth(key: dict[str, Any]) -> _Truth:
     }
     return _Truth(
         listed,
-        tuple(str(e["block"]) for e in key["effects"] if e["mark"] == UNLISTED),
+        tuple(
+            block
+            for e in key["effects"]
+            if e["mark"] == UNLISTED
+            for block in _where(str(e["block"]), e.get("at", ""))
+        ),
         dict(key["wrong_parameters"]),
-        {t["id"]: t["block"] for t in key["terms"] if t["kind"] == "parameter"},
+        {
+            t["id"]: _where(t["block"], t.get("at", ""))[0]
+            for t in key["terms"]
+            if t["kind"] == "parameter"
+        },
         error,
+        {str(e["id"]): str(e["at"]) for e in key["effects"] if e.get("at")},
     )
 
 
 def _sets(entries: Iterable[Any]) -> list[set[str]]:
-    return [{part for i in group for part in str(i).split("+")} for group in entries]
+    return [{family(part) for i in group for part in str(i).split("+")} for group in entries]
 
 
 def _told(result: dict[str, Any]) -> _Told:
     groups = list(result.get("blocks") or [])
     verdict = str(result["verdict"])
     effects = list(result.get("effects") or [])
-    named = [str(e["id"]) for e in effects] if verdict == "effects" else []
+    named = [family(str(e["id"])) for e in effects] if verdict == "effects" else []
     for group in groups:
         if group.get("verdict") == "effects":
-            named += [str(i) for i in group.get("effects", []) if str(i) not in named]
+            own = (family(str(i)) for i in group.get("effects", []))
+            named += [i for i in own if i not in named]
     told = list(result.get("wrong_parameters") or [])
     wrong = {str(e["name"]) for e in told}
     sets = _sets(result.get("ambiguity") or [])
@@ -164,7 +209,7 @@ def _told(result: dict[str, Any]) -> _Told:
 
 
 def _parts(name: str) -> set[str]:
-    return set(name.replace(",", "+").split("+")) - set(HEALTHY)
+    return {family(part) for part in name.replace(",", "+").split("+")} - set(HEALTHY)
 
 
 def _claim(
@@ -225,21 +270,20 @@ def _shares(key: dict[str, Any], result: dict[str, Any]) -> tuple[bool, ...]:
         return ()
     found = []
 
-    def wrong(block: str) -> float:
-        own = [b for b in budget if place([str(b.get("block", ""))]) == {block}]
+    def told(name: str, block: str) -> float:
+        """Share of a name in a block, the part that parameters inside their tolerances take away
+        left out.
+        """
+        own = [b for b in budget if block in covered([str(b.get("block", ""))])]
         kept = sum(_number(b.get("share")) or 0.0 for b in own if b.get("kind") == "parameters")
-        return 1.0 - kept
+        there = sum(_number(b.get("share")) or 0.0 for b in own if b.get("id") == name)
+        return there / (1.0 - kept) if kept < 1.0 else 0.0
 
     for term in key["terms"]:
         if term["kind"] == "model_error" or term.get("share") is None:
             continue
-        told = [
-            _number(b.get("share")) or 0.0
-            for b in budget
-            if b.get("id") == term["id"] and place([str(b.get("block", ""))]) == {term["block"]}
-        ]
-        whole = wrong(term["block"])
-        share = sum(told) / whole if whole > 0.0 else 0.0
+        where = _where(term["block"], term.get("at", ""))
+        share = sum(told(term["id"], block) for block in where) / len(where)
         found.append(abs(share - float(term["share"])) <= POINTS)
     return tuple(found)
 
@@ -248,16 +292,18 @@ def _blocks(truth: _Truth, told: _Told) -> tuple[BlockMark, ...]:
     """Marks of the groups of blocks that a result judges by themselves."""
     found = []
     for group in told.groups:
-        where = place(group.get("blocks") or [])
+        where = covered(group.get("blocks") or [])
         there = {n for n, block in truth.listed if block in where}
         named = group.get("effects", []) if group.get("verdict") == "effects" else []
-        extra = set(map(str, named)) - there
+        named = [family(str(name)) for name in named]
+        extra = set(named) - there
+        acts = {block.split(".")[0] for _, block in truth.listed if block in where}
         found.append(
             BlockMark(
-                "+".join(sorted(where)),
-                bool(named) and str(named[0]) in there if there else None,
+                "+".join(sorted(place(group.get("blocks") or []))),
+                bool(named) and named[0] in there if there else None,
                 bool(extra) and not there and not set(truth.unlisted) & where,
-                tuple(sorted({block for _, block in truth.listed if block in where})),
+                tuple(sorted(acts)),
             )
         )
     return tuple(found)
@@ -270,7 +316,13 @@ def _nearest(reached: float) -> str:
 
 def _own(key: dict[str, Any]) -> tuple[str, ...]:
     """How much the weakest effect leaves in the channel of its own block [noises]."""
-    sizes = [t["left"].get(CHANNEL[t["block"]], 0.0) for t in key["terms"] if t["kind"] == "effect"]
+    sizes = [
+        max(
+            (v for c, v in t["left"].items() if c.split(".")[0] == CHANNEL[t["block"]]), default=0.0
+        )
+        for t in key["terms"]
+        if t["kind"] == "effect"
+    ]
     if not sizes:
         return ()
     edges = (1.5, 3.0, 10.0, 100.0)
@@ -287,6 +339,7 @@ def _tags(key: dict[str, Any]) -> dict[str, tuple[str, ...]]:
     if key["wrong_parameters"]:
         kind = "wrong parameter and effect" if effects else "wrong parameter"
     blocks = {e["block"] for e in effects}
+    places = tuple(sorted({str(e["at"]) for e in effects if e.get("at")}))
     return {
         "truth": (kind,),
         "strength": (_nearest(max(e["reached"] for e in effects)),) if effects else (),
@@ -301,6 +354,7 @@ def _tags(key: dict[str, Any]) -> dict[str, tuple[str, ...]]:
             sorted({"yes" if e["first_catalogue"] else "no" for e in effects if e["mark"] == KNOWN})
         ),
         "block": tuple(b for b in BLOCKS if b in blocks),
+        **({"place": places} if places else {}),
         "rig": (str(spec["rig"]),),
         "rate": (f"{lab['rate']} Hz",),
         "bits": (f"{lab['bits']} bit",),
@@ -324,11 +378,32 @@ def _seen(key: dict[str, Any], truth: _Truth) -> tuple[bool, bool]:
 
 def _words(key: dict[str, Any]) -> str:
     """The truth in one line."""
-    parts = [f"{e['id']}/{e['form']} {e['reached']:.3g}" for e in key["effects"]]
+    parts = [
+        f"{e['id']}/{e['form']}{' at ' + e['at'] if e.get('at') else ''} {e['reached']:.3g}"
+        for e in key["effects"]
+    ]
     parts += [f"{n} {e['tolerances']:+.1f} tol" for n, e in key["wrong_parameters"].items()]
     if percent := int(key["spec"]["percent"]):
         parts.append(f"model error {percent} %")
     return " + ".join(parts) or "none"
+
+
+def _with_places(told: _Told) -> list[str]:
+    """The names, each with the place that stands beside it."""
+    at = {family(str(e["id"])): str(e.get("at", "")) for e in told.effects}
+    return [f"{name} at {at[name]}" if at.get(name) else name for name in told.named]
+
+
+def _placed(truth: _Truth, told: _Told) -> bool | None:
+    """Whether the first name is at its place, where that name is right and has one: at both sides
+    are an effect without a place and two of them.
+    """
+    first = told.named[0] if told.named else ""
+    if first not in truth.names or first not in truth.at:
+        return None
+    said = {str(e.get("at", "")) for e in told.effects if family(str(e["id"])) == first}
+    right = truth.at[first]
+    return said in ({""}, set(SIDES)) if right == BOTH else said == {right}
 
 
 def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
@@ -346,7 +421,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
     odd = told.verdict == "unlisted" or any(g.get("verdict") == "unlisted" for g in told.groups)
     claims: list[tuple[float, bool]] = []
     for group in told.groups or [{**(result or {}), "blocks": list(BLOCKS)}]:
-        where = place(group.get("blocks") or BLOCKS)
+        where = covered(group.get("blocks") or BLOCKS)
         claim = _claim(group.get("probabilities") or {}, truth, where)
         claims += [claim] if claim else []
     holds: bool | None = None
@@ -358,7 +433,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
         claimed = bool(told.named) or bool(told.wrong - wrong)
         plain = not int(key["spec"]["percent"]) and (odd or bool(told.rest))
         false = claimed or plain
-    said = ", ".join(told.named) or told.verdict
+    said = ", ".join(_with_places(told)) or told.verdict
     said += f"; wrong {', '.join(sorted(told.wrong))}" if told.wrong else ""
     said += f"; rest in {', '.join(sorted(told.rest))}" if told.rest else ""
     return Mark(
@@ -383,6 +458,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
         seconds=_number((result or {}).get("seconds")),
         claims=tuple(claims),
         blocks=_blocks(truth, told),
+        placed=_placed(truth, told) if not missing else None,
     )
 
 
@@ -427,3 +503,9 @@ def is_second(keys: Path) -> bool:
     """Whether the keys in a folder are those of the second plan."""
     first: Sequence[Path] = sorted(Path(keys).glob("*.json"))[:1]
     return any(json.loads(p.read_text(encoding="utf-8")).get("schema") == SCHEMA for p in first)
+
+
+def plan_of(keys: Path) -> str:
+    """Name of the plan of strata whose keys are in a folder."""
+    first = sorted(Path(keys).glob("*.json"))[0]
+    return str(json.loads(first.read_text(encoding="utf-8")).get("plan", SECOND))

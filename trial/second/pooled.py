@@ -47,7 +47,7 @@ def pooled(files: Iterable[Path]) -> dict[str, list[Mark]]:
 
 def _mark(told: dict[str, Any]) -> Mark:
     """A case's mark from the JSON of a score."""
-    own = {f.name: told[f.name] for f in fields(Mark)}
+    own = {f.name: told[f.name] for f in fields(Mark) if f.name in told}
     own["tags"] = {name: tuple(values) for name, values in told["tags"].items()}
     own["claims"] = tuple((float(p), bool(right)) for p, right in told["claims"])
     own["blocks"] = tuple(

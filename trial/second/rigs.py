@@ -1,7 +1,4 @@
-"""The rigs of the second plan, as the trial's plant holds them.
-
-An antagonistic pair is missing: two chambers with a valve each are more than this plant has.
-"""
+"""The rigs of the second plan and of those after it, as the trial's plants hold them."""
 
 from __future__ import annotations
 
@@ -10,10 +7,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from ..pair.places import SIDES
+from ..pair.plant import PairPlant, pair_parameters
 from ..plant import Parameters, Plant
 from ..rigfile import default_rig, read_rig, to_parameters
 
 HOME = Path(__file__).resolve().parents[1] / "rigs"
+PAIR = "antagonistic_pair"
 ARM = ("arm.inertia", "arm.first_moment", "arm.payload", "arm.viscous")
 GAS = ("supply.volume", "valve.discharge_area_max", "chamber.dead_volume")
 
@@ -51,8 +51,18 @@ _TURNING = (
     "hose_torque",
     "tendon_compliance",
     "moment_arm_error",
+    "com_offset",
 )
 _MUSCLE = "muscle.modulus_scale"
+#: what each side of a pair has, and their tank
+_TWICE = (
+    "supply.volume",
+    *(
+        f"{block}.{side}.{key}"
+        for block, key in (n.split(".") for n in (*GAS[1:], _MUSCLE))
+        for side in SIDES
+    ),
+)
 RIGS: dict[str, RigKind] = {
     r.name: r
     for r in (
@@ -77,6 +87,7 @@ RIGS: dict[str, RigKind] = {
             6e5,
             10e5,
         ),
+        RigKind(PAIR, (*_AIR, *_MOTION), (*_TWICE, *ARM), 10.0, 82.0, 5.5e5, 10e5),
         RigKind("chamber", _AIR, GAS, 0.0, 1.0, 5e5, 10e5),
         RigKind(
             "blow_down",
@@ -157,7 +168,19 @@ def _lift(model: dict[str, Any]) -> dict[str, Any]:
 
 
 @lru_cache(maxsize=8)
+def stated(name: str) -> tuple[dict[str, Any], dict[str, float]]:
+    """Nominal model of a rig, and its tolerances."""
+    return read_rig(RIGS[name].path)
+
+
+@lru_cache(maxsize=8)
 def nominal(name: str) -> tuple[dict[str, Any], dict[str, float], Plant]:
-    """Nominal model, tolerances and plant of a rig."""
-    model, tolerance = read_rig(RIGS[name].path)
+    """Nominal model, tolerances and plant of a rig with one valve or none."""
+    model, tolerance = stated(name)
     return model, tolerance, Plant(parameters_of(model, RIGS[name]))
+
+
+@lru_cache(maxsize=1)
+def nominal_pair() -> PairPlant:
+    """Nominal plant of the pair."""
+    return PairPlant(pair_parameters(stated(PAIR)[0]))

@@ -63,6 +63,8 @@ STRATA = (
     "bits",
     "log",
 )
+#: strata and counts of plans with a pair: other plans do without them
+PLACED = "place"
 
 
 def share_of(marks: Iterable[Mark], counts: Counts) -> tuple[int, int]:
@@ -257,7 +259,7 @@ def _about(off: float, spread: tuple[float, float] | None) -> tuple[float, float
 def scores(marks: Sequence[Mark]) -> dict[str, Any]:
     """All scores as plain data: the whole, every stratum, targets and cases."""
     strata: dict[str, Any] = {}
-    for name in STRATA:
+    for name in (*STRATA, *([PLACED] if any(PLACED in m.tags for m in marks) else [])):
         values = sorted({v for m in marks for v in m.tags.get(name, ())}, key=_order)
         strata[name] = {
             v: measures([m for m in marks if v in m.tags.get(name, ())]) for v in values
@@ -267,9 +269,20 @@ def scores(marks: Sequence[Mark]) -> dict[str, Any]:
         "all": measures(marks),
         "strata": strata,
         "leave_form_out": measures([m for m in marks if m.tags["form"] == (OTHER,)]),
+        **({"places": places} if (places := _places(marks)) else {}),
         "targets": [t.to_dict() for t in targets(marks)],
         "cases": [m.to_dict() for m in marks],
     }
+
+
+def _places(marks: Sequence[Mark]) -> dict[str, Any]:
+    """Of right names of effects that act at a side: how many have their place right, by place."""
+    asked = [m for m in marks if m.placed is not None]
+    found = {}
+    for value in sorted({v for m in asked for v in m.tags.get(PLACED, ())}):
+        k, n = share_of((m for m in asked if value in m.tags[PLACED]), _one("placed"))
+        found[value] = {"hits": k, "n": n, **_interval(k, n)}
+    return found
 
 
 def _order(value: str) -> tuple[float, str]:
@@ -359,6 +372,10 @@ def tables(told: dict[str, Any]) -> str:
         if values:
             rows = [_line(v, m) for v, m in values.items()]
             parts += [f"\n### By {name}\n", table((name, *head[1:]), rows)]
+    if told.get("places"):
+        head_ = ("an effect acts at", "right names", "place right (95 % interval)")
+        rows = [(v, str(m["n"]), percent(m["hits"], m["n"])) for v, m in told["places"].items()]
+        parts += ["\n## Places of right names\n", table(head_, rows)]
     parts += ["\n## By block of the rig\n", _block_rows(told["all"]["by block"])]
     parts += ["\n## Stated probabilities\n", _bins(told["all"]["reliability"]["bins"])]
     return "\n".join(parts) + "\n"
@@ -392,12 +409,9 @@ def _outcome(case: dict[str, Any]) -> str:
         "wrong": ("parameter named", "parameter not named"),
         "unlisted": ("unlisted right", "not called unlisted"),
         "false_name": ("false name", "no false name"),
+        "placed": ("place right", "place wrong"),
     }
-    told = [
-        words[name][0 if case[name] else 1]
-        for name in ("leading", "wrong", "unlisted", "false_name")
-        if case[name] is not None
-    ]
+    told = [words[n][0 if case[n] else 1] for n in words if case.get(n) is not None]
     return ", ".join(told)
 
 

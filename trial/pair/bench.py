@@ -1,0 +1,74 @@
+"""Runs the recordings of a case of a pair."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..effects import Effect
+from ..plant import Parameters
+from ..recording import Array, Record
+from ..rigfile import split
+from ..second.bench import Bench
+from ..second.rigs import nominal_pair
+from .course import PairDriver, pair_course
+from .places import SIDES, Placed
+from .plant import PairParameters, PairPlant, pair_parameters
+from .recording import CHANNELS, KINDS, follow_pair, run_pair
+
+
+class PairBench(Bench):
+    """The recordings of one case of a pair; its effects are :class:`.places.Placed`."""
+
+    channels = CHANNELS
+
+    def numbers(self, model: dict[str, Any]) -> PairParameters:
+        return pair_parameters(model)
+
+    def numbers_at(self, effect: Effect | Placed) -> tuple[Parameters, ...]:
+        assert isinstance(effect, Placed)
+        own: PairParameters = self.par
+        return tuple(own.of(side) for side in effect.sides or ("",))
+
+    def floors(self) -> Array:
+        return self.noise.floor()[list(KINDS)]
+
+    def drive(self, name: str, rng: np.random.Generator) -> tuple[Any, Any, Array | None]:
+        shape = pair_course(self.rig, name, self.spec.duration, self.step, rng)
+        return (
+            shape,
+            PairDriver(nominal_pair(), self.rig, self.step * self.spec.lab.held, rng),
+            None,
+        )
+
+    def plant(self, numbers: Any, effects: Sequence[Any] = ()) -> PairPlant:
+        return PairPlant(numbers, effects)
+
+    def recorded(self, plant: Any, index: int) -> Record:
+        shape, driver, _ = self.drives[index]
+        driver.reset()
+        return run_pair(
+            plant,
+            shape,
+            lambda i, measured: driver.on(shape, i, measured),
+            self.supply[index],
+            self.noise,
+            np.random.default_rng([self.spec.seed, index, 78]),
+            index,
+            self.step,
+            self.spec.lab.held,
+        )
+
+    def followed(
+        self, plant: Any, record: Record, index: int, name: str = "", step: float = 0.0
+    ) -> Array:
+        section, key = split(name)
+        zero = {"pressure_zero": section.removeprefix("sensors."), "angle_zero": "angle"}.get(key)
+        shift = tuple(-step if zero == own else 0.0 for own in (*SIDES, "angle"))
+        return follow_pair(plant, record, index, shift, sample_time=self.step)
+
+    @property
+    def shown(self) -> list[int]:
+        return [i for i, name in enumerate(self.channels) if name != self.spec.lab.missing]
