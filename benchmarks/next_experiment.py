@@ -23,12 +23,12 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Fit, Problem, bin_width, fit, free_baseline, starts_of
 from pamrs.diagnosis.next_experiment import (
-    MEASURABLE,
     Experiment,
     Hypothesis,
     Outcome,
     library,
     linear,
+    measurable,
     misfit,
     outcome_of,
     problem_of,
@@ -112,7 +112,7 @@ QUESTIONS = (
 def drawn(rig: Rig, rng: np.random.Generator) -> Rig:
     """The rig with its baseline parameters somewhere inside their tolerances."""
     known = rig.parameters
-    names = free_baseline(problem_of(rig, [], MEASURABLE, SETTINGS), rig)
+    names = free_baseline(problem_of(rig, [], measurable(rig), SETTINGS), rig)
     return rig.with_parameters(
         {n: known[n].value + 0.5 * known[n].tol * float(rng.standard_normal()) for n in names}
     )
@@ -164,7 +164,7 @@ def likelihoods(
     out = []
     for _, rig, _ in hypotheses:
         changed = experiment.changed(rig)
-        problem = problem_of(changed, [real], MEASURABLE, SETTINGS)
+        problem = problem_of(changed, [real], measurable(changed), SETTINGS)
         out.append(
             -0.5 * misfit(problem, linear(problem, changed), weights_of(problem, changed)).total
         )
@@ -199,7 +199,7 @@ def opened(
         parameters = {n: v * size if n in scaled else v for n, v in question.parameters.items()}
         truth = plant.with_effect(question.truth, parameters)
         seen = taken(first.simulate(truth), truth, first.name, NOISE, SETTINGS, rng=rng)
-        problem = problem_of(nominal, [seen], MEASURABLE, SETTINGS)
+        problem = problem_of(nominal, [seen], measurable(nominal), SETTINGS)
         hypotheses, prior = explained(question, nominal, problem)
         if prior.max() <= OPEN or size < 0.1:
             return Case(question, size, truth, hypotheses, prior)
@@ -269,7 +269,9 @@ def answered(case: Case, experiments: list[Experiment], rng: np.random.Generator
     gains: dict[str, Array] = {}
     for experiment in experiments:
         try:
-            outcomes.append(outcome_of(experiment, case.hypotheses, NOISE, MEASURABLE, SETTINGS))
+            outcomes.append(
+                outcome_of(experiment, case.hypotheses, NOISE, measurable(case.truth), SETTINGS)
+            )
             gains[experiment.name] = likelihoods(experiment, case.truth, case.hypotheses, rng)
         except SimulationError:
             outcomes = [o for o in outcomes if o.experiment is not experiment]

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -22,7 +23,9 @@ from pamrs.diagnosis.next_experiment import (
     entropy,
     library,
     linear,
+    measurable,
     misfit,
+    noise_of,
     outcome_of,
     problem_of,
     propose,
@@ -30,15 +33,18 @@ from pamrs.diagnosis.next_experiment import (
     usual_noise,
 )
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.effects import term_of
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording, load_recording
+from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig, replay
-from tests.diagnosis import again
+from tests.diagnosis import again, test_places
 
 SETTINGS = DiagnosisSettings()
 OWN = SETTINGS.next_experiment
 NOISE = usual_noise(OWN)
 SHOULDER = pamrs.rigs.shoulder()
+ANTAGONISTS = pamrs.rigs.antagonistic_joint()
 REGULATED = pamrs.rigs.named("regulated_joint")
 SENSORS = ("supply_pressure", "muscle_pressure", "joint_angle")
 OPEN = replace(
@@ -69,6 +75,12 @@ PAIRS = {
         ("valve_centre_leakage", {"conductance": 5e-12}),
         ("step_and_shut", "multisine"),
     ),
+    "leak of one muscle or the other": (
+        ANTAGONISTS,
+        ("leak_muscle", {"conductance": 2e-12}, "flexor"),
+        ("leak_muscle", {"conductance": 2e-12}, "extensor"),
+        ("step_and_shut.extensor", "multisine"),
+    ),
     "regulator or sensor": (
         REGULATED,
         ("supply_regulator_deadband", {"dead_band": 2e3}),
@@ -80,14 +92,17 @@ PAIRS = {
 
 @pytest.mark.parametrize("pair", PAIRS)
 def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
-    rig, one, other, names = PAIRS[pair]
-    rivals = [rig.with_effect(*one), rig.with_effect(*other)]
-    hypotheses = [(one[0], rivals[0], 0.5), (other[0], rivals[1], 0.5)]
+    rig, *both, names = PAIRS[pair]
+    rivals, labels = [], []
+    for effect, values, *at in both:
+        rivals.append(rig.with_effect(effect, values, at=at[0] if at else ""))
+        labels.append(term_of(effect, *at))
+    hypotheses = [(label, rival, 0.5) for label, rival in zip(labels, rivals, strict=True)]
     pool = library(rig, OWN, sample_time=0.01, highest=4e5, only=names)
-    channels = (pool[0].channel, *SENSORS)
-    proposed = propose(rig, hypotheses, NOISE, channels=channels, experiments=pool)
+    noise, channels = noise_of(rig, OWN), measurable(rig)
+    proposed = propose(rig, hypotheses, noise, channels=channels, experiments=pool)
     chosen = next(e for e in pool if e.name == proposed.excitation["kind"])
-    outcome = outcome_of(chosen, hypotheses, NOISE, channels, SETTINGS)
+    outcome = outcome_of(chosen, hypotheses, noise, channels, SETTINGS)
     bits = []
     for i, j in ((0, 1), (1, 0)):
         gained, missed = [], []
@@ -95,9 +110,8 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
         for seed in range(4):
             # the rig of hypothesis i plays the experiment, with the noise of its sensors
             run = chosen.simulate(rivals[i])
-            heard = {c: v for c, v in NOISE.items() if c in channels}
             rng = np.random.default_rng([seed, i])
-            played = taken(run, rig, chosen.name, heard, SETTINGS, rng=rng)
+            played = taken(run, rig, chosen.name, noise, SETTINGS, rng=rng)
             problem = problem_of(rig, [played], channels, SETTINGS)
             problem = replace(problem, blocks=outcome.problem.blocks)
             right, wrong = (
@@ -153,9 +167,13 @@ def test_experiments_stay_inside_what_the_stand_allows(tmp_path) -> None:
 
 
 def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> None:
+    text = REGULATED.to_toml_text().partition("[limits]")[0]
+    unlimited = parse_rig(text)
     with pytest.raises(DiagnosisError, match="max_pressure"):
-        library(REGULATED, OWN)
-    rig = limited(REGULATED, 'max_pressure = { value = 2.5, unit = "bar" }', tmp_path)
+        library(unlimited, OWN)
+    with pytest.raises(DiagnosisError, match="max_pressure"):
+        pamrs.plan_diagnosis(unlimited, ["muscle_pressure"])
+    rig = limited(unlimited, 'max_pressure = { value = 2.5, unit = "bar" }', tmp_path)
     pool = library(rig, OWN, sample_time=0.01)
     assert {"set_steps", "fine_staircase", "nested_triangles"} <= {e.name for e in pool}
     assert not {"sealed_hold", "null_ramp", "step_and_shut"} & {e.name for e in pool}
@@ -234,6 +252,7 @@ def test_what_a_regulator_lacks_is_asked_of_the_regulator() -> None:
         ("shoulder", ("valve_command", *SENSORS), ["sealed_hold", "step_and_shut", "nested"]),
         ("regulated_joint", ("supply_command", *SENSORS), ["set_steps", "set_steps", "nested"]),
         ("sealed_chamber", ("muscle_pressure",), ["hold_low"]),
+        ("tube", ("muscle_pressure.left", "muscle_pressure.right"), ["blow_over", "blow_over"]),
     ],
 )
 def test_every_block_has_its_own_experiment(
@@ -273,6 +292,28 @@ def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
     assert found.to_dict()["next_experiment"]["pairs"]
 
 
+def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(tmp_path, capsys) -> None:
+    leak = ANTAGONISTS.with_effect("leak_muscle", {"conductance": 2e-11}, at="flexor")
+    given = test_places.case(leak)
+    found = pamrs.diagnose(replace(given, recordings=given.recordings[:2]), settings=OPEN)
+    assert found.ambiguity
+    asked = found.next_experiment
+    assert asked.pairs
+    assert asked.protocol is not None
+    assert set(asked.protocol.commands) == {"valve_command.flexor", "valve_command.extensor"}
+    assert asked.excitation["kind"] in {asked.protocol.name, asked.protocol.name.partition(".")[0]}
+    run = pamrs.simulate(
+        ANTAGONISTS,
+        {name.partition(".")[2]: u for name, u in asked.protocol.commands.items()},
+        sample_time=float(asked.protocol.time[1]),
+    )
+    for side in ("flexor", "extensor"):
+        name = f"muscle_pressure.{side}"
+        highest = max(float(np.max(r.channels[name])) for r in given.recordings[:2])
+        assert float(run[name].max()) <= 1.12 * highest
+    assert "chamber of flexor" in found.summary()
+
+
 def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:
     leak = SHOULDER.with_effect("leak_muscle", {"conductance": 3e-11})
     pool = library(SHOULDER, OWN, sample_time=0.01, highest=4e5, only={"step_and_shut"})
@@ -287,12 +328,13 @@ def test_an_effect_and_parameters_that_moved_are_simulated_as_a_pair() -> None:
     assert 0.0 < found.expected_information_bits < entropy([0.6, 0.4])
 
 
-def test_a_pair_that_nothing_simulates_is_told_in_words() -> None:
+@pytest.mark.parametrize("driven", [True, False], ids=["valves", "none"])
+def test_a_pair_that_nothing_simulates_is_told_in_words(driven: bool) -> None:
     rig = pamrs.rigs.antagonistic_joint()
-    names = ("muscle_pressure", "valve_command")
-    channels = [f"{n}.{side}" for n in names for side in ("flexor", "extensor")]
-    every = ("supply_pressure", "joint_angle.elbow", *channels)
-    blocks = available_blocks(rig, every, SETTINGS.prepare)
+    if not driven:  # pressures that are given: no experiment of the library drives them
+        cut = re.sub(r"(?m)^\[(supply|valve).*\n(?:(?!\[).*\n)*", "", rig.to_toml_text())
+        rig = parse_rig(cut)
+    blocks = available_blocks(rig, measurable(rig), SETTINGS.prepare)
     from pamrs.diagnosis.evidence import Candidate, Group, Judged
     from pamrs.diagnosis.fit import Fit
 
@@ -306,6 +348,7 @@ def test_a_pair_that_nothing_simulates_is_told_in_words() -> None:
     asked = _Question(rig, judged, blocks, [], problem)
     told = _pair(asked, *sets, [])
     assert told.between == ["muscle_creep", "muscle_hysteresis"]
-    assert "nested loops" in told.text
+    assert ("nested triangles" if driven else "nested loops") in told.text
     assert "arm of elbow" in told.text
-    assert (told.experiment, told.noises) == ("", None)
+    # of two chains that move the joint the first one is moved
+    assert (told.experiment, told.noises) == ("nested_triangles.flexor" if driven else "", None)

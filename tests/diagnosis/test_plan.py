@@ -125,9 +125,9 @@ def few():
     made = plan._parts
     kept: dict[str, Any] = {}
 
-    def once(rig, blocks, experiment, starts, noise, settings):
+    def once(rig, blocks, experiment, *rest):
         if experiment.name not in kept:
-            kept[experiment.name] = made(rig, blocks, experiment, starts, noise, settings)
+            kept[experiment.name] = made(rig, blocks, experiment, *rest)
         return kept[experiment.name]
 
     with pytest.MonkeyPatch.context() as patch:

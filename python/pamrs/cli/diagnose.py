@@ -185,8 +185,7 @@ def _plan(
     """What a diagnosis could tell, to standard output and a file."""
     from json import dumps
 
-    from pamrs.diagnosis.next_experiment import MEASURABLE, plan_diagnosis
-    from pamrs.simulation import core_rig
+    from pamrs.diagnosis.next_experiment import measurable, plan_diagnosis
 
     loaded = rig_named(rig)
     noise: dict[str, float] = {}
@@ -197,10 +196,8 @@ def _plan(
         )
     if angle_noise is not None:
         noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
-    core = core_rig(loaded)
-    every = [name for name in MEASURABLE if name in {*core.inputs, *core.channels}]
     given = (
-        every
+        measurable(loaded)
         if channels is None
         else [name.strip() for name in channels.split(",") if name.strip()]
     )

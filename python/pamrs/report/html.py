@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -400,13 +401,16 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
 
 def _excitation(diagnosis: Findings) -> list[tuple[str, str]]:
     content = diagnosis.next_experiment.excitation
-    return [
-        (
-            words.label(str(k)),
-            words.format_number(v) if words.is_number(v) and not isinstance(v, bool) else str(v),
-        )
-        for k, v in content.items()
-    ]
+    return [(words.label(str(k)), _value(v)) for k, v in content.items()]
+
+
+def _value(value: object) -> str:
+    """A value of an excitation; of several chains by their names."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{name}: {_value(own)}" for name, own in value.items())
+    if words.is_number(value) and not isinstance(value, bool):
+        return words.format_number(value)
+    return str(value)
 
 
 def _separating(diagnosis: Findings) -> str | None:

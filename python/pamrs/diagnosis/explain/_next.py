@@ -18,13 +18,15 @@ from pamrs.diagnosis.next_experiment import (
     Experiment,
     Hypothesis,
     apart,
+    can_shut,
+    chains_of,
     experiments_of,
     is_sealed,
+    noise_of,
     outcome_of,
     propose,
     protocol_of,
     spoken,
-    usual_noise,
 )
 from pamrs.diagnosis.prepare import Block, Prepared
 from pamrs.effects import info_of, is_effect
@@ -83,6 +85,13 @@ _SET = _Telling(
     "what comes late is a lag, what is less the more air flows is a droop or a restriction, what "
     "stays away from the set pressure at rest is an offset or a dead band",
 )
+_KEPT = _Telling(
+    "set_steps",
+    "step the pressure by two sizes, 1:3, up and down, inside the pressures that are already "
+    "recorded, and keep each for 5 s",
+    "what comes late is a lag, what grows with the flow is the valve's, what the valves have to "
+    "make good while the pressure rests is a leak",
+)
 _ONCE_MORE = _Telling(
     "hold_low",
     "repeat the hold at a third of the pressure",
@@ -96,6 +105,12 @@ _BLOWN = replace(
     shows="an opening lets through the same share of the pressure at every pressure, and a hold "
     "with the outlet shut shows what else the chamber loses",
 )
+_OVER = _Telling(
+    "blow_over",
+    "fill one chamber, open what lies between and let it blow over into the others",
+    "how the flow goes with both pressures shows what the way between lets through, and what the "
+    "chambers lose together is a leak",
+)
 
 
 def _telling(block: Block, rig: Rig) -> _Telling:
@@ -103,10 +118,14 @@ def _telling(block: Block, rig: Rig) -> _Telling:
     if block.mechanical:
         return _LOOPS
     if is_sealed(rig):
-        lines = rig.tables("line") or rig.tables("muscle") or len(rig.tables("chamber")) > 1
+        if len(rig.tables("chamber")) > 1:
+            return _OVER
+        lines = rig.tables("line") or rig.tables("muscle")
         return _BLOWN if lines else _ONCE_MORE
     if regulators_of(rig) and not rig.tables("valve"):
         return _SET
+    if not all(can_shut(rig, chain) for chain in chains_of(rig)):
+        return _KEPT
     return _HOLDS if block.kind == "supply" else _SHUT
 
 
@@ -127,7 +146,7 @@ class _Question:
     problem : Problem
         Any of them, for its settings.
     made : dict of str to (Experiment or None)
-        What the library made for this rig so far, by kind.
+        What the library made for this rig so far, by name or kind.
     """
 
     nominal: Rig
@@ -169,17 +188,27 @@ class _Question:
         for this rig.
         """
         telling = _telling(block, self.nominal)
-        if telling.kind not in self.made:
-            self.made[telling.kind] = self._make(telling.kind)
-        made = self.made[telling.kind]
+        # of several chains the one that drives the block, or else the first
+        chains = [chain for chain in chains_of(self.nominal) if chain.name]
+        own = [c.name for c in chains if block.channel in (c.pressure, *c.moves)]
+        named = [f"{telling.kind}.{name}" for name in (own or [c.name for c in chains])[:1]]
+        made = self._made((*named, telling.kind))
         return telling.text if made is None else made.text, telling.shows, made
 
-    def _make(self, kind: str) -> Experiment | None:
-        """The experiment of a kind; None where the library makes none for this rig."""
+    def _made(self, names: Sequence[str]) -> Experiment | None:
+        """The first experiment of some names or kinds that the library makes for this rig; None
+        where it makes none of them.
+        """
         records = [p.recording for p in self.recordings]
         settings = self.problem.settings.next_experiment
-        with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
-            return next(iter(experiments_of(self.nominal, records, settings, {kind})), None)
+        for name in names:
+            if name not in self.made:
+                self.made[name] = None
+                with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
+                    found = experiments_of(self.nominal, records, settings, {name})
+                    self.made[name] = next(iter(found), None)
+            if self.made[name] is not None:
+                return self.made[name]
         return None
 
 
@@ -366,7 +395,7 @@ def _weight(
         bare = without_term(bare, effect)
     settings = asked.problem.settings
     channels = tuple(asked.recordings[0].recording.channels)
-    noise = {**usual_noise(settings.next_experiment), **asked.noise}
+    noise = {**noise_of(asked.nominal, settings.next_experiment), **asked.noise}
     pair = [("with", own, 0.5), ("without", bare, 0.5)]
     with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
         return apart(outcome_of(experiment, pair, noise, channels, settings), 0, 1, nested=True)

@@ -2,14 +2,23 @@
 
 Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `apart`, `information`,
 `entropy`, `experiments_of`, `protocol_of`, `spoken` (experiments compared); `Experiment`, `Range`,
-`library`, `pressure_range`, `trial_of`, `is_sealed` (what a person can record); `Plan`, `Sight`,
-`Addition`, `plan_diagnosis` (before there are data); `MEASURABLE`, `Left`, `Linear`,
-`checked_channels`, `counted`, `difference`, `linear`, `misfit`, `problem_of`, `taken`,
-`usual_noise`, `weights_of` (how far two models differ).
+`library`, `Chain`, `chains_of`, `can_shut`, `pressure_range`, `trial_of`, `is_sealed` (what a
+person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before there are data);
+`Left`, `Linear`, `checked_channels`, `measurable`, `counted`, `difference`, `linear`, `misfit`,
+`problem_of`, `taken`, `usual_noise`, `noise_of`, `weights_of` (how far two models differ).
 """
 
 from __future__ import annotations
 
+from pamrs.diagnosis.next_experiment._chains import (
+    Chain,
+    Range,
+    can_shut,
+    chains_of,
+    is_sealed,
+    pressure_range,
+    trial_of,
+)
 from pamrs.diagnosis.next_experiment._choice import (
     Hypothesis,
     Outcome,
@@ -24,33 +33,28 @@ from pamrs.diagnosis.next_experiment._choice import (
     spoken,
 )
 from pamrs.diagnosis.next_experiment._differences import (
-    MEASURABLE,
     Left,
     Linear,
     checked_channels,
     counted,
     difference,
     linear,
+    measurable,
     misfit,
+    noise_of,
     problem_of,
     taken,
     usual_noise,
     weights_of,
 )
+from pamrs.diagnosis.next_experiment._experiment import Experiment
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._planning import plan_diagnosis
-from pamrs.diagnosis.next_experiment._protocols import (
-    Experiment,
-    Range,
-    is_sealed,
-    library,
-    pressure_range,
-    trial_of,
-)
+from pamrs.diagnosis.next_experiment._protocols import library
 
 __all__ = [
-    "MEASURABLE",
     "Addition",
+    "Chain",
     "Experiment",
     "Hypothesis",
     "Left",
@@ -60,6 +64,8 @@ __all__ = [
     "Range",
     "Sight",
     "apart",
+    "can_shut",
+    "chains_of",
     "checked_channels",
     "counted",
     "difference",
@@ -69,7 +75,9 @@ __all__ = [
     "is_sealed",
     "library",
     "linear",
+    "measurable",
     "misfit",
+    "noise_of",
     "outcome_of",
     "plan_diagnosis",
     "pressure_range",

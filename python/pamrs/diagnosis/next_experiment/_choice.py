@@ -18,10 +18,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import unit_of
+from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
+from pamrs.diagnosis.next_experiment._chains import chains_of, is_sealed
 from pamrs.diagnosis.next_experiment._differences import (
-    MEASURABLE,
     Left,
     Linear,
     checked_channels,
@@ -30,21 +30,23 @@ from pamrs.diagnosis.next_experiment._differences import (
     elsewhere,
     judged_alike,
     linear,
+    measurable,
+    noise_of,
     problem_of,
     taken,
-    usual_noise,
     weights_of,
 )
-from pamrs.diagnosis.next_experiment._protocols import Experiment, is_sealed, library
+from pamrs.diagnosis.next_experiment._experiment import Experiment
+from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
-from pamrs.effects import info_of, is_effect, place_of
+from pamrs.effects import info_of, is_effect, place_of, term_in
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
 from pamrs.recordings import Recording
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, core_rig, regulators_of
+from pamrs.simulation import Simulation, core_rig
 
 __all__ = [
     "Outcome",
@@ -162,10 +164,9 @@ def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
     """The blocks in which hypotheses differ: those where an effect acts that not all of them have;
     all where none does.
     """
-    sets = [{effect["id"] for effect in rig.effects} for rig in rigs]
-    disputed = set.union(*sets) - (
-        set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set()
-    )
+    sets = [{term_in(effect) for effect in rig.effects} for rig in rigs]
+    shared: set[str] = set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set()
+    disputed = set.union(*sets) - shared
     blocks = [b for b in problem.blocks if any(acts_in(effect, b) for effect in disputed)]
     return replace(problem, blocks=blocks or problem.blocks)
 
@@ -330,7 +331,7 @@ def propose(
     settings = DiagnosisSettings() if settings is None else settings
     own_settings = settings.next_experiment
     chosen = _checked(hypotheses, own_settings)
-    usual = usual_noise(own_settings)
+    usual = noise_of(nominal, own_settings)
     sound = {**usual, **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
@@ -426,7 +427,7 @@ def _largest(outcome: Outcome, i: int, j: int) -> tuple[str, float]:
 
 def _nested(one: Rig, other: Rig) -> bool:
     """Whether the one model has every effect of the other."""
-    first, second = ({entry["id"] for entry in rig.effects} for rig in (one, other))
+    first, second = ({term_in(entry) for entry in rig.effects} for rig in (one, other))
     return first <= second or second <= first
 
 
@@ -508,13 +509,9 @@ def _channels(
     rig: Rig, records: Sequence[Recording], channels: tuple[str, ...] | None
 ) -> tuple[str, ...]:
     if channels is not None:
-        checked_channels(rig, channels)
-        return tuple(channels)
-    has = {*core_rig(rig).inputs, *core_rig(rig).channels}
+        return checked_channels(rig, channels)
     return tuple(
-        name
-        for name in MEASURABLE
-        if name in has and all(name in record.channels for record in records)
+        name for name in measurable(rig) if all(name in record.channels for record in records)
     )
 
 
@@ -523,7 +520,11 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
     for which the line has to be cut, is offered by a plan alone.
     """
     has = core_rig(rig).channels
-    return [name for name in sensors if name in has and name not in (*own, "line_pressure")]
+    return [
+        name
+        for name in sensors
+        if name in has and name not in own and channel_of(name) != "line_pressure"
+    ]
 
 
 def experiments_of(
@@ -547,17 +548,22 @@ def experiments_of(
         usual = settings.sealed_sample_time
         least, most = settings.least_sealed_sample_time, settings.most_sealed_sample_time
     step = min(max(min((r.sample_time for r in records), default=usual), least), most)
-    # a regulator was set to pressures that its chamber may not have reached
-    seen = ("muscle_pressure", "supply_command") if regulators_of(rig) else ("muscle_pressure",)
-    peaks = [
-        float(np.nanmax(r.channels[name]))
-        for r in records
-        for name in seen
-        if name in r.channels and np.isfinite(r.channels[name]).any()
-    ]
-    highest = max(peaks, default=0.0)
-    limit = 1.05 * highest if highest > 2e4 else None
-    return library(rig, settings, sample_time=step, highest=limit, only=only)
+    every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
+    seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
+    limits = {}
+    for chain, names in seen.items():
+        peaks = [
+            float(np.nanmax(r.channels[name]))
+            for r in records
+            for name in names
+            if name in r.channels and np.isfinite(r.channels[name]).any()
+        ]
+        if max(peaks, default=0.0) > 2e4:
+            limits[chain] = 1.05 * max(peaks)
+    # what has no gauge is moved no higher than what has one
+    most = max(limits.values(), default=0.0)
+    limits = {chain: limits.get(chain, most) for chain in seen if limits}
+    return library(rig, settings, sample_time=step, highest=limits or None, only=only)
 
 
 _WITHOUT_NAME = {

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import (
@@ -36,7 +37,6 @@ from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, core_rig
 
 __all__ = [
-    "MEASURABLE",
     "Left",
     "Linear",
     "checked_channels",
@@ -44,7 +44,9 @@ __all__ = [
     "difference",
     "judged_alike",
     "linear",
+    "measurable",
     "misfit",
+    "noise_of",
     "problem_of",
     "taken",
     "usual_noise",
@@ -56,7 +58,7 @@ Array = NDArray[np.float64]
 COMMANDS = ("valve_command", "supply_command")
 """Channels that a person sends."""
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
-MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length")
+_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length")
 """Channels that the cut chain uses."""
 
 
@@ -66,8 +68,30 @@ def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
     return pressures | {"joint_angle": settings.angle_noise, "length": settings.length_noise}
 
 
+def noise_of(
+    rig: Rig, settings: NextExperimentSettings, given: Mapping[str, float] | None = None
+) -> dict[str, float]:
+    """Sample noise of every channel of a rig that the cut chain uses [SI]: that of usual
+    transducers, where none is given for the channel, or for all of its kind.
+    """
+    usual = usual_noise(settings) | dict(given or {})
+    names = [name for kind in usual_noise(settings) for name in measurable(rig, kind)]
+    return {name: usual.get(name, usual[channel_of(name)]) for name in names}
+
+
+def measurable(rig: Rig, kind: str = "") -> tuple[str, ...]:
+    """Channels of a rig that the cut chain uses, of one kind or of all: ``valve_command.flexor``,
+    ``muscle_pressure.flexor``, ``joint_angle.elbow``.
+    """
+    core = core_rig(rig)
+    has = dict.fromkeys((*core.inputs, *core.channels))
+    kinds = (kind,) if kind else _MEASURABLE
+    return tuple(name for one in kinds for name in has if channel_of(name) == one)
+
+
 def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
-    """The channels that are given, or an error that names one that is unknown or not of this rig.
+    """The channels that are given, or an error that names one that is unknown or not of this rig; a
+    name without that of a block stands for all of its kind.
 
     Parameters
     ----------
@@ -81,15 +105,15 @@ def checked_channels(rig: Rig, channels: tuple[str, ...]) -> tuple[str, ...]:
     ParameterError
         For a channel that the cut chain does not use, or that this rig does not have.
     """
-    has = [*core_rig(rig).inputs, *core_rig(rig).channels]
-    own = [name for name in MEASURABLE if name in has]
+    own = measurable(rig)
+    kinds = {channel_of(name) for name in own}
     for name in channels:
-        if name not in own:
+        if name not in own and name not in kinds:
             raise ParameterError(
                 f"channels has {name!r}, which is not allowed: of rig {rig.name!r} one of "
                 f"{', '.join(own)}"
             )
-    return tuple(name for name in own if name in channels)
+    return tuple(name for name in own if name in channels or channel_of(name) in channels)
 
 
 def taken(
@@ -118,7 +142,7 @@ def taken(
     rng : numpy.random.Generator, optional
         Adds that noise; none by default.
     """
-    names = [c for c in MEASURABLE if c in run and (c in COMMANDS or c in noise)]
+    names = [c for c in measurable(rig) if c in run and (channel_of(c) in COMMANDS or c in noise)]
     channels = {c: np.asarray(run[c], dtype=np.float64) for c in names}
     if rng is not None:
         channels = {

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs.effects import CATALOGUE, find_parameter
+from pamrs.effects import CATALOGUE, find_parameter, id_of, place_of
 from pamrs.errors import ParameterError
 
 __all__ = ["Addition", "Plan", "Sight"]
@@ -20,7 +20,7 @@ class Sight:
     Attributes
     ----------
     effect : str
-        Its id.
+        Its id, with a place where it may act at one of several blocks: ``leak_muscle@flexor``.
     left : float
         What is left of its signature, root mean square over the recording where that is largest
         [noise levels].
@@ -89,7 +89,8 @@ class Plan:
     experiments : list of dict
         ``name``, ``text``, ``duration`` [s] of those assumed.
     sights : list of Sight
-        One for each effect that the rig can have, in the order of the catalogue.
+        One for each effect that the rig can have, in the order of the catalogue; one for each place
+        of an effect that may act at one of several blocks.
     pairs : list of (str, str, float)
         Effects seen that are not told apart, with the cosine of their signatures.
     groups : list of tuple of str
@@ -120,7 +121,7 @@ class Plan:
         Parameters
         ----------
         effect : str
-            Its id.
+            Its id, with a place where the plan has it at several.
 
         Returns
         -------
@@ -147,7 +148,8 @@ class Plan:
         Parameters
         ----------
         first, second : str
-            Their ids.
+            Their ids, with places where the plan has them; one id with two places asks whether the
+            place is told.
 
         Returns
         -------
@@ -161,7 +163,9 @@ class Plan:
         """Effects of the catalogue that have no place in this rig, or none that these channels
         surround.
         """
-        return tuple(e for e in CATALOGUE if e not in {sight.effect for sight in self.sights})
+        return tuple(
+            e for e in CATALOGUE if e not in {id_of(sight.effect) for sight in self.sights}
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The plan as plain values, null for no number."""
@@ -179,7 +183,8 @@ class Plan:
             "experiments": self.experiments,
             "effects": [
                 {
-                    "id": s.effect,
+                    "id": id_of(s.effect),
+                    "at": place_of(s.effect) or None,
                     "verdict": s.verdict,
                     "left": number(s.left),
                     "block": s.block or None,
@@ -213,13 +218,15 @@ class Plan:
             "",
         ]
         lines += ["Blocks that these channels tell apart"]
+        wide = max([8, *(len(block["name"]) for block in self.blocks)])
         for block in self.blocks:
             lines.append(
-                f"  {block['name']:<8} {', '.join(block['drives']) or '(its start)'} -> "
+                f"  {block['name']:<{wide}} {', '.join(block['drives']) or '(its start)'} -> "
                 f"{block['channel']}"
             )
             lines += _wrapped(
-                f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"], 11
+                f"lumps {block['covers']}: {block['why']}" if block["why"] else block["covers"],
+                wide + 3,
             )
         lines += [] if self.blocks else ["  none"]
         for block in self.missing:
@@ -255,9 +262,13 @@ class Plan:
                 "tolerances (in noise levels of means over 0.1 s)"
             ),
         ]
+        # names of places make the columns wider
+        wide = max([25, *(len(s.effect) + 1 for s in self.sights)])
+        room = max([9, *(len(s.block) + 1 for s in self.sights)])
+        long = max([17, *(len(s.recording) + 1 for s in self.sights)])
         lines += [
-            f"  {'effect':<25}{'':<9}{'remains':>8}  "
-            f"{'in':<9}{'recording':<17}{'at size':>10}{'seen from':>11}  {'unit':<13}"
+            f"  {'effect':<{wide}}{'':<9}{'remains':>8}  "
+            f"{'in':<{room}}{'recording':<{long}}{'at size':>10}{'seen from':>11}  {'unit':<13}"
             "cannot be told from"
         ]
         for sight in self.sights:
@@ -266,8 +277,9 @@ class Plan:
             ]
             unit = find_parameter(sight.size).unit if sight.size else ""
             typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
+            unit = "" if unit == "1" else unit
             smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
-            where = f"{sight.block or '-':<9}{sight.recording or '-':<17}"
+            where = f"{sight.block or '-':<{room}}{sight.recording or '-':<{long}}"
             if sight.verdict == "not seen":
                 rivals += [
                     "the parameters inside their tolerances, or noise"
@@ -275,8 +287,8 @@ class Plan:
                     else "(nothing here shows it)"
                 ]
             lines.append(
-                f"  {sight.effect:<25}{sight.verdict:<9}{sight.left:>8.2g}  {where}{typical:>10}"
-                f"{smallest:>11}  {'' if unit == '1' else unit:<13}{', '.join(rivals)}".rstrip()
+                f"  {sight.effect:<{wide}}{sight.verdict:<9}{sight.left:>8.2g}  {where}"
+                f"{typical:>10}{smallest:>11}  {unit:<13}{', '.join(rivals)}".rstrip()
             )
         return [
             *lines,
@@ -310,7 +322,7 @@ class Plan:
                 lines += _wrapped(
                     (
                         f"{addition.kind} {addition.name}: {'; '.join(gains)} "
-                        f"(+{addition.bits:.0f} bit)"
+                        f"({round(addition.bits):+d} bit)"
                     ),
                     2,
                 )

@@ -11,6 +11,7 @@ projected signatures).
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -29,50 +30,80 @@ from pamrs.diagnosis.fit import (
     changes,
     fits,
     free_baseline,
+    places_of,
     residuals,
     starts_of,
 )
 from pamrs.diagnosis.next_experiment._differences import (
-    MEASURABLE,
     checked_channels,
     counted,
+    measurable,
+    noise_of,
     taken,
     usual_noise,
     weights_of,
 )
+from pamrs.diagnosis.next_experiment._experiment import Experiment
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
-from pamrs.diagnosis.next_experiment._protocols import Experiment, library
+from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
-from pamrs.effects import CATALOGUE
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.effects import CATALOGUE, term_of
+from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
+from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig, has_frame, regulators_of, switching_valves
+from pamrs.rig.schema import qualified
+from pamrs.simulation import core_rig, has_frame
 
 __all__ = ["plan_diagnosis"]
 
 Array = NDArray[np.float64]
 
-BASIC = ("multisine", "sealed_hold", "slow_triangle", "step_and_shut", "hold_low", "hold_high")
-"""Experiments that a plan assumes by default, those of them that the rig can do."""
+BASIC = (
+    "multisine",
+    "sealed_hold",
+    "slow_triangle",
+    "step_and_shut",
+    "set_steps",
+    "hold_low",
+    "hold_high",
+    "blow_over",
+)
+"""Kinds of experiments that a plan assumes by default, those of them that the rig can do."""
 _LUMPED = {
-    ("supply"): (
+    "supply and valve": (
         "what leaves the tank by itself and what the valve takes are one sum in its pressure; only "
         "that follows the command"
     ),
-    ("chamber"): (
+    "supply and line": (
+        "what leaves the tank by itself and what the line takes are one sum in its pressure; only "
+        "that follows the flow"
+    ),
+    "regulator and valve": "what the regulator gives and what the valve takes are one sum",
+    "valve, line and chamber": (
         "no pressure is measured between the valve's outlet and the muscle, nor the temperature of "
         "the gas"
     ),
-    "arm": "neither force nor torque is measured between the muscle and the arm",
+    "line and chamber": "no pressure is measured along the line, nor the temperature of the gas",
+    "regulator, line and chamber": (
+        "no pressure is measured between the regulator and the chamber, nor the temperature of "
+        "the gas"
+    ),
+    "regulator, valve, line and chamber": (
+        "no pressure is measured in front of the valve nor between its outlet and the muscle, nor "
+        "the temperature of the gas"
+    ),
+    "muscle, joint and arm": "neither force nor torque is measured between the muscle and the arm",
 }
+"""Why a block lumps what it covers."""
 
 
 _BEHIND_LINE = (
     "it is predicted from the command, through the line; what shows here and not at the line's "
     "inlet lies behind the valve"
 )
+_MOST_HALVINGS = 8
 _Place = tuple[Block, str]
 """A block, and the name of an experiment."""
 
@@ -121,17 +152,19 @@ def plan_diagnosis(
     Parameters
     ----------
     rig : Rig
-        Nominal model, one that can be diagnosed: a tank or a constant supply, valve, chamber and
-        arm without names, or a part.
+        Nominal model, one that can be diagnosed: with valves or regulators, one chain or several,
+        whole or a part; not one whose load is a frame.
     channels : iterable of str
-        Channels at hand, of ``valve_command``, ``supply_pressure``, ``line_pressure`` (of a line
-        with an inlet), ``muscle_pressure`` and ``joint_angle`` or ``length``.
+        Channels at hand, of ``valve_command``, ``supply_command``, ``supply_pressure``,
+        ``line_pressure`` (of a line with an inlet), ``muscle_pressure`` and ``joint_angle`` or
+        ``length``; of a rig with several blocks by their names (``muscle_pressure.flexor``), or
+        without a name for all of a kind.
     noise : mapping of str to float, optional
-        Sample noise by channel [SI]; that of typical transducers by default (``next_experiment`` of
-        the settings).
+        Sample noise by channel, or by kind of channel [SI]; that of typical transducers by default
+        (``next_experiment`` of the settings).
     experiments : sequence of str, optional
-        Names of the experiments that will be made; multisine, sealed holds, slow triangle and steps
-        by default.
+        Names or kinds of the experiments that will be made; multisine, sealed holds, slow triangle
+        and steps by default.
     settings : DiagnosisSettings, optional
         From where on an effect counts as seen, and two as apart; the published ones by default.
     progress : callable, optional
@@ -140,7 +173,8 @@ def plan_diagnosis(
     Returns
     -------
     Plan
-        Blocks, effects seen, groups that are not told apart, what would add most.
+        Blocks, effects seen, groups that are not told apart, what would add most. Where an effect
+        may act at one of several blocks, each of them is a row (``leak_muscle@flexor``).
 
     Raises
     ------
@@ -159,26 +193,17 @@ def plan_diagnosis(
     _check_rig(rig)
     settings = DiagnosisSettings() if settings is None else settings
     own = checked_channels(rig, tuple(channels))
-    sound = _noise(noise, settings)
+    sound = _noise(rig, noise, settings)
     say = progress or (lambda _: None)
-    every = tuple(c for c in MEASURABLE if c in {*core_rig(rig).inputs, *core_rig(rig).channels})
+    every = measurable(rig)
     whole = available_blocks(rig, every, settings.prepare)
     pool = {e.name: e for e in library(rig, settings.next_experiment)}
-    chosen = [name for name in BASIC if name in pool] if experiments is None else list(experiments)
-    for name in chosen:
-        if name not in pool:
-            raise ParameterError(
-                f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of "
-                f"{', '.join(pool)}"
-            )
-    starts = [
-        s
-        for e in CATALOGUE
-        if _applies(rig, e, whole)
-        for s in starts_of(e, sealed=rig.model["valve"] is None)
-    ]
+    chosen = _chosen(rig, pool, experiments)
+    starts = _starts(rig, whole)
     parts: dict[_Place, _Part] = {}
-    layers = _layers(rig, every, whole, settings)
+    layers = _layers(rig, own, every, settings)
+    together = [block for _, blocks in layers for block in blocks]
+    free = free_baseline(Problem(together, [], core_rig(rig), settings), rig)
     usable = {}
     for name, experiment in pool.items():
         say(
@@ -186,8 +211,9 @@ def plan_diagnosis(
             f"{len({s.effect for s in starts})} effects"
         )
         try:
-            for layer in layers:
-                parts |= _parts(rig, layer, experiment, starts, sound, settings)
+            for measured, cut in layers:
+                heard = {c: v for c, v in sound.items() if c in measured}
+                parts |= _parts(rig, cut, experiment, starts, heard, settings, free)
         except SimulationError:
             continue  # the cut chain leaves the range of the model there
         usable[name] = experiment
@@ -195,14 +221,14 @@ def plan_diagnosis(
     blocks = available_blocks(rig, own, settings.prepare)
     assumed = _Assumed(rig, parts, starts, settings)
     now = assumed.picture(blocks, chosen)
-    order = [e for e in CATALOGUE if e in now.sights]
+    order = list(now.sights)
     unseparated = sorted(now.unseparated, key=lambda p: (order.index(p[0]), order.index(p[1])))
     pairs = [(a, b, now.cosine[a, b]) for a, b in unseparated]
     return Plan(
         rig=rig.name,
         channels=own,
         noise={c: sound[c] for c in own if c in sound},
-        blocks=[_described(block, blocks) for block in blocks],
+        blocks=[_described(rig, block, blocks) for block in blocks],
         missing=[
             {"name": b.name, "covers": b.covers, "needs": assumed.needed(b.name, own, every)}
             for b in whole
@@ -264,9 +290,9 @@ class _Assumed:
         found = []
         for channel in lacking:
             then = self.picture(self.blocks((*own, channel)), chosen)
-            found.append(_addition("channel", channel, channel.replace("_", " "), now, then))
+            found.append(_addition("channel", channel, spoken_name(channel), now, then))
         for several in itertools.combinations(lacking, 2) if not blocks else ():
-            text = " and ".join(c.replace("_", " ") for c in several)
+            text = " and ".join(map(spoken_name, several))
             then = self.picture(self.blocks((*own, *several)), chosen)
             found.append(_addition("channels", "+".join(several), text, now, then))
         for name in [n for n in usable if n not in chosen] if blocks else ():
@@ -282,22 +308,9 @@ def _check_rig(rig: Rig) -> None:
             f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
             "pamrs.load_rig(path)"
         )
-    several = [block for block in rig.blocks if "" not in rig.tables(block)]
     reasons = {
         f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects"
         if rig.effects
-        else "",
-        (
-            f"it has named blocks ({', '.join(several)}); rigs of one chain can be planned, "
-            "without names"
-        )
-        if several
-        else "",
-        "its valve switches; valves that open by degrees can be planned"
-        if switching_valves(rig)
-        else "",
-        "it is fed by a regulator; rigs fed by a tank or a constant supply can be planned"
-        if regulators_of(rig)
         else "",
         "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned"
         if has_frame(rig)
@@ -307,19 +320,66 @@ def _check_rig(rig: Rig) -> None:
         raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
 
 
-def _noise(given: Mapping[str, float] | None, settings: DiagnosisSettings) -> dict[str, float]:
+def _noise(
+    rig: Rig, given: Mapping[str, float] | None, settings: DiagnosisSettings
+) -> dict[str, float]:
     """Sample noise of every channel [SI]."""
-    usual = usual_noise(settings.next_experiment)
+    usual, own = usual_noise(settings.next_experiment), noise_of(rig, settings.next_experiment)
     for name, value in (given or {}).items():
-        if name not in usual:
+        if name not in usual and name not in own:
             raise ParameterError(
-                f"noise has {name!r}, which is not allowed: one of {', '.join(usual)}"
+                f"noise has {name!r}, which is not allowed: one of "
+                f"{', '.join(dict.fromkeys((*usual, *own)))}"
             )
         if not (math.isfinite(value) and value > 0.0):
             raise ParameterError(
                 f"noise of {name} = {value} is not allowed: a finite number > 0 is needed"
             )
-    return {**usual, **{name: float(value) for name, value in (given or {}).items()}}
+    told = {name: float(value) for name, value in (given or {}).items()}
+    return noise_of(rig, settings.next_experiment, told)
+
+
+def _chosen(
+    rig: Rig, pool: Mapping[str, Experiment], experiments: Sequence[str] | None
+) -> list[str]:
+    """Names of the experiments that are assumed, given by their names or kinds."""
+    found: list[str] = []
+    for name in BASIC if experiments is None else experiments:
+        meant = [e.name for e in pool.values() if name in (e.name, e.kind)]
+        if not meant and experiments is not None:
+            raise ParameterError(
+                f"experiments has {name!r}, which is not allowed: of rig {rig.name!r} one of "
+                f"{', '.join(pool)}"
+            )
+        found += meant
+    return list(dict.fromkeys(found))
+
+
+def _starts(rig: Rig, blocks: list[Block]) -> list[Start]:
+    """Every start of every effect that a rig can have; where some blocks tell apart at which place
+    it acts, of the effect at each of them.
+    """
+    found: list[Start] = []
+    for effect in CATALOGUE:
+        if not _applies(rig, effect, blocks):
+            continue
+        places = places_of(rig, effect, blocks)
+        for term in [term_of(effect, at) for at in places] or [effect]:
+            usual = starts_of(term, sealed=rig.model["valve"] is None)
+            found += [s for s in (_possible(rig, start) for start in usual) if s is not None]
+    return found
+
+
+def _possible(rig: Rig, start: Start) -> Start | None:
+    """A start of an effect, halved until a rig can have it (a small arm does not carry as much
+    payload as an effect takes away); None where it never can.
+    """
+    for halvings in range(_MOST_HALVINGS):
+        smaller = start.scaled(0.5**halvings) if halvings else start
+        with contextlib.suppress(ParameterError, RigError, SimulationError):
+            core_rig(smaller.applied(rig))
+            return smaller
+    return None
 
 
 def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
@@ -330,39 +390,36 @@ def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
 
 
 def _layers(
-    rig: Rig, every: tuple[str, ...], whole: list[Block], settings: DiagnosisSettings
-) -> list[list[Block]]:
-    """Every block that some of the channels surround, in lists in which each name stands once: with
-    a gauge less, a block may be driven by other channels. All channels come first.
+    rig: Rig, own: tuple[str, ...], every: tuple[str, ...], settings: DiagnosisSettings
+) -> list[tuple[tuple[str, ...], list[Block]]]:
+    """Every block that some channels surround, with these channels: all of them, those at hand, and
+    these with one more (two where they surround none). With a gauge less, a block may be driven by
+    other channels.
     """
-    layers = [whole]
-    for count in range(len(every) - 1, 0, -1):
-        for several in itertools.combinations(every, count):
-            for block in available_blocks(rig, several, settings.prepare):
-                if any(block in layer for layer in layers):
-                    continue
-                free = (own for own in layers[1:] if all(b.name != block.name for b in own))
-                layer = next(free, None)
-                if layer is None:
-                    layers.append([block])
-                else:
-                    layer.append(block)
+    lacking = [c for c in every if c not in own]
+    few = [every, own, *((*own, channel) for channel in lacking)]
+    if not available_blocks(rig, own, settings.prepare):
+        few += [(*own, *several) for several in itertools.combinations(lacking, 2)]
+    layers: list[tuple[tuple[str, ...], list[Block]]] = []
+    for channels in few:
+        blocks = available_blocks(rig, channels, settings.prepare)
+        new = [b for b in blocks if all(b not in there for _, there in layers)]
+        if new:
+            layers.append((channels, new))
     return layers
 
 
-def _described(block: Block, blocks: list[Block]) -> dict[str, Any]:
-    lumped = block.covers != block.name
-    inside = "valve" in block.covers and any(b.name == "line" for b in blocks)
+def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
+    lines = {qualified("line", n): ends["to"] for n, ends in rig.ports("line").items()}
+    behind = any(lines.get(b.name) == block.name for b in blocks if b.name in lines)
     return {
         "name": block.name,
         "channel": block.channel,
         "drives": list(block.drives),
         "covers": block.covers,
         "why": _BEHIND_LINE
-        if inside and block.name == "chamber"
-        else _LUMPED.get(block.name, "")
-        if lumped
-        else "",
+        if behind and "valve" in block.covers and block.kind == "chamber"
+        else _LUMPED.get(block.covers.partition(" of ")[0], ""),
     }
 
 
@@ -373,13 +430,13 @@ def _parts(
     starts: list[Start],
     noise: Mapping[str, float],
     settings: DiagnosisSettings,
+    baseline: list[str],
 ) -> dict[_Place, _Part]:
     """Products of everything that one experiment shows, by block."""
     stands = experiment.changed(rig)
     prepared = taken(experiment.simulate(rig), stands, experiment.name, noise, settings)
     prepared = begun_alike(blocks, core_rig(stands), prepared)
     problem = Problem(blocks, [prepared], core_rig(stands), settings)
-    baseline = free_baseline(problem, stands)
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
     spread = np.array([stands.parameter(name).tol for name in baseline])
@@ -463,10 +520,10 @@ def _picture(
         )
         best[effect] = index
         sights[effect] = _sight(starts[index], float(sizes[key][index]), key, own_settings)
+    shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in effects}
     cosine, unseparated = {}, set()
     for first, second in itertools.combinations(effects, 2):
         mine, theirs = best[first], best[second]
-        shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in (first, second)}
         forward = float(max(cosines[mine, k] for k in shapes[second]))
         backward = float(max(cosines[theirs, k] for k in shapes[first]))
         cosine[first, second] = min(1.0, max(forward, backward))

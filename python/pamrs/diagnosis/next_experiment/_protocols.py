@@ -2,278 +2,46 @@
 numbers in words.
 
 The levels follow from the rig: the lowest pressure at which its arm leaves the stop and the highest
-that keeps it off the other one. Commands are found on the model by a loop over its muscle pressure
-that inverts the valve, and then sent as they are, so that every hypothesis answers to the same
-ones.
+that keeps it off the other one. Of several chains (valves and their chambers, or regulators) one is
+moved while the others are held, or all are moved at once, none as another one.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs import _core
-from pamrs.control import OrificeInverse
+from pamrs.channels import dotted
+from pamrs.diagnosis.next_experiment._chains import (
+    Range,
+    can_shut,
+    chains_of,
+    commands_for,
+    pressure_range,
+    trial_of,
+)
+from pamrs.diagnosis.next_experiment._experiment import (
+    Experiment,
+    Points,
+    in_bar,
+    other_payload,
+    then,
+    through,
+)
+from pamrs.diagnosis.next_experiment._several import SHUTTING, several_library
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
-from pamrs.rig.schema import BLOCKS
-from pamrs.simulation import Simulation, Simulator, regulators_of, simulate, switching_valves
+from pamrs.simulation import has_frame, simulate
 
-__all__ = ["Experiment", "Range", "is_sealed", "library", "pressure_range", "trial_of"]
+__all__ = ["library"]
 
 Array = NDArray[np.float64]
-Points = list[tuple[float, float]]
-
-_LEAST_SHARE = 0.14
-"""Least flow that a command is found for, as a share of the choked one: near equal pressures the
-valve would open without bound."""
-
-
-@dataclass(frozen=True)
-class Range:
-    """Pressures between which an experiment moves, gauge [Pa].
-
-    Attributes
-    ----------
-    low, high : float
-        At which the arm just moves, and at which it nears its upper stop.
-    """
-
-    low: float
-    high: float
-
-    def at(self, share: float) -> float:
-        """The pressure at a share of the range [Pa]."""
-        return self.low + share * (self.high - self.low)
-
-
-@dataclass(frozen=True, eq=False)
-class Experiment:
-    """One experiment, ready to be simulated.
-
-    Attributes
-    ----------
-    name : str
-        Its kind, ``"sealed_hold"``.
-    text : str
-        What to do, with numbers.
-    excitation : dict
-        The same for a program: ``kind`` and numbers with their unit in the name.
-    command : (n,) array or None
-        Valve command [V], or set pressure of a regulator [Pa, gauge]; None for a chamber without
-        either.
-    rows : int
-        Number of samples.
-    sample_time : float
-        Time between them [s].
-    initial : dict of str to float
-        As for :func:`pamrs.simulate`.
-    changes : dict of str to float
-        Parameters of the rig that the person changes (another payload), SI.
-    effort : float
-        What it costs, as time [s]: its length and what must be changed by hand.
-    channel : str
-        Channel of the command.
-    needs : str
-        What it takes that the rig file does not say to be there, in words; empty for nothing.
-    """
-
-    name: str
-    text: str
-    excitation: dict[str, Any]
-    command: Array | None
-    rows: int
-    sample_time: float
-    initial: dict[str, float] = field(default_factory=dict)
-    changes: dict[str, float] = field(default_factory=dict)
-    effort: float = 0.0
-    channel: str = "valve_command"
-    needs: str = ""
-
-    @property
-    def commands(self) -> dict[str, Array]:
-        """What is sent, by channel [SI]; empty where everything is done by hand."""
-        return {} if self.command is None else {self.channel: self.command}
-
-    @property
-    def duration(self) -> float:
-        """Length [s]."""
-        return (self.rows - 1) * self.sample_time
-
-    def changed(self, rig: Rig) -> Rig:
-        """The rig as it stands in this experiment."""
-        return rig.with_parameters(self.changes) if self.changes else rig
-
-    def simulate(self, rig: Rig) -> Simulation:
-        """The experiment on a rig, every hypothesis from the same commands.
-
-        Raises
-        ------
-        SimulationError
-            If the state leaves the range in which the model holds.
-        """
-        driven: dict[str, Any] = dict(self.commands) or {"duration": self.duration}
-        return simulate(
-            self.changed(rig), sample_time=self.sample_time, initial=self.initial, **driven
-        )
-
-
-def trial_of(
-    rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any
-) -> Array:
-    """Valve commands that make the muscle pressure of a rig follow a reference.
-
-    Parameters
-    ----------
-    rig : Rig
-        A rig of one chain with a valve.
-    reference : (n,) array
-        Gauge pressure [Pa].
-    sample_time : float
-        Time between samples [s].
-    bandwidth : float
-        Of the loop [rad/s].
-    **options
-        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither``
-        ((n,) array added to the command [V]), ``initial`` (as for :func:`pamrs.simulate`).
-
-    Returns
-    -------
-    (n,) array
-        Command [V].
-    """
-    n = reference.size
-    shut = options.get("shut", np.zeros(n, dtype=bool))
-    dither = options.get("dither", np.zeros(n))
-    model = rig.model
-    valve, gas = model["valve"], model["gas"]
-    ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
-    orifice = OrificeInverse(
-        ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
-    )
-    if valve["flow"] == "orifice":
-        widest = valve["discharge_area_max"]
-    else:  # the loop makes good what this misses of the larger path
-        unit = _core.Gas(*(gas[key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
-        widest = unit * max(valve["fill_conductance"], valve["vent_conductance"])
-    fractions, openings = np.asarray(valve["fraction"]), np.asarray(valve["opening"])
-    null, half = valve["null_voltage"], valve["half_range"]
-    slope = np.gradient(reference, sample_time)
-
-    def update(sample: Mapping[str, float]) -> float:
-        k = min(n - 1, round(sample["time"] / sample_time))
-        if shut[k]:
-            return float(null)
-        wanted = bandwidth * (reference[k] - sample["muscle_pressure"]) + slope[k]
-        mass = wanted * sample["air_volume"] / warm
-        inside, supply = sample["muscle_pressure"] + ambient, sample["supply_pressure"] + ambient
-        up, down = (supply, inside) if mass > 0.0 else (inside, ambient)
-        flow = max(orifice.flow(up, down), _LEAST_SHARE * orifice.flow(up, 0.0))
-        opening = float(np.interp(abs(mass) / (widest * flow), fractions, openings))
-        return float(
-            np.clip(
-                null + math.copysign(half * opening, mass) + dither[k], null - half, null + half
-            )
-        )
-
-    simulator = Simulator(rig, sample_time=sample_time, initial=options.get("initial"))
-    every = max(1, round(0.01 / sample_time))
-    total = (n - 1 + every - 1) // every * every
-    found = simulator.control(update, total * sample_time, period=every * sample_time)
-    return np.ascontiguousarray(found["valve_command"][:n])
-
-
-def pressure_range(
-    rig: Rig, settings: NextExperimentSettings, *, highest: float | None = None
-) -> Range:
-    """Pressures between which a rig is worth exciting.
-
-    Parameters
-    ----------
-    rig : Rig
-        A rig of one chain.
-    settings : NextExperimentSettings
-        Bandwidth of the loop that finds them.
-    highest : float, optional
-        Gauge pressure that is not to be exceeded [Pa], for example the highest that was recorded.
-
-    Returns
-    -------
-    Range
-        With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of
-        it; without one, from a tenth to six tenths of the supply's pressure. Never above what the
-        rig file says that the stand allows.
-
-    Raises
-    ------
-    DiagnosisError
-        If nothing says how high the set pressure of a regulator may go.
-    """
-    model = rig.model
-    said = [p for p in (highest, rig.limits.get("max_pressure")) if p is not None]
-    most = min(said, default=math.inf)
-    if is_sealed(rig):
-        top = min(7.0e5, most) if highest is None else most
-        return Range(0.35 * top, top)
-    regulated = bool(regulators_of(rig))
-    if regulated and not said:
-        raise DiagnosisError(
-            f"rig {rig.name!r} is fed by a regulator, and nothing says how high its pressure may "
-            "go: [limits] max_pressure of the rig file, or a recording of the pressure, is needed"
-        )
-    top = most if regulated else min(0.8 * model["supply"]["initial_pressure"], most)
-    joint, load = model["joint"], model["load"]
-    if model["arm"] is None and load is None:
-        return Range(0.1 * top, min(0.75 * top, 7.0e5))
-    ramp = np.linspace(0.0, top, 1501)
-    if regulated:
-        found = simulate(rig, supply_command=ramp, sample_time=0.01)
-    else:
-        command = trial_of(rig, ramp, sample_time=0.01, bandwidth=settings.bandwidth)
-        found = simulate(rig, command, sample_time=0.01)
-    if load is None:
-        share = (found["joint_angle"] - joint["rest_angle"]) / (
-            joint["max_angle"] - joint["rest_angle"]
-        )
-    else:
-        share = (found["length"][0] - found["length"]) / (found["length"][0] - load["min_length"])
-    pressure = np.maximum.accumulate(found["muscle_pressure"])
-    low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
-    high = float(pressure[np.argmax(share > 0.85)]) if (share > 0.85).any() else top
-    high = min(max(high, 1.2 * low), top)
-    return Range(low, high) if high > low else Range(0.3 * top, top)
-
-
-def is_sealed(rig: Rig) -> bool:
-    """Whether nobody sends a command to a rig: a chamber without a valve and without a supply."""
-    return not (rig.tables("valve") or rig.tables("supply"))
-
-
-def _through(points: Points, sample_time: float) -> Array:
-    """Straight lines through (time, value) points."""
-    end = points[-1][0]
-    time = np.arange(round(end / sample_time) + 1) * sample_time
-    return np.asarray(
-        np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64
-    )
-
-
-def _then(points: Points, *legs: tuple[float, float]) -> Points:
-    """Points continued by (duration, value) legs."""
-    out = list(points)
-    for duration, value in legs:
-        out.append((out[-1][0] + duration, value))
-    return out
-
-
-def _bar(pressure: float) -> float:
-    return round(pressure * 1e-5, 2)
 
 
 class _Maker:
@@ -281,7 +49,8 @@ class _Maker:
 
     def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
         self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
-        self.regulated = bool(regulators_of(rig))
+        (self.chain,) = chains_of(rig)
+        self.regulated = self.chain.regulator is not None
         self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
 
     def driven(
@@ -292,14 +61,21 @@ class _Maker:
         needs = options.pop("needs", "")
         rig = self.rig.with_parameters(changes) if changes else self.rig
         if self.regulated:
-            command = np.clip(reference, 0.0, self.span.high)
+            sent = {self.chain.commands[0]: np.clip(reference, 0.0, self.span.high)}
         else:
-            command = trial_of(
-                rig, reference, sample_time=self.dt, bandwidth=bandwidth, initial=initial, **options
+            shut = {"": options.pop("shut")} if "shut" in options else None
+            sent = commands_for(
+                rig,
+                {"": reference},
+                sample_time=self.dt,
+                bandwidth=bandwidth,
+                shut=shut,
+                initial=initial,
+                **options,
             )
         seconds = (reference.size - 1) * self.dt
         done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
-        channel = "supply_command" if self.regulated else "valve_command"
+        (channel, command), *also = sent.items()
         return Experiment(
             name,
             text,
@@ -312,30 +88,31 @@ class _Maker:
             seconds + extra,
             channel,
             needs,
+            dict(also),
         )
 
     def levels(self, *shares: float) -> tuple[list[float], str]:
         pressures = [self.span.at(s) for s in shares]
         return pressures, ", ".join(
-            f"{_bar(p):g}" for p in pressures[:-1]
-        ) + f" and {_bar(pressures[-1]):g} bar"
+            f"{in_bar(p):g}" for p in pressures[:-1]
+        ) + f" and {in_bar(pressures[-1]):g} bar"
 
     def triangle(self, name: str, period: float, cycles: int, **options: Any) -> Experiment:
         low, high = self.span.at(0.05), self.span.at(0.95)
-        points: Points = _then([(0.0, 0.0)], (2.0, low))
+        points: Points = then([(0.0, 0.0)], (2.0, low))
         for _ in range(cycles):
-            points = _then(points, (0.5 * period, high), (0.5 * period, low))
+            points = then(points, (0.5 * period, high), (0.5 * period, low))
         text = options.pop("text", "") + (
-            f"drive {self.what} as a triangle between {_bar(low):g} and {_bar(high):g} bar "
+            f"drive {self.what} as a triangle between {in_bar(low):g} and {in_bar(high):g} bar "
             f"with a period of {period:g} s, {cycles} cycles, the first one kept"
         )
         excitation = {
-            "levels_bar": [_bar(low), _bar(high)],
+            "levels_bar": [in_bar(low), in_bar(high)],
             "period_s": period,
             "cycles": cycles,
             **options.pop("also", {}),
         }
-        return self.driven(name, text, excitation, _through(points, self.dt), **options)
+        return self.driven(name, text, excitation, through(points, self.dt), **options)
 
     def sealed(self, hold: float = 16.0) -> Experiment:
         pressures, words = self.levels(0.15, 0.55, 0.95)
@@ -350,22 +127,32 @@ class _Maker:
         """Holds above and below the pressure at which equal leaks from the supply and to the
         ambient balance.
         """
-        ambient = self.rig.model["gas"]["ambient_pressure"]
+        ambient = self.rig.tables("gas")[""]["ambient_pressure"]
+        (fed,) = {self.rig.ports("valve")[name]["from"] for name in self.chain.valves}
+        kind, _, place = fed.partition(".")
+        if kind != "supply":
+            return None  # what stands in front of the valve would have to be let down as well
         middle = self.span.at(0.5) + ambient
         supply = max(
             middle / 0.8 - ambient, 1.15 * self.span.at(0.8)
         )  # x = psi(x) of ISO 6358: 0.76 to 0.81
-        if supply > self.rig.model["supply"]["initial_pressure"]:
+        if supply > self.rig.tables("supply")[place]["initial_pressure"]:
             return None  # more than the supply gives
         pressures, words = self.levels(0.1, 0.8)
         text = (
-            f"turn the supply down to {_bar(supply):g} bar, so that leaks through the valve's "
-            f"centre would balance near {_bar(middle - ambient):g} bar; fill to {words}, on both "
+            f"turn the supply down to {in_bar(supply):g} bar, so that leaks through the valve's "
+            f"centre would balance near {in_bar(middle - ambient):g} bar; fill to {words}, on both "
             f"sides of it, shut the valve at each and hold it for {hold:g} s"
         )
-        also = {"supply_bar": _bar(supply), "balance_bar": _bar(middle - ambient)}
+        also = {"supply_bar": in_bar(supply), "balance_bar": in_bar(middle - ambient)}
         return self._holds(
-            "holds_both_sides", pressures, hold, text, also, {"supply_pressure": supply}, extra=60.0
+            "holds_both_sides",
+            pressures,
+            hold,
+            text,
+            also,
+            {dotted("supply_pressure", place): supply},
+            extra=60.0,
         )
 
     def _holds(
@@ -381,15 +168,15 @@ class _Maker:
         points: Points = [(0.0, 0.0)]
         closed: list[tuple[float, float]] = []
         for pressure in pressures:
-            points = _then(points, (1.0, pressure), (1.0, pressure))
+            points = then(points, (1.0, pressure), (1.0, pressure))
             closed.append((points[-1][0], points[-1][0] + hold))
-            points = _then(points, (hold, pressure))
-        reference = _through(points, self.dt)
+            points = then(points, (hold, pressure))
+        reference = through(points, self.dt)
         time = np.arange(reference.size) * self.dt
         shut = np.zeros(reference.size, dtype=bool)
         for a, b in closed:
             shut |= (time >= a) & (time < b)
-        excitation = {"levels_bar": [_bar(p) for p in pressures], "hold_s": hold, **(also or {})}
+        excitation = {"levels_bar": [in_bar(p) for p in pressures], "hold_s": hold, **(also or {})}
         return self.driven(
             name, text, excitation, reference, shut=shut, initial=initial or {}, extra=extra
         )
@@ -415,24 +202,24 @@ class _Maker:
         low, high = self.span.at(0.1), self.span.at(0.9)
         text = (
             f"drive {self.what} as a multisine of {frequencies[0]:g} to "
-            f"{frequencies[-1]:g} Hz between {_bar(low):g} and {_bar(high):g} bar for 30 s"
+            f"{frequencies[-1]:g} Hz between {in_bar(low):g} and {in_bar(high):g} bar for 30 s"
         )
-        excitation = {"frequencies_hz": frequencies, "levels_bar": [_bar(low), _bar(high)]}
+        excitation = {"frequencies_hz": frequencies, "levels_bar": [in_bar(low), in_bar(high)]}
         return self.driven("multisine", text, excitation, reference)
 
     def staircase(self) -> Experiment:
         shares = [0.1, 0.35, 0.6, 0.85, 0.6, 0.35, 0.1]
         points: Points = [(0.0, 0.0)]
         for share in shares:
-            points = _then(points, (0.5, self.span.at(share)), (4.5, self.span.at(share)))
+            points = then(points, (0.5, self.span.at(share)), (4.5, self.span.at(share)))
         _, words = self.levels(*shares[:4])
         text = f"climb to {words} and down again, with {self.what} held for 4.5 s at each step"
-        excitation = {"levels_bar": [_bar(self.span.at(s)) for s in shares], "hold_s": 4.5}
-        return self.driven("staircase", text, excitation, _through(points, self.dt))
+        excitation = {"levels_bar": [in_bar(self.span.at(s)) for s in shares], "hold_s": 4.5}
+        return self.driven("staircase", text, excitation, through(points, self.dt))
 
     def long_hold(self) -> Experiment:
         up, back = self.span.at(0.9), self.span.at(0.45)
-        points = _then(
+        points = then(
             [(0.0, 0.0)],
             (2.0, self.span.at(0.05)),
             (0.3, up),
@@ -441,91 +228,92 @@ class _Maker:
             (25.0, back),
         )
         text = (
-            f"step to {_bar(up):g} bar, then back to {_bar(back):g} bar, and keep "
+            f"step to {in_bar(up):g} bar, then back to {in_bar(back):g} bar, and keep "
             f"{self.what} there for 25 s after each"
         )
-        excitation = {"levels_bar": [_bar(up), _bar(back)], "hold_s": 25.0}
-        return self.driven("long_hold", text, excitation, _through(points, self.dt))
+        excitation = {"levels_bar": [in_bar(up), in_bar(back)], "hold_s": 25.0}
+        return self.driven("long_hold", text, excitation, through(points, self.dt))
 
     def step_and_shut(self) -> Experiment:
         base, small, large = self.span.at(0.05), self.span.at(0.3), self.span.at(0.8)
-        points: Points = _then([(0.0, 0.0)], (1.5, base), (0.5, base))
+        points: Points = then([(0.0, 0.0)], (1.5, base), (0.5, base))
         closed = []
         for goal in (small, base, large, base):
-            points = _then(points, (0.02, goal), (0.35, goal))
+            points = then(points, (0.02, goal), (0.35, goal))
             closed.append((points[-1][0], points[-1][0] + 4.0))
-            points = _then(points, (4.0, goal))
-        reference = _through(points, self.dt)
+            points = then(points, (4.0, goal))
+        reference = through(points, self.dt)
         time = np.arange(reference.size) * self.dt
         shut = np.zeros(reference.size, dtype=bool)
         for a, b in closed:
             shut |= (time >= a) & (time < b)
         text = (
-            f"step from {_bar(base):g} bar to {_bar(small):g} bar and back, then to "
-            f"{_bar(large):g} bar and back (sizes 1:3), with the valve far open, shut it 0.35 s "
+            f"step from {in_bar(base):g} bar to {in_bar(small):g} bar and back, then to "
+            f"{in_bar(large):g} bar and back (sizes 1:3), with the valve far open, shut it 0.35 s "
             "after each step and watch for 4 s"
         )
-        excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "watch_s": 4.0}
+        excitation = {"levels_bar": [in_bar(base), in_bar(small), in_bar(large)], "watch_s": 4.0}
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
 
     def nested(self) -> Experiment:
         middle, reach = self.span.at(0.5), 0.45 * (self.span.high - self.span.low)
-        points: Points = _then([(0.0, 0.0)], (2.0, middle))
+        points: Points = then([(0.0, 0.0)], (2.0, middle))
         for period in (12.0, 1.2):
             for share in (1.0, 0.6, 0.3):
-                points = _then(
+                points = then(
                     points,
                     (0.25 * period, middle + share * reach),
                     (0.5 * period, middle - share * reach),
                     (0.25 * period, middle),
                 )
         text = (
-            f"drive {self.what} in nested triangles around {_bar(middle):g} bar, of "
-            f"±{_bar(reach):g}, ±{_bar(0.6 * reach):g} and ±{_bar(0.3 * reach):g} bar, first with "
-            "a period of 12 s, then of 1.2 s"
+            f"drive {self.what} in nested triangles around {in_bar(middle):g} bar, of "
+            f"±{in_bar(reach):g}, ±{in_bar(0.6 * reach):g} and ±{in_bar(0.3 * reach):g} bar, "
+            "first with a period of 12 s, then of 1.2 s"
         )
         excitation = {
-            "middle_bar": _bar(middle),
-            "reach_bar": [_bar(s * reach) for s in (1.0, 0.6, 0.3)],
+            "middle_bar": in_bar(middle),
+            "reach_bar": [in_bar(s * reach) for s in (1.0, 0.6, 0.3)],
             "periods_s": [12.0, 1.2],
         }
-        return self.driven("nested_triangles", text, excitation, _through(points, self.dt))
+        return self.driven("nested_triangles", text, excitation, through(points, self.dt))
 
     def null_ramp(self) -> Experiment:
         middle = self.span.at(0.5)
-        half = self.rig.model["valve"]["half_range"]
+        half = self.rig.tables("valve")[self.chain.valves[0]]["half_range"]
         reach, period, seconds = 0.03 * half, 2.0, 24.0
         time = np.arange(round((seconds + 2.0) / self.dt) + 1) * self.dt
         phase = np.clip(time - 2.0, 0.0, None) / period % 1.0
         dither = reach * (1.0 - 4.0 * np.abs(((phase + 0.25) % 1.0) - 0.5)) * (time >= 2.0)
         reference = np.clip(time / 2.0, 0.0, 1.0) * middle
         text = (
-            f"hold {_bar(middle):g} bar by slow corrections and ramp the valve command through its "
-            f"null by ±{1e3 * reach:.0f} mV in both directions, period {period:g} s, for "
+            f"hold {in_bar(middle):g} bar by slow corrections and ramp the valve command through "
+            f"its null by ±{1e3 * reach:.0f} mV in both directions, period {period:g} s, for "
             f"{seconds:g} s"
         )
-        excitation = {"level_bar": _bar(middle), "reach_v": round(reach, 4), "period_s": period}
+        excitation = {"level_bar": in_bar(middle), "reach_v": round(reach, 4), "period_s": period}
         return self.driven("null_ramp", text, excitation, reference, dither=dither, bandwidth=1.5)
 
     def free_decay(self) -> Experiment | None:
         pressure = self.span.at(0.5)
-        joint = self.rig.model["joint"]
-        reference = _through([(0.0, pressure), (8.0, pressure)], self.dt)
+        (angle,) = self.chain.moves
+        joint = self.rig.tables("joint")[angle.partition(".")[2]]
+        reference = through([(0.0, pressure), (8.0, pressure)], self.dt)
         shut = np.ones(reference.size, dtype=bool)
-        slow = _through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01)
+        slow = through([(0.0, 0.0), (3.0, pressure), (6.0, pressure)], 0.01)
         command = trial_of(self.rig, slow, sample_time=0.01, bandwidth=self.bandwidth)
-        rest = simulate(self.rig, command, sample_time=0.01)["joint_angle"][-1]
+        rest = simulate(self.rig, command, sample_time=0.01)[angle][-1]
         turned = min(
             float(rest) + 0.15 * (joint["max_angle"] - joint["min_angle"]),
             joint["max_angle"] - 0.05,
         )
         shown = round(math.degrees(turned - float(rest)), 0)
-        initial = {"muscle_pressure": pressure, "joint_angle": turned}
+        initial = {self.chain.pressure: pressure, angle: turned}
         text = (
-            f"at {_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} "
+            f"at {in_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} "
             "deg, let it go and record 8 s from the release"
         )
-        excitation = {"level_bar": _bar(pressure), "deflection_deg": shown}
+        excitation = {"level_bar": in_bar(pressure), "deflection_deg": shown}
         try:
             return self.driven(
                 "free_decay", text, excitation, reference, shut=shut, initial=initial, extra=30.0
@@ -535,38 +323,37 @@ class _Maker:
 
     def set_steps(self) -> Experiment:
         base, small, large = self.span.at(0.05), self.span.at(0.3), self.span.at(0.8)
-        points: Points = _then([(0.0, 0.0)], (1.5, base), (2.0, base))
+        points: Points = then([(0.0, 0.0)], (1.5, base), (2.0, base))
         for goal in (small, base, large, base):
-            points = _then(points, (0.0, goal), (5.0, goal))
+            points = then(points, (0.0, goal), (5.0, goal))
         text = (
-            f"step {self.what} from {_bar(base):g} bar to {_bar(small):g} bar and back, then to "
-            f"{_bar(large):g} bar and back (sizes 1:3), and keep each for 5 s"
+            f"step {self.what} from {in_bar(base):g} bar to {in_bar(small):g} bar and back, then "
+            f"to {in_bar(large):g} bar and back (sizes 1:3), and keep each for 5 s"
         )
-        excitation = {"levels_bar": [_bar(base), _bar(small), _bar(large)], "hold_s": 5.0}
-        return self.driven("set_steps", text, excitation, _through(points, self.dt))
+        excitation = {"levels_bar": [in_bar(base), in_bar(small), in_bar(large)], "hold_s": 5.0}
+        return self.driven("set_steps", text, excitation, through(points, self.dt))
 
     def fine_staircase(self) -> Experiment:
         middle, step = self.span.at(0.5), 0.01 * (self.span.high - self.span.low)
-        points: Points = _then([(0.0, 0.0)], (2.0, middle), (2.0, middle))
+        points: Points = then([(0.0, 0.0)], (2.0, middle), (2.0, middle))
         for k in (*range(1, 7), *range(5, -7, -1), *range(-5, 1)):
-            points = _then(points, (0.0, middle + k * step), (1.5, middle + k * step))
+            points = then(points, (0.0, middle + k * step), (1.5, middle + k * step))
         text = (
             f"move {self.what} by single steps of {step * 1e-5:.2g} bar, six up from "
-            f"{_bar(middle):g} bar, twelve down and six up again, 1.5 s each"
+            f"{in_bar(middle):g} bar, twelve down and six up again, 1.5 s each"
         )
-        excitation = {"middle_bar": _bar(middle), "step_bar": round(step * 1e-5, 4), "hold_s": 1.5}
-        return self.driven("fine_staircase", text, excitation, _through(points, self.dt))
+        excitation = {
+            "middle_bar": in_bar(middle),
+            "step_bar": round(step * 1e-5, 4),
+            "hold_s": 1.5,
+        }
+        return self.driven("fine_staircase", text, excitation, through(points, self.dt))
 
     def other_payload(self) -> Experiment | None:
-        name = "load.mass" if self.rig.model["load"] else "arm.payload"
-        now = self.rig.parameter(name).value
-        listed = self.rig.limits.get("payloads")
-        least = self.rig.parameter(name).lower
-        others = [m for m in listed or [] if m >= least and not math.isclose(m, now)]
-        if (listed is not None and not others) or (listed is None and now <= 0.0):
+        found = other_payload(self.rig)
+        if found is None:
             return None
-        other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
-        needs = "" if others else f"another payload, about {other:.3g} kg"
+        name, other, needs = found
         text = f"change the payload to {other:.3g} kg and "
         also = {"payload_kg": round(other, 3)}
         changes = {name: other}
@@ -575,7 +362,11 @@ class _Maker:
         )
 
 
-def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experiment]:
+def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> list[Experiment]:
+    """Fills of all chambers, shut off and left alone; where lines join several chambers, also of
+    one, which then blows over into the others.
+    """
+    chambers, segments = list(rig.tables("chamber")), _segments(rig)
     out = []
     for name, pressure, seconds in (
         ("hold_low", span.low, 600.0),
@@ -583,27 +374,66 @@ def _sealed_library(rig: Rig, sample_time: float, span: Range) -> list[Experimen
         ("hold_short", span.high, 120.0),
         ("hold_long", span.high, 1800.0),
     ):
-        then = "open its outlet" if rig.tables("line") else "shut it off"
+        if segments:
+            break  # waves would be followed for minutes
+        one = len(chambers) == 1
+        filled, it, its = ("the chamber", "it", "its") if one else ("all chambers", "them", "their")
+        what = f"open {its} outlet" if _outlets(rig) else f"shut {it} off"
         text = (
-            f"fill the chamber to {_bar(pressure):g} bar, {then} and record {seconds:g} s from "
+            f"fill {filled} to {in_bar(pressure):g} bar, {what} and record {seconds:g} s from "
             "that moment"
         )
-        excitation = {"kind": name, "levels_bar": [_bar(pressure)], "duration_s": seconds}
-        rows = round(seconds / sample_time) + 1
-        out.append(
-            Experiment(
-                name,
-                text,
-                excitation,
-                None,
-                rows,
-                sample_time,
-                {"muscle_pressure": pressure},
-                {},
-                seconds,
-            )
+        begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
+        out.append(_left_alone(name, text, begin, seconds, settings.sealed_sample_time))
+    for chamber in chambers if len(chambers) > 1 else ():
+        begin = {dotted("muscle_pressure", other): span.low for other in chambers}
+        begin[dotted("muscle_pressure", chamber)] = span.high
+        seconds = _equalised(rig, begin, settings)
+        text = (
+            f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
+            f"bar, open what lies between and record {seconds:.2g} s from that moment"
         )
+        step = max(settings.least_sample_time, seconds / _MOST_ROWS)
+        out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
+
+
+_MOST_ROWS = 3000
+"""Samples of a pressure that blows over."""
+
+
+def _segments(rig: Rig) -> bool:
+    """Whether a tube of a rig carries waves."""
+    return any(line.get("segments") for line in rig.tables("line").values())
+
+
+def _outlets(rig: Rig) -> bool:
+    """Whether a line lets the air of a sealed rig out."""
+    return any(ends["to"] == "ambient" for ends in rig.ports("line").values())
+
+
+def _equalised(rig: Rig, begin: dict[str, float], settings: NextExperimentSettings) -> float:
+    """Three times as long as chambers take to come within a hundredth of each other [s], from 1 s
+    to 60 s.
+    """
+    found = simulate(rig, sample_time=settings.sample_time, duration=20.0, initial=begin)
+    each = np.array([found[channel] for channel in begin])
+    apart = each.max(axis=0) - each.min(axis=0)
+    late = np.flatnonzero(apart > 0.01 * apart[0])
+    return float(np.clip(3.0 * found.time[late[-1]], 1.0, 60.0))
+
+
+def _left_alone(
+    name: str, text: str, begin: dict[str, float], seconds: float, sample_time: float
+) -> Experiment:
+    """Some pressures to begin with, and nothing that is sent."""
+    excitation = {
+        "kind": name,
+        "levels_bar": sorted({in_bar(pressure) for pressure in begin.values()}),
+        "duration_s": round(seconds, 2),
+    }
+    rows = round(seconds / sample_time) + 1
+    return Experiment(name, text, excitation, None, rows, sample_time, begin, {}, seconds)
 
 
 def library(
@@ -611,7 +441,7 @@ def library(
     settings: NextExperimentSettings,
     *,
     sample_time: float | None = None,
-    highest: float | None = None,
+    highest: float | Mapping[str, float] | None = None,
     only: Collection[str] | None = None,
 ) -> list[Experiment]:
     """The standard experiments that a rig can do.
@@ -619,48 +449,68 @@ def library(
     Parameters
     ----------
     rig : Rig
-        A rig of one chain: with a valve or a regulator, with or without an arm or a hanging load;
-        or a chamber that nobody sends a command to.
+        A rig with valves or regulators, with or without arms or a hanging load; or chambers that
+        nobody sends a command to.
     settings : NextExperimentSettings
         Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
         Time between samples [s].
-    highest : float, optional
-        Gauge pressure that is not to be exceeded [Pa].
+    highest : float or mapping of str to float, optional
+        Gauge pressure that is not to be exceeded [Pa], of several chains by their names.
     only : collection of str, optional
-        Names of those to make; all by default.
+        Names or kinds of those to make; all by default.
 
     Returns
     -------
     list of Experiment
         Those that the rig survives in simulation.
+
+    Raises
+    ------
+    DiagnosisError
+        If no experiment is made for such a rig, or nothing says how high a regulator may be set.
     """
-    several = [block for block in rig.blocks if "" not in rig.tables(block)]
-    if several:
+    if has_frame(rig):
         raise DiagnosisError(
-            f"rig {rig.name!r} has named blocks ({', '.join(several)}); experiments are made for "
-            "rigs of one chain"
+            f"the load of rig {rig.name!r} is a frame; experiments are made for a mass, [joint] "
+            "and [arm], or no muscle"
         )
-    if switching_valves(rig):
-        raise DiagnosisError(
-            f"rig {rig.name!r} has a valve that switches; experiments are made for valves that "
-            "open by degrees"
-        )
-    regulated = bool(regulators_of(rig)) and not rig.tables("valve")
-    if not rig.tables("valve") and not regulated and (rig.tables("supply") or rig.tables("muscle")):
+    chains = chains_of(rig)
+    if not chains and (rig.tables("supply") or rig.tables("muscle") or rig.tables("valve")):
         raise DiagnosisError(
             f"rig {rig.name!r} has no valve that a person could command, and no regulator; "
             "experiments need one, or a sealed chamber"
         )
-    span = pressure_range(rig, settings, highest=highest)
-    if is_sealed(rig):
-        sealed = _sealed_library(
-            rig, settings.sealed_sample_time if sample_time is None else sample_time, span
-        )
-        return [e for e in sealed if only is None or e.name in only]
-    make = _Maker(
-        rig, settings.sample_time if sample_time is None else sample_time, span, settings.bandwidth
-    )
+    step = settings.sample_time if sample_time is None else sample_time
+    if not chains:
+        if sample_time is not None:
+            settings = replace(settings, sealed_sample_time=sample_time)
+        span = pressure_range(rig, settings, highest=highest)
+        sealed = _sealed_library(rig, settings, span)
+        return [e for e in sealed if only is None or e.name in only or e.kind in only]
+    if len(chains) == 1:
+        span = pressure_range(rig, settings, highest=highest)
+        makers = _of_one(_Maker(rig, step, span, settings.bandwidth))
+    else:
+        if not isinstance(highest, Mapping):
+            highest = {} if highest is None else {c.name: highest for c in chains}
+        makers = several_library(rig, chains, settings, step, highest)
+    out = []
+    for name, maker in makers.items():
+        if only is not None and name not in only and name.partition(".")[0] not in only:
+            continue
+        try:
+            found = maker()
+        except SimulationError:
+            continue  # the model does not hold there: nothing to propose to anyone
+        if found is not None and not _exceeds(found, rig):
+            out.append(found)
+    return out
+
+
+def _of_one(make: _Maker) -> dict[str, Callable[[], Experiment | None]]:
+    """What makes each experiment of a rig of one chain, by its name."""
+    rig, chain = make.rig, make.chain
     makers: dict[str, Callable[[], Experiment | None]] = {
         "multisine": make.multisine,
         "sealed_hold": make.sealed,
@@ -673,25 +523,21 @@ def library(
         "null_ramp": make.null_ramp,
         "holds_both_sides": make.both_sides,
     }
-    if regulated:
+    degrees = all(rig.tables("valve")[v]["spool"] != "switching" for v in chain.valves)
+    if chain.regulator is not None:
         hold = ("multisine", "slow_triangle", "staircase", "long_hold", "nested_triangles")
         makers = {name: makers[name] for name in (*hold, "fast_triangle")}
         makers |= {"set_steps": make.set_steps, "fine_staircase": make.fine_staircase}
-    if rig.model["arm"] is not None or rig.model["load"] is not None:
+    elif not can_shut(rig, chain):
+        makers = {name: m for name, m in makers.items() if name not in SHUTTING}
+        makers |= {"set_steps": make.set_steps}
+    if not degrees or len(chain.valves) > 1:
+        makers = {n: m for n, m in makers.items() if n not in ("null_ramp", "holds_both_sides")}
+    if rig.tables("arm") or rig.tables("load"):
         makers |= {"other_payload": make.other_payload}
-    if rig.model["arm"] is not None and not regulated:
+    if rig.tables("arm") and len(chain.moves) == 1 and can_shut(rig, chain):
         makers |= {"free_decay": make.free_decay}
-    out = []
-    for name, maker in makers.items():
-        if only is not None and name not in only:
-            continue
-        try:
-            found = maker()
-        except SimulationError:
-            continue  # the model does not hold there: nothing to propose to anyone
-        if found is not None and not _exceeds(found, rig):
-            out.append(found)
-    return out
+    return makers
 
 
 def _exceeds(experiment: Experiment, rig: Rig) -> bool:
@@ -701,4 +547,7 @@ def _exceeds(experiment: Experiment, rig: Rig) -> bool:
     most = rig.limits.get("max_pressure")
     if most is None:
         return False
-    return bool(experiment.simulate(rig)["muscle_pressure"].max() > most)
+    found = experiment.simulate(rig)
+    behind = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    moved = {chain.pressure for chain in chains_of(rig)} or behind
+    return any(bool(found[name].max() > most) for name in moved)

@@ -1,0 +1,595 @@
+"""The chains of a rig that a person commands, the pressures between which each is worth moving, and
+commands that make pressures follow references.
+
+A chain is a chamber with the valves that fill and vent it, or a regulator with what it fills.
+Commands are found on the model by a loop over the pressures that inverts the valves, and then sent
+as they are, so that every hypothesis answers to the same ones.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs import _core
+from pamrs.channels import channel_of, dotted
+from pamrs.control import OrificeInverse
+from pamrs.diagnosis.settings import NextExperimentSettings
+from pamrs.errors import DiagnosisError
+from pamrs.rig import Rig
+from pamrs.rig.schema import BLOCKS, qualified
+from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
+
+__all__ = [
+    "Chain",
+    "Range",
+    "Spans",
+    "can_shut",
+    "chains_of",
+    "commands_for",
+    "driving",
+    "is_sealed",
+    "pressure_range",
+    "spans_of",
+    "trial_of",
+]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_LEAST_SHARE = 0.14
+"""Least flow that a command is found for, as a share of the choked one: near equal pressures the
+valve would open without bound."""
+_RAMP = 15.0
+"""Time in which pressures rise to find where a joint moves [s]."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """Pressures between which an experiment moves, gauge [Pa].
+
+    Attributes
+    ----------
+    low, high : float
+        At which the arm just moves, and at which it nears its upper stop.
+    """
+
+    low: float
+    high: float
+
+    def at(self, share: float) -> float:
+        """The pressure at a share of the range [Pa]."""
+        return self.low + share * (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Chain:
+    """What one or several commands move: the air of one chamber, or that behind one regulator.
+
+    Attributes
+    ----------
+    name : str
+        Of its chamber or regulator; empty where the rig has one chain.
+    valves : tuple of str
+        Names of the valves at the chamber; none for a regulator.
+    regulator : str or None
+        Name of the regulator; None for valves.
+    chamber : str
+        Name of the chamber whose pressure is moved.
+    moves : tuple of str
+        Channels of what its muscles move: ``joint_angle.elbow``, ``length``.
+    """
+
+    name: str
+    valves: tuple[str, ...]
+    regulator: str | None
+    chamber: str
+    moves: tuple[str, ...]
+
+    @property
+    def commands(self) -> tuple[str, ...]:
+        """Channels of its commands."""
+        if self.regulator is not None:
+            return (dotted("supply_command", self.regulator),)
+        return tuple(dotted("valve_command", name) for name in self.valves)
+
+    @property
+    def pressure(self) -> str:
+        """Channel of its pressure."""
+        return dotted("muscle_pressure", self.chamber)
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Channels that say how high its pressure was: a regulator was set to pressures that its
+        chamber may not have reached.
+        """
+        return (self.pressure, *(self.commands if self.regulator is not None else ()))
+
+    def before(self, rig: Rig) -> float:
+        """Its pressure before the first command [Pa]."""
+        if self.regulator is not None:
+            return float(rig.tables("supply")[self.regulator]["initial_pressure"])
+        return float(rig.tables("chamber")[self.chamber]["initial_pressure"])
+
+
+def chains_of(rig: Rig) -> list[Chain]:
+    """The chains that a person commands, in the order of the rig file; regulators only where there
+    are no valves (in front of valves they hold what they are set to).
+
+    Parameters
+    ----------
+    rig : Rig
+        Any rig.
+    """
+    if rig.tables("valve"):
+        lines = {qualified("line", n): ends["to"] for n, ends in rig.ports("line").items()}
+        fed: dict[str, list[str]] = {}
+        for name, ends in rig.ports("valve").items():
+            end = lines.get(ends["to"], ends["to"])
+            if end.partition(".")[0] == "chamber":
+                fed.setdefault(end.partition(".")[2], []).append(name)
+        found = [
+            Chain(chamber, tuple(fed[chamber]), None, chamber, _moved(rig, {chamber}))
+            for chamber in rig.tables("chamber")
+            if chamber in fed
+        ]
+    else:
+        found = []
+        for name in regulators_of(rig):
+            behind = _behind(rig, qualified("supply", name))
+            if behind:
+                found.append(Chain(name, (), name, behind[0], _moved(rig, set(behind))))
+    if len(found) == 1:
+        (only,) = found
+        return [Chain("", only.valves, only.regulator, only.chamber, only.moves)]
+    return found
+
+
+def _behind(rig: Rig, node: str) -> list[str]:
+    """Names of the chambers that lines join to a block, the nearest first."""
+    ends = [(line["from"], line["to"]) for line in rig.ports("line").values()]
+    found, reached = [node], []
+    for at in found:
+        for a, b in ends:
+            other = b if a == at else a if b == at else ""
+            if other.partition(".")[0] == "chamber" and other not in found:
+                found.append(other)
+                reached.append(other.partition(".")[2])
+    return reached
+
+
+def _moved(rig: Rig, chambers: set[str]) -> tuple[str, ...]:
+    """Channels of what the muscles in some chambers move."""
+    ends = [e for e in rig.ports("muscle").values() if e["chamber"].partition(".")[2] in chambers]
+    if rig.tables("load"):
+        return ("length",) if ends else ()
+    if not rig.tables("arm"):
+        return ()
+    joints = dict.fromkeys(e["joint"].partition(".")[2] for e in ends)
+    return tuple(dotted("joint_angle", name) for name in joints)
+
+
+def is_sealed(rig: Rig) -> bool:
+    """Whether nobody sends a command to a rig: a chamber without a valve and without a supply."""
+    return not (rig.tables("valve") or rig.tables("supply"))
+
+
+def can_shut(rig: Rig, chain: Chain) -> bool:
+    """Whether the valves of a chain can hold its air: a 3/2 valve that switches fills or vents."""
+    tables = rig.tables("valve")
+    closing = ("closed", "either")
+    return chain.regulator is None and all(
+        tables[name]["spool"] != "switching"
+        or tables[name]["with_current"] in closing
+        or tables[name]["without_current"] in closing
+        for name in chain.valves
+    )
+
+
+def driving(commands: Mapping[str, Array]) -> dict[str, Any]:
+    """Commands by channel as keywords of :func:`pamrs.simulate`."""
+    out: dict[str, Any] = {}
+    for channel, values in commands.items():
+        out.setdefault(channel_of(channel), {})[channel.partition(".")[2]] = values
+    return out
+
+
+class _Valve:
+    """A valve backwards: from the mass flow that is wanted in its chamber to its command."""
+
+    def __init__(self, rig: Rig, name: str, orifice: OrificeInverse) -> None:
+        gas, table = rig.tables("gas")[""], rig.tables("valve")[name]
+        fed = rig.ports("valve")[name]["from"]
+        kind, _, place = fed.partition(".")
+        self.channel = dotted("valve_command", name)
+        self.fed = dotted("supply_pressure" if kind == "supply" else "muscle_pressure", place)
+        self.orifice, self.ambient = orifice, gas["ambient_pressure"]
+        self.null, self.half = table["null_voltage"], table["half_range"]
+        self.table = table
+        if table["flow"] == "orifice":
+            self.fills = self.vents = self.widest = table["discharge_area_max"]
+        else:  # the loop makes good what the widest misses of the larger path
+            unit = _core.Gas(*(gas[key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+            self.fills = unit * table["fill_conductance"]
+            self.vents = unit * table["vent_conductance"]
+            self.widest = unit * max(table["fill_conductance"], table["vent_conductance"])
+        self.fractions = np.asarray(table["fraction"])
+        self.openings = np.asarray(table["opening"])
+        self.owed = 0.0
+
+    def _flow(self, up: float, down: float) -> float:
+        """Flow per area that a command is found for [kg/(s m2)]."""
+        return float(max(self.orifice.flow(up, down), _LEAST_SHARE * self.orifice.flow(up, 0.0)))
+
+    def answer(self, mass: float, inside: float, supply: float, dither: float) -> float:
+        """The command for a mass flow [kg/s] into a chamber, between absolute pressures."""
+        if self.table["spool"] == "switching":
+            return self._duty(mass, inside, supply)
+        if not (self.fills if mass > 0.0 else self.vents):
+            return float(self.null)
+        up, down = (supply, inside) if mass > 0.0 else (inside, self.ambient)
+        flow = self._flow(up, down)
+        opening = float(np.interp(abs(mass) / (self.widest * flow), self.fractions, self.openings))
+        return float(
+            np.clip(
+                self.null + math.copysign(self.half * opening, mass) + dither,
+                self.null - self.half,
+                self.null + self.half,
+            )
+        )
+
+    def _duty(self, mass: float, inside: float, supply: float) -> float:
+        """The duty of a valve that switches, as a command, its delays made good; without a carrier
+        full or none, so that their mean is the duty.
+        """
+        of = {
+            "fill": self.fills * self._flow(supply, inside),
+            "vent": -self.vents * self._flow(inside, self.ambient),
+            "closed": 0.0,
+        }
+        on, off = self.table["with_current"], of[self.table["without_current"]]
+        side = 1.0
+        if on == "either":
+            side = math.copysign(1.0, mass)
+            on = "fill" if mass > 0.0 else "vent"
+        span = of[on] - off
+        duty = float(np.clip((mass - off) / span, 0.0, 1.0)) if span else 0.0
+        carrier = self.table["carrier_frequency"]
+        if carrier > 0.0:
+            late = self.table["opening_delay"] - self.table["closing_delay"]
+            if 0.0 < duty < 1.0:
+                duty = float(np.clip(duty + late * carrier, 0.0, 1.0))
+        else:
+            self.owed += duty
+            duty = 1.0 if self.owed >= 0.5 else 0.0
+            self.owed -= duty
+        return float(self.null + side * self.half * duty)
+
+
+def commands_for(
+    rig: Rig,
+    references: Mapping[str, Array],
+    *,
+    sample_time: float,
+    bandwidth: float,
+    shut: Mapping[str, Mask] | None = None,
+    dither: Array | None = None,
+    initial: Mapping[str, float] | None = None,
+) -> dict[str, Array]:
+    """Commands that make the pressures of a rig's chains follow references.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig with valves.
+    references : mapping of str to (n,) array
+        Gauge pressure [Pa] by the name of each chain.
+    sample_time : float
+        Time between samples [s].
+    bandwidth : float
+        Of the loops [rad/s].
+    shut : mapping of str to (n,) bool array, optional
+        By chain: samples at which its valves are shut (the null voltage, or no flow of a valve that
+        switches).
+    dither : (n,) array, optional
+        Added to every command [V].
+    initial : mapping, optional
+        As for :func:`pamrs.simulate`.
+
+    Returns
+    -------
+    dict of str to (n,) array
+        Commands [V] by channel.
+    """
+    chains = [chain for chain in chains_of(rig) if chain.name in references]
+    n = next(iter(references.values())).size
+    gas = rig.tables("gas")[""]
+    ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
+    orifice = OrificeInverse(
+        ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
+    )
+    valves = {c.name: [_Valve(rig, name, orifice) for name in c.valves] for c in chains}
+    slopes = {name: np.gradient(values, sample_time) for name, values in references.items()}
+
+    def update(sample: Mapping[str, float]) -> dict[str, dict[str, float]]:
+        k = min(n - 1, round(sample["time"] / sample_time))
+        volts: dict[str, float] = {}
+        for chain in chains:
+            own = valves[chain.name]
+            closed = shut is not None and bool(shut[chain.name][k])
+            pressure, wanted = sample[chain.pressure], references[chain.name][k]
+            rate = bandwidth * (wanted - pressure) + slopes[chain.name][k]
+            mass = rate * sample[dotted("air_volume", chain.chamber)] / warm
+            for name, valve in zip(chain.valves, own, strict=True):
+                if closed and valve.table["spool"] != "switching":
+                    volts[name] = float(valve.null)
+                    continue
+                flow = 0.0 if closed else mass
+                supply = sample[valve.fed] + ambient
+                shaken = 0.0 if dither is None else float(dither[k])
+                volts[name] = valve.answer(flow, pressure + ambient, supply, shaken)
+        return {"valve_command": volts}
+
+    simulator = Simulator(rig, sample_time=sample_time, initial=initial or None)
+    every = max(1, round(0.01 / sample_time))
+    total = (n - 1 + every - 1) // every * every
+    found = simulator.control(update, total * sample_time, period=every * sample_time)
+    channels = [channel for chain in chains for channel in chain.commands]
+    return {channel: np.ascontiguousarray(found[channel][:n]) for channel in channels}
+
+
+def trial_of(
+    rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any
+) -> Array:
+    """Valve commands that make the muscle pressure of a rig of one chain follow a reference.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of one chain with a valve.
+    reference : (n,) array
+        Gauge pressure [Pa].
+    sample_time : float
+        Time between samples [s].
+    bandwidth : float
+        Of the loop [rad/s].
+    **options
+        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither``
+        ((n,) array added to the command [V]), ``initial`` (as for :func:`pamrs.simulate`).
+
+    Returns
+    -------
+    (n,) array
+        Command [V].
+    """
+    shut = {"": options.pop("shut")} if "shut" in options else None
+    found = commands_for(
+        rig, {"": reference}, sample_time=sample_time, bandwidth=bandwidth, shut=shut, **options
+    )
+    return next(iter(found.values()))
+
+
+def _source(rig: Rig, chain: Chain) -> float:
+    """Highest pressure that the supply of a chain gives [Pa, gauge]: what it begins with; that of
+    its chamber where no supply stands in front of it.
+    """
+    ways = [*rig.ports("valve").values(), *rig.ports("line").values()]
+    found = [qualified("chamber", chain.chamber)]
+    for at in found:
+        for way in ways:
+            if way["to"] == at and way["from"] and way["from"] not in found:
+                found.append(way["from"])
+        inlets = [qualified("line", n) for n, e in rig.ports("line").items() if e["to"] == at]
+        found += [inlet for inlet in inlets if inlet not in found]
+    tables = rig.tables("supply")
+    pressures = [
+        float(tables[node.partition(".")[2]]["initial_pressure"])
+        for node in found
+        if node.partition(".")[0] == "supply"
+    ]
+    return max(pressures, default=chain.before(rig))
+
+
+def _most(
+    rig: Rig, chain: Chain | None, highest: float | Mapping[str, float] | None
+) -> list[float]:
+    """What is known of the highest pressure that is allowed [Pa, gauge]."""
+    if isinstance(highest, Mapping):
+        highest = highest.get("" if chain is None else chain.name)
+    said = [p for p in (highest, rig.limits.get("max_pressure")) if p is not None]
+    return [float(p) for p in said]
+
+
+def _top(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) -> float:
+    """Highest pressure that a chain is moved to [Pa, gauge]."""
+    said = _most(rig, chain, highest)
+    if chain.regulator is None:
+        return min(0.8 * _source(rig, chain), *said, math.inf)
+    if not said:
+        raise DiagnosisError(
+            f"rig {rig.name!r} is fed by a regulator, and nothing says how high its pressure may "
+            "go: [limits] max_pressure of the rig file, or a recording of the pressure, is needed"
+        )
+    return min(said)
+
+
+def pressure_range(
+    rig: Rig,
+    settings: NextExperimentSettings,
+    *,
+    highest: float | Mapping[str, float] | None = None,
+) -> Range:
+    """Pressures between which a rig of one chain is worth exciting.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of one chain, or a sealed chamber.
+    settings : NextExperimentSettings
+        Bandwidth of the loop that finds them.
+    highest : float or mapping, optional
+        Gauge pressure that is not to be exceeded [Pa], for example the highest that was recorded.
+
+    Returns
+    -------
+    Range
+        With an arm or a load, from where it has moved by a twentieth of its range to nine tenths of
+        it; without one, from a tenth to six tenths of the supply's pressure. Never above what the
+        rig file says that the stand allows.
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing says how high the set pressure of a regulator may go.
+    """
+    if is_sealed(rig):
+        said = _most(rig, None, highest)
+        top = min(7.0e5, *said, math.inf) if highest is None else min(said)
+        return Range(0.35 * top, top)
+    (chain,) = chains_of(rig)
+    top = _top(rig, chain, highest)
+    if not chain.moves:
+        return Range(0.1 * top, min(0.75 * top, 7.0e5))
+    ramp = np.linspace(0.0, top, 1501)
+    found = _played(rig, {"": ramp}, settings)
+    share = _share(rig, chain.moves[0], found)
+    pressure = np.maximum.accumulate(found[chain.pressure])
+    low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
+    high = float(pressure[np.argmax(share > 0.85)]) if (share > 0.85).any() else top
+    high = min(max(high, 1.2 * low), top)
+    return Range(low, high) if high > low else Range(0.3 * top, top)
+
+
+def _played(
+    rig: Rig, references: Mapping[str, Array], settings: NextExperimentSettings
+) -> Simulation:
+    """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
+    chains = chains_of(rig)
+    if chains[0].regulator is not None:
+        commands = {chain.commands[0]: references[chain.name] for chain in chains}
+    else:
+        commands = commands_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
+    return simulate(rig, sample_time=0.01, **driving(commands))
+
+
+def _share(rig: Rig, channel: str, found: Simulation) -> Array:
+    """Where a joint is between its rest and its upper stop, or a load between its longest and its
+    shortest.
+    """
+    if channel == "length":
+        return np.asarray(
+            (found["length"][0] - found["length"])
+            / (found["length"][0] - rig.tables("load")[""]["min_length"])
+        )
+    joint = rig.tables("joint")[channel.partition(".")[2]]
+    return np.asarray(
+        (found[channel] - joint["rest_angle"]) / (joint["max_angle"] - joint["rest_angle"])
+    )
+
+
+@dataclass(frozen=True)
+class Spans:
+    """Pressures between which the chains of a rig are worth moving, by their names.
+
+    Attributes
+    ----------
+    held : dict of str to float
+        At which a chain is held while others move [Pa, gauge].
+    alone : dict of str to Range
+        Of a chain while all others are held.
+    """
+
+    held: dict[str, float]
+    alone: dict[str, Range]
+
+
+def spans_of(
+    rig: Rig,
+    settings: NextExperimentSettings,
+    *,
+    highest: Mapping[str, float] | None = None,
+) -> Spans:
+    """Pressures of a rig of several chains: all rise together, which says at which each is held;
+    then each rises alone.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig of several chains.
+    settings : NextExperimentSettings
+        Bandwidth of the loops that find them.
+    highest : mapping of str to float, optional
+        Gauge pressures by chain that are not to be exceeded [Pa].
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing says how high the set pressure of a regulator may go.
+    """
+    chains = chains_of(rig)
+    tops = {chain.name: _top(rig, chain, highest) for chain in chains}
+    time = np.asarray(np.arange(round(_RAMP / 0.01) + 1) * 0.01, dtype=np.float64)
+    # vented muscles may push like struts: nobody goes below a tenth
+    rising: dict[str, Array] = {
+        name: top * (0.1 + 0.9 * time / _RAMP) for name, top in tops.items()
+    }
+    found = _played(rig, rising, settings)
+    held = {c.name: _free(rig, c, chains, found, tops[c.name]).at(0.5) for c in chains}
+    alone = {}
+    for chain in chains:
+        still: dict[str, Array] = {
+            c.name: _line(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
+        }
+        moving = _line(
+            time, [0.0, 2.0, _RAMP], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
+        )
+        found = _played(rig, {**still, chain.name: moving}, settings)
+        alone[chain.name] = _free(rig, chain, [chain], found, tops[chain.name], first=200)
+    return Spans(held, alone)
+
+
+def _line(time: Array, at: Sequence[float], values: Sequence[float]) -> Array:
+    """Straight lines through values at some times."""
+    return np.asarray(np.interp(time, at, values), dtype=np.float64)
+
+
+def _free(
+    rig: Rig,
+    chain: Chain,
+    chains: Sequence[Chain],
+    found: Simulation,
+    top: float,
+    first: int = 0,
+) -> Range:
+    """The pressures of a chain, as it rises, at which nothing that some chains move is at a stop;
+    all of them where something always is.
+    """
+    moved = dict.fromkeys(m for c in chains for m in c.moves if set(c.moves) & set(chain.moves))
+    free = np.ones(found.time.size, dtype=bool)
+    for channel in moved:
+        low, high = _stops(rig, channel)
+        share = (found[channel] - low) / (high - low)
+        free &= (share > 0.05) & (share < 0.88)
+    free[:first] = False
+    pressure = found[chain.pressure]
+    if not chain.moves or not free.any():
+        return Range(0.1 * top, min(0.75 * top, 7.0e5) if not chain.moves else top)
+    # the longest stretch: on its way up a joint may pass a place twice
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
+    a, b = max(zip(edges[::2], edges[1::2], strict=True), key=lambda ab: ab[1] - ab[0])
+    low, high = float(pressure[a]), min(float(pressure[b - 1]), top)
+    return Range(low, high) if high > 1.2 * low else Range(0.3 * top, top)
+
+
+def _stops(rig: Rig, channel: str) -> tuple[float, float]:
+    """Ends of what a joint or a load can do, the one at rest first."""
+    if channel == "length":
+        load = rig.tables("load")[""]
+        return load["max_length"], load["min_length"]
+    joint = rig.tables("joint")[channel.partition(".")[2]]
+    return joint["min_angle"], joint["max_angle"]

@@ -1,0 +1,141 @@
+"""One experiment: the commands that a person sends, in numbers and in words."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.next_experiment._chains import driving
+from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
+from pamrs.simulation import Simulation, simulate
+
+__all__ = ["Experiment", "Points", "in_bar", "other_payload", "then", "through"]
+
+Array = NDArray[np.float64]
+Points = list[tuple[float, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """One experiment, ready to be simulated.
+
+    Attributes
+    ----------
+    name : str
+        Its kind, ``"sealed_hold"``; behind a dot the chain that it moves alone,
+        ``"slow_triangle.flexor"``.
+    text : str
+        What to do, with numbers.
+    excitation : dict
+        The same for a program: ``kind`` and numbers with their unit in the name.
+    command : (n,) array or None
+        Valve command [V], or set pressure of a regulator [Pa, gauge]; None for a chamber without
+        either.
+    rows : int
+        Number of samples.
+    sample_time : float
+        Time between them [s].
+    initial : dict of str to float
+        As for :func:`pamrs.simulate`.
+    changes : dict of str to float
+        Parameters of the rig that the person changes (another payload), SI.
+    effort : float
+        What it costs, as time [s]: its length and what must be changed by hand.
+    channel : str
+        Channel of the command.
+    needs : str
+        What it takes that the rig file does not say to be there, in words; empty for nothing.
+    also : dict of str to (n,) array
+        Further commands by their channels, as ``command``.
+    """
+
+    name: str
+    text: str
+    excitation: dict[str, Any]
+    command: Array | None
+    rows: int
+    sample_time: float
+    initial: dict[str, float] = field(default_factory=dict)
+    changes: dict[str, float] = field(default_factory=dict)
+    effort: float = 0.0
+    channel: str = "valve_command"
+    needs: str = ""
+    also: dict[str, Array] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """Its name without that of a chain."""
+        return self.name.partition(".")[0]
+
+    @property
+    def commands(self) -> dict[str, Array]:
+        """What is sent, by channel [SI]; empty where everything is done by hand."""
+        return {} if self.command is None else {self.channel: self.command, **self.also}
+
+    @property
+    def duration(self) -> float:
+        """Length [s]."""
+        return (self.rows - 1) * self.sample_time
+
+    def changed(self, rig: Rig) -> Rig:
+        """The rig as it stands in this experiment."""
+        return rig.with_parameters(self.changes) if self.changes else rig
+
+    def simulate(self, rig: Rig) -> Simulation:
+        """The experiment on a rig, every hypothesis from the same commands.
+
+        Raises
+        ------
+        SimulationError
+            If the state leaves the range in which the model holds.
+        """
+        driven: dict[str, Any] = driving(self.commands) or {"duration": self.duration}
+        return simulate(
+            self.changed(rig), sample_time=self.sample_time, initial=self.initial, **driven
+        )
+
+
+def through(points: Points, sample_time: float) -> Array:
+    """Straight lines through (time, value) points."""
+    end = points[-1][0]
+    time = np.arange(round(end / sample_time) + 1) * sample_time
+    return np.asarray(
+        np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64
+    )
+
+
+def then(points: Points, *legs: tuple[float, float]) -> Points:
+    """Points continued by (duration, value) legs."""
+    out = list(points)
+    for duration, value in legs:
+        out.append((out[-1][0] + duration, value))
+    return out
+
+
+def in_bar(pressure: float) -> float:
+    """A pressure as it is said [bar]."""
+    return round(pressure * 1e-5, 2)
+
+
+def other_payload(rig: Rig) -> tuple[str, float, str] | None:
+    """Another payload that a person may hang on: the parameter, its value [kg], and what it takes
+    that the rig file does not list; None where there is none.
+    """
+    if rig.tables("load"):
+        name = "load.mass"
+    elif rig.tables("link"):
+        name = f"{qualified('link', list(rig.ports('link'))[-1])}.payload"
+    else:
+        name = "arm.payload"
+    now, least = rig.parameter(name).value, rig.parameter(name).lower
+    listed = rig.limits.get("payloads")
+    others = [m for m in listed or [] if m >= least and not math.isclose(m, now)]
+    if (listed is not None and not others) or (listed is None and now <= 0.0):
+        return None
+    other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
+    return name, other, "" if others else f"another payload, about {other:.3g} kg"

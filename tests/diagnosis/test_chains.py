@@ -1,0 +1,399 @@
+"""Rigs of several chains, regulators and valves that switch: what a person can record on them, and
+what some channels could tell of them before anything is recorded.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.explain._next import _Question
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.next_experiment import (
+    Experiment,
+    can_shut,
+    chains_of,
+    experiments_of,
+    library,
+    measurable,
+    noise_of,
+    propose,
+    protocol_of,
+)
+from pamrs.diagnosis.next_experiment import _planning as plan
+from pamrs.diagnosis.next_experiment._chains import commands_for, driving
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError
+from pamrs.recordings import Recording, load_recording
+from pamrs.rig import Rig, parse_rig
+from pamrs.simulation import core_rig, replay
+from tests.diagnosis import synthetic
+from tests.simulation.test_spools import PAIR
+
+SETTINGS = DiagnosisSettings()
+OWN = SETTINGS.next_experiment
+JOINT = pamrs.rigs.antagonistic_joint()
+TWO = pamrs.rigs.named("two_joint_arm")
+REGULATED = pamrs.rigs.named("regulated_joint")
+PULSED = parse_rig(PAIR)
+SIDES = ("flexor", "extensor")
+REGULATORS = """
+schema = "pamrs.rig/1"
+name = "two_regulators"
+[gas]
+[limits]
+max_pressure = { value = 4, unit = "bar" }
+""" + "".join(
+    f"""
+[supply.{side}]
+kind             = "regulator"
+initial_pressure = {{ value = 1, unit = "bar" }}
+time_constant    = {{ value = 0.1, unit = "s", tol = 0.02 }}
+[line.{side}]
+kind     = "tube"
+from     = "supply.{side}"
+to       = "chamber.{side}"
+length   = {{ value = 2, unit = "m", tol = 0.05 }}
+diameter = {{ value = 4, unit = "mm", tol = 0.05 }}
+[chamber.{side}]
+dead_volume      = {{ value = 0.3, unit = "l", tol = 0.01 }}
+initial_pressure = {{ value = 1, unit = "bar" }}
+alpha_in  = {{ value = 1.3, unit = "1" }}
+alpha_out = {{ value = 1.1, unit = "1" }}
+alpha     = {{ value = 1.2, unit = "1" }}
+"""
+    for side in ("left", "right")
+)
+
+
+def only(rig: Rig, *names: str, **options) -> list[Experiment]:
+    return library(rig, OWN, sample_time=0.01, only=names, **options)
+
+
+def test_a_chain_is_a_chamber_with_its_valves_or_a_regulator_with_what_it_fills() -> None:
+    flexor, extensor = chains_of(JOINT)
+    assert (flexor.name, extensor.name) == SIDES
+    assert flexor.commands == ("valve_command.flexor",)
+    assert extensor.pressure == "muscle_pressure.extensor"
+    assert flexor.moves == extensor.moves == ("joint_angle.elbow",)
+    assert [c.moves for c in chains_of(TWO)] == [("joint_angle.elbow",), ("joint_angle.wrist",)]
+    (only_one,) = chains_of(pamrs.rigs.named("throttled_supply"))
+    assert (only_one.name, only_one.pressure) == ("", "muscle_pressure.muscle")
+    (pulsed,) = chains_of(PULSED)
+    assert pulsed.commands == ("valve_command.fill", "valve_command.vent")
+    assert can_shut(PULSED, pulsed)
+    (regulated,) = chains_of(REGULATED)
+    assert regulated.commands == ("supply_command",)
+    assert not can_shut(REGULATED, regulated)
+    left, right = chains_of(parse_rig(REGULATORS))
+    assert (left.commands, right.pressure) == (("supply_command.left",), "muscle_pressure.right")
+    assert chains_of(pamrs.rigs.named("tube")) == []
+
+
+def test_pressures_follow_references_of_their_own() -> None:
+    time = 0.01 * np.arange(1501)
+    wave = 0.6e5 * np.sin(2.0 * np.pi * 0.1 * time)
+    wanted = {"flexor": 3e5 + wave, "extensor": 3e5 - wave}
+    sent = commands_for(JOINT, wanted, sample_time=0.01, bandwidth=OWN.bandwidth)
+    assert list(sent) == ["valve_command.flexor", "valve_command.extensor"]
+    found = pamrs.simulate(JOINT, sample_time=0.01, **driving(sent))
+    for side in SIDES:
+        missed = found[f"muscle_pressure.{side}"] - wanted[side]
+        # but for the jerks of the joint
+        assert np.percentile(np.abs(missed[100:]), 90) < 0.15e5
+    turned = found["joint_angle.elbow"][100:]
+    assert turned.max() - turned.min() > np.radians(20)
+
+
+@pytest.mark.parametrize("carrier", [True, False], ids=["duty", "on or off"])
+def test_valves_that_switch_hold_a_pressure(carrier: bool) -> None:
+    rig = PULSED
+    if not carrier:
+        rig = rig.with_parameters(
+            {f"valve.{name}.carrier_frequency": 0.0 for name in ("fill", "vent")}
+        )
+    reference = np.interp(
+        0.01 * np.arange(901), [0.0, 1.0, 4.0, 5.0, 9.0], [2e5, 3e5, 3e5, 1e5, 1e5]
+    )
+    sent = commands_for(rig, {"": reference}, sample_time=0.01, bandwidth=OWN.bandwidth)
+    found = pamrs.simulate(rig, sample_time=0.01, **driving(sent))["muscle_pressure"]
+    for begin, level in ((250, 3e5), (700, 1e5)):
+        assert float(np.mean(found[begin : begin + 150])) == pytest.approx(level, abs=0.2e5)
+    for values in sent.values():
+        assert (values.min(), values.max()) <= (24.0, 24.0)
+        assert values.min() >= 0.0
+        if not carrier:
+            assert set(np.unique(values)) <= {0.0, 24.0}
+
+
+def test_what_cannot_be_shut_gets_no_holds() -> None:
+    three = PULSED.to_toml_text().replace('with_current        = "fill"', 'with_current = "fill"')
+    text = three.replace('without_current     = "closed"', 'without_current = "vent"')
+    rig = parse_rig(text.replace('without_current   = "closed"', 'without_current = "vent"'))
+    (chain,) = chains_of(rig)
+    assert not can_shut(rig, chain)
+    names = {e.name for e in only(rig, "sealed_hold", "step_and_shut", "set_steps", "null_ramp")}
+    assert names == {"set_steps"}
+    assert {e.name for e in only(PULSED, "sealed_hold", "set_steps")} == {"sealed_hold"}
+
+
+def test_one_chain_moves_and_the_others_are_held() -> None:
+    held = {}
+    for experiment in only(JOINT, "slow_triangle"):
+        moved = experiment.excitation["moved"]
+        (still,) = set(SIDES) - {moved}
+        assert experiment.name == f"slow_triangle.{moved}"
+        assert f"hold {still} at" in experiment.text
+        held[still] = 1e5 * experiment.excitation["held_bar"][still]
+        run = experiment.simulate(JOINT)
+        later = {s: run[f"muscle_pressure.{s}"][300:] for s in SIDES}
+        assert np.ptp(later[moved]) > 1.5e5
+        assert np.abs(later[still] - held[still]).max() < 0.2e5
+    assert set(held) == set(SIDES)
+
+
+def test_all_chains_move_at_once_and_none_as_another() -> None:
+    (waves,) = only(JOINT, "multisine")
+    assert set(waves.commands) == {f"valve_command.{side}" for side in SIDES}
+    one, other = waves.excitation["frequencies_hz"].values()
+    assert not set(one) & set(other)
+    run = waves.simulate(JOINT)
+    pressures = np.array([run[f"muscle_pressure.{side}"][500:] for side in SIDES])
+    assert abs(np.corrcoef(pressures)[0, 1]) < 0.5
+    (holds,) = only(JOINT, "sealed_hold")
+    up, down = holds.excitation["levels_bar"].values()
+    assert up == sorted(up)
+    assert down == sorted(down, reverse=True)
+    angle = holds.simulate(JOINT)["joint_angle.elbow"]
+    assert np.ptp(angle) > np.radians(40)  # against each other
+
+
+@pytest.mark.parametrize("rig", [JOINT, TWO], ids=["one joint", "two joints"])
+def test_experiments_keep_to_what_rig_and_recordings_allow(rig: Rig) -> None:
+    text = rig.to_toml_text() + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    limited = parse_rig(text + 'payloads = { value = [0.1, 0.9], unit = "kg" }\n')
+    pool = library(limited, OWN, sample_time=0.01)
+    assert {e.kind for e in pool} >= {"multisine", "slow_triangle", "other_payload", "staircase"}
+    valves = limited.tables("valve")
+    for experiment in pool:
+        run = experiment.simulate(limited)
+        assert max(run[c.pressure].max() for c in chains_of(rig)) <= 4e5
+        for name, table in valves.items():
+            reach = np.abs(experiment.commands[f"valve_command.{name}"] - table["null_voltage"])
+            assert reach.max() <= table["half_range"] + 1e-9
+    (payload,) = (e for e in pool if e.kind == "other_payload")
+    assert payload.needs == ""
+    assert set(payload.changes.values()) <= {0.1, 0.9}
+
+
+def recording(peaks: dict[str, float]) -> Recording:
+    time = 0.01 * np.arange(200)
+    channels = {name: np.linspace(0.0, peak, 200) for name, peak in peaks.items()}
+    mask = {name: np.ones(200, dtype=bool) for name in channels}
+    return Recording("r", "fit", time, 0.01, channels, mask, [], {})
+
+
+def test_each_chain_stays_inside_its_own_recorded_pressures() -> None:
+    peaks = {"muscle_pressure.flexor": 4e5, "muscle_pressure.extensor": 3e5}
+    (waves,) = experiments_of(JOINT, [recording(peaks)], OWN, {"multisine"})
+    run = waves.simulate(JOINT)
+    for name, peak in peaks.items():
+        assert run[name].max() <= 1.06 * peak
+    # without a gauge it goes no higher than what has one
+    (waves,) = experiments_of(
+        JOINT, [recording({"muscle_pressure.flexor": 3e5})], OWN, {"multisine"}
+    )
+    assert waves.simulate(JOINT)["muscle_pressure.extensor"].max() <= 1.06 * 3e5
+
+
+@pytest.mark.parametrize(
+    ("rig", "kind"),
+    [(JOINT, "staircase"), (PULSED, "step_and_shut"), (parse_rig(REGULATORS), "multisine")],
+    ids=["antagonists", "pulses", "regulators"],
+)
+def test_the_file_of_an_experiment_is_played_by_its_rig(
+    rig: Rig, kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (experiment,) = only(rig, kind)
+    protocol = protocol_of(experiment)
+    assert protocol is not None
+    file = tmp_path / "next.csv"
+    file.write_text(protocol.to_csv(), encoding="utf-8")
+    heading = file.read_text(encoding="utf-8").splitlines()[0]
+    commands = [c for chain in chains_of(rig) for c in chain.commands]
+    assert [h.partition(" ")[0] for h in heading.split(",")] == ["time", *commands]
+    played, run = replay(rig, load_recording(file)), experiment.simulate(rig)
+    for chain in chains_of(rig):
+        assert np.allclose(played[chain.pressure], run[chain.pressure], atol=20.0)
+    model, out = rig.to_toml(tmp_path / "rig.toml"), tmp_path / "out.csv"
+    words = ["simulate", str(model), "--input", str(file), "--output", str(out)]
+    assert cli.main(words) == 0, capsys.readouterr().err
+    assert len(out.read_text(encoding="utf-8").splitlines()) == experiment.rows + 1
+
+
+def test_what_lines_join_is_filled_one_by_one() -> None:
+    for name in ("tube", "long_tube"):
+        rig = pamrs.rigs.named(name)
+        pool = library(rig, OWN)
+        over = [e for e in pool if e.kind == "blow_over"]
+        assert [e.name for e in over] == ["blow_over.left", "blow_over.right"]
+        for experiment in over:
+            run = experiment.simulate(rig)
+            apart = run["muscle_pressure.left"] - run["muscle_pressure.right"]
+            assert abs(apart[0]) > 3e5
+            assert abs(apart[-1]) < 0.02 * abs(apart[0])
+
+
+def test_a_question_about_a_chamber_moves_its_own_chain() -> None:
+    blocks = available_blocks(JOINT, measurable(JOINT), SETTINGS.prepare)
+    problem = Problem(blocks, [], core_rig(JOINT), SETTINGS)
+    asked = _Question(JOINT, [], blocks, [], problem)
+    kinds = {b.name: asked.experiment(b)[2] for b in blocks if b.name != "chamber.flexor"}
+    assert {name: e.name for name, e in kinds.items() if e is not None} == {
+        "supply": "sealed_hold",
+        "chamber.extensor": "step_and_shut.extensor",
+        "arm.elbow": "nested_triangles.flexor",
+    }
+
+
+def planned(monkeypatch: pytest.MonkeyPatch, rig: Rig, kinds: tuple[str, ...], *effects: str):
+    """Plans of a rig from some kinds of experiments and effects in the place of all."""
+    pool = only(rig, *kinds)
+    monkeypatch.setattr(plan, "library", lambda *_: pool)
+    monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in effects})
+    return lambda *channels, **options: pamrs.plan_diagnosis(
+        rig, channels or measurable(rig), experiments=kinds, **options
+    )
+
+
+def test_a_plan_tells_a_leak_at_one_muscle_from_one_at_the_other(monkeypatch) -> None:
+    made = planned(
+        monkeypatch, JOINT, ("sealed_hold", "step_and_shut"), "leak_muscle", "valve_dead_zone"
+    )
+    found = made()
+    assert set(found.seen) == {
+        f"{effect}@{side}" for effect in ("valve_dead_zone", "leak_muscle") for side in SIDES
+    }
+    for side in SIDES:
+        assert found.sight(f"leak_muscle@{side}").block == f"chamber.{side}"
+        assert found.separable(f"leak_muscle@{side}", f"valve_dead_zone@{side}")
+    assert found.separable("leak_muscle@flexor", "leak_muscle@extensor")
+    assert [e["name"] for e in found.experiments] == [
+        "sealed_hold",
+        "step_and_shut.flexor",
+        "step_and_shut.extensor",
+    ]
+    written = json.loads(json.dumps(found.to_dict()))["effects"]
+    assert {(e["id"], e["at"]) for e in written} >= {("leak_muscle", s) for s in SIDES}
+    assert "leak_muscle@extensor" in found.text()
+    with pytest.raises(ParameterError, match="leak_muscle@flexor"):
+        found.sight("leak_muscle")
+    # without a gauge at the extensor nothing says what it loses
+    fewer = made(*(c for c in measurable(JOINT) if c != "muscle_pressure.extensor"))
+    assert [b["name"] for b in fewer.blocks] == ["chamber.flexor"]
+    assert fewer.sight("leak_muscle@flexor").verdict == "seen"
+    assert fewer.sight("leak_muscle@extensor").verdict == "not seen"
+    gauge = fewer.additions[0]
+    assert gauge.name == "muscle_pressure.extensor"
+    assert "leak_muscle@extensor" in gauge.seen
+    assert {m["name"] for m in fewer.missing} == {"supply", "chamber.extensor", "arm.elbow"}
+
+
+def test_names_without_a_block_stand_for_all_of_a_kind(monkeypatch) -> None:
+    made = planned(monkeypatch, JOINT, ("step_and_shut.flexor",), "leak_muscle")
+    found = made("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+    assert found.channels == measurable(JOINT)
+    noisy = made(noise={"muscle_pressure": 900.0, "muscle_pressure.flexor": 100.0})
+    assert noisy.noise["muscle_pressure.flexor"] == 100.0
+    assert noisy.noise["muscle_pressure.extensor"] == 900.0
+    sharp, blunt = (noisy.sight(f"leak_muscle@{side}").left for side in SIDES)
+    usual = {s: found.sight(f"leak_muscle@{s}").left for s in SIDES}
+    assert sharp > usual["flexor"]
+    assert blunt < usual["extensor"]
+    with pytest.raises(ParameterError, match=r"muscle_pressure\.biceps.*muscle_pressure\.flexor"):
+        made("muscle_pressure.biceps")
+    with pytest.raises(ParameterError, match=r"noise has 'noise'.*muscle_pressure\.extensor"):
+        made(noise={"noise": 1.0})
+
+
+def test_effects_of_a_time_or_of_the_last_joint_are_planned_as_they_can_be(monkeypatch) -> None:
+    made = planned(
+        monkeypatch, JOINT, ("slow_triangle.flexor",), "payload_change", "external_torque"
+    )
+    found = made()
+    assert set(found.seen) == {"payload_change", "external_torque"}
+    # no more than is there can be taken away
+    payload = JOINT.parameter("arm.payload").value
+    assert found.sight("payload_change").typical <= payload
+
+
+def test_a_regulated_joint_is_planned(monkeypatch) -> None:
+    made = planned(
+        monkeypatch,
+        REGULATED,
+        ("slow_triangle", "set_steps"),
+        "supply_regulator_deadband",
+        "muscle_hysteresis",
+        "leak_muscle",
+    )
+    found = made()
+    assert [b["name"] for b in found.blocks] == ["supply", "chamber", "arm"]
+    assert set(found.seen) == {"supply_regulator_deadband", "muscle_hysteresis"}
+    # the regulator makes good what a leak takes
+    assert found.sight("leak_muscle").verdict == "not seen"
+    assert "regulator" in found.text()
+    lumped = made("supply_command", "muscle_pressure", "joint_angle")
+    assert [b["covers"] for b in lumped.blocks][0] == "regulator, line and chamber"
+    assert lumped.sight("supply_regulator_deadband").verdict == "seen"
+    blind = made("supply_command", "supply_pressure", "muscle_pressure")
+    assert blind.sight("muscle_hysteresis").verdict == "not seen"
+    assert blind.additions[0].name == "joint_angle"
+    assert "muscle_hysteresis" in blind.additions[0].seen
+
+
+def test_two_regulators_and_pulsed_valves_are_planned(monkeypatch) -> None:
+    rig = parse_rig(REGULATORS)
+    found = planned(monkeypatch, rig, ("set_steps",), "supply_regulator_deadband")()
+    assert found.separable("supply_regulator_deadband@left", "supply_regulator_deadband@right")
+    leak = planned(monkeypatch, PULSED, ("sealed_hold",), "leak_muscle", "valve_area")()
+    assert leak.sight("leak_muscle").verdict == "seen"
+    assert leak.channels == measurable(PULSED)
+
+
+def test_frames_are_refused_in_words() -> None:
+    bench = pamrs.rigs.named("bench")
+    for what in (library, pamrs.plan_diagnosis):
+        with pytest.raises(DiagnosisError, match="frame"):
+            what(bench, OWN if what is library else ["muscle_pressure"])
+
+
+def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
+    hypotheses = [
+        (
+            f"leak_muscle@{side}",
+            JOINT.with_effect("leak_muscle", {"conductance": 5e-12}, at=side),
+            0.5,
+        )
+        for side in SIDES
+    ]
+    pool = only(JOINT, "step_and_shut.flexor")
+    found = propose(JOINT, hypotheses, noise_of(JOINT, OWN), experiments=pool)
+    assert found.expected_information_bits > 0.9
+    assert "at flexor" in found.text
+    assert set(found.protocol.commands) == {f"valve_command.{side}" for side in SIDES}
+    (pair,) = found.pairs
+    assert pair.between == [f"leak_muscle@{side}" for side in SIDES]
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("jinja2")
+    from pamrs.report import render_html
+
+    page = render_html(synthetic.diagnosis(next_experiment=found))
+    held = found.excitation["held_bar"]["extensor"]
+    assert f"extensor: {held:.3g}" in page
