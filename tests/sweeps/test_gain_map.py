@@ -79,8 +79,8 @@ def test_a_gain_without_its_prefix_and_a_length_are_told(tmp_path):
     found = sweeps.gain_map(rig, by_length, {"gain.kp": [50.0, 100.0]}, lift, **kept)
     assert found["squared_error"].attrs["units"] == "m2 s"
     assert found["rms"].attrs["units"] == "m"
+    bench, own = pamrs.rigs.bench(), {**kept, "store": tmp_path / "bench.zarr"}
     with pytest.raises(pamrs.ParameterError, match="frame, which prescribes"):
-        bench, own = pamrs.rigs.bench(), {**kept, "store": tmp_path / "bench.zarr"}
         sweeps.gain_map(bench, control.PID, {"gain.kp": [1.0]}, lift, **own)
 
 

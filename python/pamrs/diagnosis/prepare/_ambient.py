@@ -16,6 +16,8 @@ __all__ = ["AMBIENT", "at_ambient"]
 
 AMBIENT = "ambient_temperature"
 _NAME = "gas.temperature"
+_SAME = 0.1
+"""Temperatures that differ by less are told as the same [K]."""
 
 
 def at_ambient(
@@ -69,9 +71,10 @@ def at_ambient(
     except ParameterError as error:
         names = ", ".join(name for name, _ in found)
         raise DiagnosisError(f"{AMBIENT} of {names}: {error}") from error
+    same = abs(value - before.value) < _SAME
+    stated = f"to {_SAME:g} K the rig file's" if same else f"{before.value:.2f} K in the rig file"
     said = [
-        f"{_NAME} is {value:.1f} K, as {AMBIENT} was measured ({before.value:.1f} K in the rig "
-        "file)",
+        f"{_NAME} is {value:.2f} K, as {AMBIENT} was measured ({stated})",
         *_doubted(value, before, settings),
     ]
     low, high = min(one for _, one in found), max(one for _, one in found)
