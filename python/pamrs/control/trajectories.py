@@ -330,7 +330,7 @@ def check_reach(
         for one in trajectory.of_joint.values():
             check_reach(one, duration)
         return
-    wanted = trajectory(np.linspace(0.0, duration, 257)).angle
+    wanted = np.asarray(trajectory(np.linspace(0.0, duration, 257)).angle, dtype=np.float64)
     if lengths is not None:
         low, high = lengths
         worst = float(wanted[np.argmax(np.maximum(low - wanted, wanted - high))])
