@@ -19,7 +19,6 @@ from pamrs.findings import (
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
 
-
 KEYS = ("noise", "before", "refit", "after")
 
 
