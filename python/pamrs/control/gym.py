@@ -479,6 +479,12 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
         _check_render_mode(render_mode)
         self.render_mode = None
+        whole = isinstance(num_envs, (int, np.integer)) and not isinstance(num_envs, bool)
+        if not whole or num_envs < 1:
+            raise ParameterError(
+                f"num_envs = {num_envs!r} is not allowed: a whole number of rigs, 1 at least, is "
+                "needed; the rig comes behind it, RigVectorEnv(64, rig)"
+            )
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
         self.num_envs = num_envs
