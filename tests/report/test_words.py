@@ -64,6 +64,8 @@ def test_one_cause_that_two_groups_see_is_told_once() -> None:
         "The model leaves out: encoder error in the chamber, probability 0.93, and in the arm, "
         "probability 0.98"
     )
+    found = seen(one, two)
+    assert words.name_chance(found, found.effects[0]) == "0.93 in the chamber, 0.98 in the arm"
     # another name, or a group that leaves something open, is told by itself
     other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
     assert words.claim(seen(one, other)).count("the model leaves out") == 1
