@@ -471,8 +471,9 @@ class RigController(SampledController):
                 for name, first, last in zip(self.tracked, low, high, strict=True)
             )
             what = "angle" if rest_length is None else "length"
+            at_given = np.asarray(angle).tolist()
             raise ParameterError(
-                f"{what} = {angle!r} is not allowed: one number each is needed, {ends}"
+                f"{what} = {at_given} is not allowed: one number each is needed, {ends}"
             )
         return float(at.ravel()[0]) if joints == 1 else at.ravel()
 
