@@ -75,21 +75,22 @@ def checked_number(
         With name, value and what is allowed.
     """
     last = with_unit("", unit)
-    allowed = f"from {lower:g} to {upper:g}{last}"
+    kind = "whole" if whole else "finite"
+    allowed = f"{'a whole number ' * whole}from {lower:g} to {upper:g}{last}"
     if math.isinf(upper):
-        allowed = f"a finite number of {lower:g}{last} or more"
+        allowed = f"a {kind} number of {lower:g}{last} or more"
     try:
         if isinstance(value, (str, bytes, bytearray)):
             raise TypeError
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
-            f"{name} = {value!r} is not allowed: a number is needed, {allowed}"
+            f"{name} = {value!r} is not allowed: {'' if whole else 'a number is needed, '}{allowed}"
         ) from None
-    if not (math.isfinite(number) and lower <= number <= upper):
+    if not (math.isfinite(number) and lower <= number <= upper) or (
+        whole and not number.is_integer()
+    ):
         raise ParameterError(f"{name} = {number:g}{last} is not allowed: {allowed}")
-    if whole and not number.is_integer():
-        raise ParameterError(f"{name} = {number:g} is not allowed: a whole number is needed")
     return number
 
 

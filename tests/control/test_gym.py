@@ -337,3 +337,17 @@ def test_bad_input_is_named(call, word):
         env.step(np.array([math.nan]))
     with pytest.raises(ParameterError, match=r"action with the shape \(2,\)"):
         env.step(np.zeros(2))
+
+
+def test_a_trajectory_that_nothing_follows_is_refused():
+    mass = pamrs.rigs.named("hanging_mass")
+    with pytest.raises(ParameterError, match="goes to 0.6981 m, .*load.max_length = 0.28 m"):
+        gym_module.RigEnv(mass, trajectory=lift_hold_return(0.25, math.radians(40)))
+    with pytest.raises(ParameterError, match="goes to 60 rad.*degrees"):
+        gym_module.RigEnv(trajectory=lift_hold_return(20.0, 60.0))
+
+
+@pytest.mark.parametrize("num_envs", [pamrs.rigs.shoulder(), 0, 2.5, True])
+def test_a_vector_asks_how_many_first(num_envs):
+    with pytest.raises(ParameterError, match=r"num_envs = .* RigVectorEnv\(64, rig\)"):
+        gym_module.RigVectorEnv(num_envs)

@@ -395,7 +395,7 @@ def test_what_cannot_be_is_named(held):
         linearise(rig, initial={**start, controller.tracked[0]: start[controller.tracked[0]] + 0.1})
     with pytest.raises(ParameterError, match=r"point has no joint_angle\."):
         linear_controller(controller, {"joint_angle": 0.5})
-    with pytest.raises(ParameterError, match=r"angle = .*are needed"):
+    with pytest.raises(ParameterError, match=r"angle = .* one number each is needed, joint_angle"):
         controller.holding(np.zeros(len(controller.joints)) - 3.0)
     heavy = {
         name: 500.0 for name in rig.parameters if name.rpartition(".")[2] in ("payload", "mass")

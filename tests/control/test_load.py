@@ -27,7 +27,8 @@ from pamrs.control import (
 from pamrs.control.linear import linear_controller, linearise
 from pamrs.control.simulated_device import SimulatedDevice, VirtualClock
 from pamrs.control.stability import margins
-from pamrs.control.trajectories import cosine_cycles, step
+from pamrs.control.trajectories import cosine_cycles, lift_hold_return, step
+from pamrs.control.tuning import gain_map
 from pamrs.errors import ParameterError
 
 RIG = pamrs.rigs.named("hanging_mass")
@@ -210,7 +211,7 @@ def test_what_cannot_be_is_named():
         RigModel(RIG, torque="simplified")
     with pytest.raises(ParameterError, match="kind = 'neural'.*hanging mass"):
         MODEL.law("neural")
-    with pytest.raises(ParameterError, match=r"from \[0.18\] to \[0.28\]"):
+    with pytest.raises(ParameterError, match=r"^length = 0.3 .* from 0.18 to 0.28 m$"):
         whole.holding(0.3)
     with pytest.raises(ParameterError, match="no pressures hold length = 0.19"):
         whole.holding(0.19)
@@ -219,3 +220,61 @@ def test_what_cannot_be_is_named():
     with pytest.raises(ParameterError, match="rest_length = -1"):
         ARM.replace(rest_length=-1.0)
     assert math.isfinite(ARM.replace(mass=3.0).mass)
+
+
+def loops_of_a_length(trajectory):
+    """Every way to follow a trajectory by the length of the mass."""
+    pid = ByLength(PID(100.0, 50.0, period=PERIOD), RIG)
+    many = ByLength(PID(np.array([50.0, 100.0]), period=PERIOD), RIG)
+    own = RigController(MODEL, MODEL.law("sliding", period=PERIOD))
+    clock = VirtualClock()
+    device = SimulatedDevice(RIG, clock)
+    return [
+        lambda: closed_loop(RIG, pid, trajectory, 0.1),
+        lambda: closed_loop(RIG, own, trajectory, 0.1),
+        lambda: sweep(RIG, many, trajectory, 0.1, n=2),
+        lambda: run_live(device, pid, trajectory, 0.1, clock=clock),
+        lambda: run_live(device, own, trajectory, 0.1, clock=clock),
+    ]
+
+
+@pytest.mark.parametrize("end", [math.radians(20), math.radians(5), 25.0])
+@pytest.mark.parametrize("way", range(5))
+def test_an_angle_is_no_length(way, end):
+    told = rf"goes to {end:.4g} m, .*load.min_length = 0.18 m to load.max_length = 0.28 m.*\[m\]"
+    with pytest.raises(ParameterError, match=told):
+        loops_of_a_length(lift_hold_return(end, 0.25))[way]()
+
+
+def test_the_ends_of_the_stroke_are_lengths():
+    closed_loop(RIG, ByLength(PID(100.0, period=PERIOD), RIG), step(0.28, 0.18, duration=0.1))
+
+
+def test_a_map_of_gains_is_told_over_masses():
+    """The mass that hangs is the payload of a map; nu is in metres."""
+    lift = step(0.27, 0.25, duration=0.5)
+
+    def made(kp):
+        return ByLength(PID(kp, 50.0, period=PERIOD), RIG)
+
+    found = gain_map(RIG, made, {"kp": [100.0, 300.0]}, lift, payloads=[10.0, 20.0])
+    heavy = RIG.with_parameters({"load.mass": 20.0})
+    alone = sweep(heavy, made(np.array([100.0, 300.0])), lift, n=2)
+    np.testing.assert_array_equal(found.rms[1], alone.rms)
+    assert found.rms[0, 0] != found.rms[1, 0]
+    own = gain_map(RIG, made, {"kp": [100.0]}, lift)
+    assert own.payloads == [RIG.parameter("load.mass").value]
+    with pytest.raises(ParameterError, match="unit = 'deg' .* a length"):
+        gain_map(RIG, made, {"kp": [100.0]}, lift, unit="deg")
+
+
+def test_a_frame_and_a_chamber_say_why_nothing_follows():
+    rest = step(0.27, 0.25, duration=0.1)
+    for rig, told in (
+        (pamrs.rigs.bench(), "'bench'.*frame.*prescribes"),
+        (pamrs.rigs.sealed_chamber(), r"'sealed_chamber' has no \[muscle\]"),
+    ):
+        with pytest.raises(ParameterError, match=told):
+            gain_map(rig, PID, {"kp": [1.0]}, rest)
+        with pytest.raises(ParameterError, match=told):
+            closed_loop(rig, PID(1.0), rest)

@@ -169,7 +169,7 @@ def test_a_measured_room_is_that_of_the_rig() -> None:
     found = pamrs.diagnose(pamrs.Case("warm", NOZZLE, recordings, Path()))
     assert found.verdict == "none"
     (told,) = (text for text in found.warnings if text.startswith("gas.temperature is"))
-    assert told.startswith("gas.temperature is 320.0 K, as ambient_temperature was measured (293")
+    assert told.startswith("gas.temperature is 320 K, as ambient_temperature was measured (293")
     for own in json.loads(found.to_json())["data"]:
         assert "ambient_temperature" in own["used"]
         assert own["unused"] == {}
@@ -195,6 +195,17 @@ def test_one_temperature_holds_for_all_recordings() -> None:
     assert at_ambient(NOZZLE, [], SETTINGS.plausibility)[1] == []
 
 
+@pytest.mark.parametrize(
+    ("room", "told"),
+    [
+        (293.18, "is 293.18 K, as ambient_temperature was measured (to 0.1 K the rig file's)"),
+        (293.26, "is 293.26 K, as ambient_temperature was measured (293.15 K in the rig file)"),
+    ],
+)
+def test_temperatures_that_are_told_beside_each_other_differ(room: float, told: str) -> None:
+    assert told in room_of(room, rig=known_to(""))[1][0]
+
+
 @pytest.mark.parametrize("room", [210.0, 249.9, 330.1, 390.0, 500.0, 1900.0])
 def test_a_room_that_cannot_be_is_an_error(room: float) -> None:
     with pytest.raises(
@@ -208,7 +219,7 @@ def test_an_impossible_room_ends_a_diagnosis_unless_it_is_allowed() -> None:
     with pytest.raises(DiagnosisError, match=r"hold1 \(390.0 K\): no room has it"):
         pamrs.diagnose(hot)
     wider = SETTINGS.with_values({"plausibility.most_room": 400.0})
-    assert "gas.temperature is 390.0 K" in " ".join(pamrs.diagnose(hot, settings=wider).warnings)
+    assert "gas.temperature is 390 K" in " ".join(pamrs.diagnose(hot, settings=wider).warnings)
 
 
 def known_to(tolerance: str) -> pamrs.Rig:

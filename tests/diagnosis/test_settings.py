@@ -21,10 +21,11 @@ from pamrs.recordings import Recording
 ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 CONSTANTS = {
+    "prepare/_ambient.py": {"_SAME"},  # of temperatures that are told as one
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
     "next_experiment/_protocols.py": {"_LEAST_SHARE"},  # of the choked flow
-    "explain/_conditions.py": {"_MAP_CELLS"},  # of a picture
+    "explain/_conditions.py": {"_MAP_CELLS", "_ONE_SIDED"},  # of a picture and of words
     "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358
     "explain/_closure_words.py": {"_UNITS"},  # of sizes that are told
     "prove.py": {"TIMEOUT", "_POLL"},  # of processes

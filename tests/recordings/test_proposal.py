@@ -347,3 +347,43 @@ def test_a_room_that_is_named_is_proposed(tmp_path: Path, name: str, rig: pamrs.
     else:
         assert "temp_oil" not in found
         assert "not found in this log: valve_command" in told
+
+
+@pytest.mark.parametrize(
+    ("supply", "muscle", "suspected"),
+    [
+        (6.0, 11.0, {"muscle_pressure"}),  # within what the rig file has of its tank, not of this
+        (6.0, 5.5, set()),
+        (13.5, 11.0, set()),
+        (0.4, 11.0, set()),  # a gauge that is not connected tells nothing
+        (87.0, 70.0, {"supply_pressure", "muscle_pressure"}),  # both in psi
+    ],
+)
+def test_a_muscle_above_its_recorded_supply_is_suspected(
+    supply: float, muscle: float, suspected: set[str]
+) -> None:
+    """Whatever the rig file says that the tank once had."""
+    rig = pamrs.rigs.shoulder().with_parameters({"supply.initial_pressure": 13.8e5})
+    if supply > 20.0:
+        rig = rig.with_parameters({"supply.initial_pressure": 6e5})
+    channels = {
+        "supply_pressure": np.full(len(TIME), supply * BAR),
+        "muscle_pressure": np.maximum(1.1 * LIFT - 0.1, 0.0) * muscle * BAR,
+    }
+    found = suspicions(channels, dict.fromkeys(channels, "bar"), rig)
+    likely = {one.channel for one in found if one.likely == "psi"}
+    assert likely == suspected
+    for one in found:
+        if one.channel == "muscle_pressure" and one.likely == "psi":
+            assert "bar of the recorded supply" in one.text or supply > 20.0
+
+
+def test_channels_that_are_missing_are_explained(tmp_path: Path) -> None:
+    np.savez(tmp_path / "run.npz", **{"t": TIME, "p_muscle [bar]": VENTED})
+    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    told = next(text for text in item.remarks if text.startswith("not found in this log: "))
+    assert "valve_command (voltage of the valve)" in told
+    assert "joint_torque (torque of the muscles at the joint, by a torque sensor; not need" in told
+    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.bench()).logs
+    told = next(text for text in item.remarks if text.startswith("not found in this log: "))
+    assert told.endswith("force (pull of the muscles, by a load cell)")  # which a frame needs

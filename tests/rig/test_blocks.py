@@ -10,10 +10,12 @@ import pickle
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import pamrs
 from pamrs import cli, rigs
+from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig, load_rig, parse_rig
 from pamrs.rig.schema import BLOCKS, PORTS
@@ -621,3 +623,125 @@ def test_help_and_template_know_every_rig_and_key(
     ):
         assert words in text
     assert all(line.startswith("#") for line in text.splitlines())
+
+
+def test_a_bench_without_a_muscle_is_the_packaged_one() -> None:
+    assert same(rigs.bench(), rigs.named("bench"))
+    other = rigs.bench(name="mine")
+    assert (other.name, other.parameters) == ("mine", rigs.bench().parameters)
+
+
+@pytest.mark.parametrize("name", rigs.names())
+def test_every_packaged_rig_is_a_function_without_arguments(name: str) -> None:
+    assert same(getattr(rigs, name)(), rigs.named(name))
+    assert getattr(rigs, name)().cautions == []
+
+
+@pytest.mark.parametrize("name", ["tube", "long_tube", "sealed_chamber", "blow_down_tank"])
+def test_comments_on_coefficients_go_with_them(name: str) -> None:
+    said = "a fast change (1.4)" if "tube" in name else "keep"
+    with_them = rigs.template(name, gas="coefficients").partition("# Every key")[0]
+    without = rigs.template(name).partition("# Every key")[0]
+    assert with_them.count(said) > without.replace("# keeps mass", "").count(said) == 0
+
+
+def pulsed(valve: str) -> Rig:
+    """A chamber behind one valve that switches, with some keys of the valve in other words."""
+    keys = {
+        "flow": '"iso_6358"',
+        "fill_conductance": '{ value = 0.2, unit = "l/(s bar)" }',
+        "fill_critical_ratio": '{ value = 0.3, unit = "1" }',
+        "vent_conductance": '{ value = 0, unit = "l/(s bar)" }',
+        "vent_critical_ratio": '{ value = 0.3, unit = "1" }',
+        "null_voltage": '{ value = 0, unit = "V" }',
+        "half_range": '{ value = 24, unit = "V" }',
+        "area_fraction": "{ opening = [0, 1], fraction = [0, 1] }",
+        "spool": '"switching"',
+        "opening_delay": '{ value = 2.5, unit = "ms" }',
+        "closing_delay": '{ value = 1.5, unit = "ms" }',
+        "carrier_frequency": '{ value = 80, unit = "Hz" }',
+    }
+    keys |= dict(line.split(" = ", 1) for line in valve.splitlines() if line)
+    table = "\n".join(f"{key} = {value}" for key, value in keys.items() if value != "-")
+    return parse_rig(f"{stand('supply', 'chamber')}\n[valve]\n{table}\n")
+
+
+@pytest.mark.parametrize(
+    ("valve", "said"),
+    [
+        ("", []),
+        ('with_current = "vent"', ["valve never passes air", "vent_conductance = 0 m3/(s Pa)"]),
+        (
+            'with_current = "closed"\nwithout_current = "vent"',
+            ["valve never passes air", "without_current = 'vent'"],
+        ),
+        ('with_current = "closed"\nwithout_current = "fill"', []),
+        ('with_current = "either"', []),
+        (
+            "area_fraction = { opening = [0, 1], fraction = [0, 0] }",
+            ["valve never passes air", "fraction"],
+        ),
+        ('opening_delay = { value = 12.5, unit = "ms" }', ["opening_delay = 12.5 ms", "duty of 1"]),
+        ('closing_delay = { value = 20, unit = "ms" }', ["closing_delay = 20 ms", "duty of 0"]),
+        (
+            'opening_delay = { value = 11.5, unit = "ms" }',
+            ["= 13 ms", "open and close in a period"],
+        ),
+        ('opening_delay = { value = 20, unit = "ms" }\ncarrier_frequency = -', []),
+        (
+            'spool = "ideal"\nopening_delay = -\nclosing_delay = -\ncarrier_frequency = -\n'
+            'fill_conductance = { value = 0, unit = "l/(s bar)" }',
+            ["valve never passes air", "fill_conductance = 0", "vent_conductance = 0"],
+        ),
+    ],
+)
+def test_valves_that_never_act_are_told(
+    valve: str, said: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = pulsed(valve)
+    assert len(rig.cautions) == bool(said)
+    assert all(part in rig.cautions[0] for part in said)
+    file = rig.to_toml(tmp_path / "rig.toml")
+    assert cli.main(["rig", "check", str(file)]) == 0  # possible, and told
+    out = capsys.readouterr().out.splitlines()
+    assert [line for line in out if line.startswith("warning: ")] == [
+        f"warning: {text}" for text in rig.cautions
+    ]
+
+
+def test_a_delay_as_long_as_the_period_opens_at_a_whole_duty_alone() -> None:
+    rig = pulsed('opening_delay = { value = 15, unit = "ms" }')
+    ends = []
+    for duty in (0.99, 1.0):
+        command = np.full(101, 24.0 * duty)
+        command[:20] = 0.0
+        ends.append(pamrs.simulate(rig, command, sample_time=0.005)["muscle_pressure"][-1])
+    assert ends[0] == 0.0
+    assert ends[1] > 5e5
+
+
+def test_rig_check_shows_the_effects_parameters_with_their_bounds(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rig = rigs.antagonistic_joint()
+    rig = rig.with_effect(
+        "leak_muscle", {"conductance": 5e-11}, std={"conductance": 1e-12}, at="flexor"
+    )
+    file = rig.to_toml(tmp_path / "rig.toml")
+    assert cli.main(["rig", "check", str(file)]) == 0
+    out = capsys.readouterr().out.splitlines()
+    own = next(line for line in out if line.startswith("leak_muscle.flexor.conductance "))
+    bounds = next(p for p in EFFECTS["leak_muscle"].parameters if p.name == "conductance")
+    assert own.split(maxsplit=1)[1] == (
+        f"5e-11 ± 1e-12 m3/(s Pa); allowed from {bounds.lower:g} to {bounds.upper:g} m3/(s Pa)"
+    )
+    assert out[-1].endswith("1 effect")
+
+
+@pytest.mark.parametrize(("value", "shown"), [("257", "257"), ("-1", "-1"), ("2.5", "2.5")])
+def test_a_count_asks_for_a_whole_number(value: str, shown: str) -> None:
+    words = f"line.segments = {shown} is not allowed: a whole number from 0 to 256"
+    text = stand("supply", "chamber", "line from=supply to=chamber")
+    assert words in refused(text.replace("[line]", f"[line]\nsegments = {value}"))
+    with pytest.raises(ParameterError, match=words):
+        rigs.named("long_tube").with_parameters({"line.segments": float(value)})

@@ -68,3 +68,21 @@ def test_what_no_other_process_finds_is_refused(tmp_path, controller, trajectory
             trajectory,
             store=tmp_path / "out.zarr",
         )
+
+
+def test_a_gain_without_its_prefix_and_a_length_are_told(tmp_path):
+    rig = pamrs.rigs.hanging_mass()
+    kept = {"store": tmp_path / "out.zarr", "progress": False}
+    with pytest.raises(pamrs.ParameterError, match="'kp': a gain is called 'gain.kp'"):
+        sweeps.gain_map(rig, control.PID, {"kp": [1.0]}, LIFT, **kept)
+    lift = trajectories.step(0.27, 0.25, duration=0.2)
+    found = sweeps.gain_map(rig, by_length, {"gain.kp": [50.0, 100.0]}, lift, **kept)
+    assert found["squared_error"].attrs["units"] == "m2 s"
+    assert found["rms"].attrs["units"] == "m"
+    bench, own = pamrs.rigs.bench(), {**kept, "store": tmp_path / "bench.zarr"}
+    with pytest.raises(pamrs.ParameterError, match="frame, which prescribes"):
+        sweeps.gain_map(bench, control.PID, {"gain.kp": [1.0]}, lift, **own)
+
+
+def by_length(kp):
+    return control.ByLength(control.PID(kp, period=0.005), pamrs.rigs.hanging_mass())

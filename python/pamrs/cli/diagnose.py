@@ -50,7 +50,7 @@ def diagnose_command(
     ] = None,
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[
-        Path | None, typer.Option(help="Write the rig with the named effect in it.")
+        Path | None, typer.Option(help="Write the model: the rig with what was found in it.")
     ] = None,
     experiment: Annotated[
         Path | None,

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from pamrs import rigs
 from pamrs.cli._shared import rig_named
 from pamrs.units import with_unit
+
+if TYPE_CHECKING:
+    from pamrs.rig import Rig
 
 __all__ = ["rig_app"]
 
@@ -22,7 +25,9 @@ def _rig_check(
         Path, typer.Argument(help="Rig file (TOML), or the name of a rig of the package.")
     ],
 ) -> None:
-    """Check a rig file, say what is connected to what, and list its parameters in SI units."""
+    """Check a rig file, say what is connected to what, and list its parameters, and those of its
+    effects with their bounds, in SI units; what is possible and hardly meant is a warning.
+    """
     from pamrs.simulation import core_rig
 
     rig = rig_named(file)
@@ -31,15 +36,45 @@ def _rig_check(
     core_rig(rig)
     for line in rig.wiring:
         typer.echo(line)
-    width = max((len(name) for name in rig.parameters), default=0)
+    shown = {}
     for name, parameter in rig.parameters.items():
         known = f"{parameter.value:.6g}" if parameter.known else "unknown"
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
-        typer.echo(with_unit(f"{name:<{width}}  {known}{spread}", parameter.unit))
+        shown[name] = with_unit(f"{known}{spread}", parameter.unit)
+    shown |= _of_effects(rig)
+    width = max(map(len, shown), default=0)
+    for name, text in shown.items():
+        typer.echo(f"{name:<{width}}  {text}")
+    for caution in rig.cautions:
+        typer.echo(f"warning: {caution}")
+    count = len(rig.effects)
     typer.echo(
-        f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {len(rig.effects)} "
-        "effects"
+        f"{file}: rig {rig.name!r} is valid, {len(rig.parameters)} parameters, {count} "
+        f"effect{'s' * (count != 1)}"
     )
+
+
+def _of_effects(rig: Rig) -> dict[str, str]:
+    """Value, standard deviation and bounds of every parameter of the effects, by its name in
+    full.
+    """
+    if not rig.effects:
+        return {}
+    from pamrs.effects import info_of
+    from pamrs.rig.schema import qualified
+
+    shown = {}
+    several = [entry["id"] for entry in rig.effects]
+    for entry in rig.effects:
+        own = entry["id"]
+        full = qualified(own, entry.get("at", ""))
+        spread = rig.effect_std.get(own if several.count(own) == 1 else full, {})
+        for p in info_of(own).form(entry.get("form", "")).parameters:
+            value = f"{entry['parameters'][p.name]:.6g}"
+            std = f" ± {spread[p.name]:.3g}" if spread.get(p.name) else ""
+            bounds = with_unit(f"{p.lower:g} to {p.upper:g}", p.unit)
+            shown[f"{full}.{p.name}"] = f"{with_unit(value + std, p.unit)}; allowed from {bounds}"
+    return shown
 
 
 @rig_app.command("new")

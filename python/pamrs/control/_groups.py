@@ -124,6 +124,47 @@ def joints_of(rig: Rig) -> tuple[str, ...]:
     return tuple(_short(ports["joint"]) for ports in links.values())
 
 
+def lengths_of(rig: Rig) -> tuple[float, float] | None:
+    """Shortest and longest length of the muscles of a mass that hangs [m]; None where none hangs.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    tuple of (float, float) or None
+    """
+    for load in rig.tables("load").values():
+        if load.get("kind", "mass") == "mass":
+            return float(load["min_length"]), float(load["max_length"])
+    return None
+
+
+def payload_of(rig: Rig) -> str:
+    """Dotted name of the mass that a rig lifts: the payload of the arm, or of the last link, or the
+    mass that hangs.
+
+    Parameters
+    ----------
+    rig : Rig
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    ParameterError
+        As :func:`joints_of`.
+    """
+    joints_of(rig)
+    if rig.tables("load"):
+        return "load.mass"
+    links = list(rig.ports("link"))
+    return f"{named('link', links[-1])}.payload" if links else "arm.payload"
+
+
 def groups_of(rig: Rig) -> tuple[Group, ...]:
     """The groups of muscles of a rig, in the order of its chambers.
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from pamrs.control._groups import highest_pressure, joints_of
+from pamrs.control._groups import highest_pressure, joints_of, lengths_of
 from pamrs.control._model import JointModel, Parameter
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import SampledController
@@ -201,6 +201,8 @@ class ByLength(SampledController):
             )
         joints_of(rig)
         self.rest_length, self.controller = rest_length_of(rig), controller
+        #: Shortest and longest length that the mass can have [m].
+        self.lengths = lengths_of(rig)
         self.answers = controller.answers
         super().__init__(controller.period, parts=(controller,))
         self.reset()

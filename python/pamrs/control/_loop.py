@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, rate_of, unit_of
+from pamrs.control._groups import joints_of, lengths_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control.metrics import Metrics, evaluate
-from pamrs.control.trajectories import JointTrajectories, Trajectory, check_angles
+from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_samples
@@ -255,10 +256,6 @@ def closed_loop(
     total = whole_samples(
         "duration", wanted_of.duration if duration is None else duration, dt, least=1
     )
-    for one in (
-        wanted_of.of_joint.values() if isinstance(wanted_of, JointTrajectories) else [wanted_of]
-    ):
-        check_angles(one, total * dt)
     if not math.isfinite(start):
         raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
@@ -267,6 +264,8 @@ def closed_loop(
     )  # a restart at the same float
     alias = measured_by(controller, measured)
     tracked = _angles(simulator.rig, controller, alias)
+    by_length = tracked[0] == "length"
+    check_reach(wanted_of, total * dt, lengths_of(simulator.rig) if by_length else None)
     names = _recorded(simulator.rig, channels, tracked)
     read = reader_of(sensors, controller.period)
     if reset:
@@ -500,9 +499,15 @@ def actuation_of(rig: Rig, controller: Controller) -> Actuation:
     found = [name for name in inputs if name.startswith("valve_command")] or [
         n for n in inputs if n.startswith("supply_command")
     ]
+    if not found:
+        joints_of(rig)  # what is no arm and no mass says so
+        raise ParameterError(
+            f"the rig {rig.name!r} has no valve and no regulator that a command drives; it has the "
+            f"inputs {', '.join(inputs) or 'none'}"
+        )
     if len(found) != 1:
         raise ParameterError(
-            f"the rig {rig.name!r} has the inputs {', '.join(inputs) or 'none'}: "
+            f"the rig {rig.name!r} has the inputs {', '.join(inputs)}: "
             "give actuation, from one command to the keywords of Simulator.step"
         )
     kind = channel_of(found[0])

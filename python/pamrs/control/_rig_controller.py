@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from pamrs.channels import unit_of
 from pamrs.control._air import AirModel
 from pamrs.control._at_rest import resting
-from pamrs.control._groups import Group, named
+from pamrs.control._groups import Group, lengths_of, named
 from pamrs.control._load import shortened
 from pamrs.control._protocol import (
     Controller,
@@ -188,6 +188,8 @@ class RigController(SampledController):
         self._number = {name: k for k, name in enumerate(model.joints)}
         # a mass is followed by its length, and the law is told the shortening
         self._rest_length = getattr(model.arm, "rest_length", None)
+        #: Shortest and longest length that a hanging mass can have [m]; None for joints.
+        self.lengths = lengths_of(model.rig)
         self._channels = self._named_channels()
         #: Channels of the joints that are tracked, base first.
         self.tracked = tuple(self._channels[0])
@@ -462,10 +464,16 @@ class RigController(SampledController):
             at = rest_length - at
         low, high = (np.broadcast_to(end, joints) for end in self.model.arm.angle_range)
         if at.size != joints or not np.all((low <= at.ravel()) & (at.ravel() <= high)):
-            ends = (low, high) if rest_length is None else (rest_length - high, rest_length - low)
+            if rest_length is not None:
+                low, high = rest_length - high, rest_length - low
+            ends = "; ".join(
+                f"{name} from {first:.4g} to {last:.4g} {unit_of(name)}"
+                for name, first, last in zip(self.tracked, low, high, strict=True)
+            )
+            what = "angle" if rest_length is None else "length"
+            at_given = np.asarray(angle).tolist()
             raise ParameterError(
-                f"angle = {angle!r} is not allowed: {joints} from {ends[0].tolist()} to "
-                f"{ends[1].tolist()} are needed"
+                f"{what} = {at_given} is not allowed: one number each is needed, {ends}"
             )
         return float(at.ravel()[0]) if joints == 1 else at.ravel()
 

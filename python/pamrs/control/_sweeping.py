@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs.control._groups import lengths_of
 from pamrs.control._loop import Actuation, actuation_of, measured_by, tracked_of
 from pamrs.control._protocol import Controller, check_controller
 from pamrs.control._sensors import Reader, Sensors, reader_of
 from pamrs.control._values import angle_factor
 from pamrs.control.metrics import slope_sine
-from pamrs.control.trajectories import Trajectory, check_angles
+from pamrs.control.trajectories import Trajectory, check_reach
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import default_step, whole_samples
@@ -144,7 +145,6 @@ def sweep(
     total = whole_samples(
         "duration", trajectory.duration if duration is None else duration, dt, least=1
     )
-    check_angles(trajectory, total * dt)
     act = actuation_of(batch.rigs[0], controller) if actuation is None else actuation
     read = reader_of(sensors, period)
     controller.reset()
@@ -155,6 +155,13 @@ def sweep(
         )
     alias = measured_by(controller, measured)
     angle, rate = tracked_of(batch.rigs[0], alias)
+    by_length = angle == "length"
+    if by_length and unit != "rad":
+        raise ParameterError(
+            f"unit = {unit!r} is not allowed where a length is followed: nu and omega are those of "
+            "metres, and unit is left out"
+        )
+    check_reach(trajectory, total * dt, lengths_of(batch.rigs[0]) if by_length else None)
     sums = _Sums(len(batch), factor)
     k = 0
 

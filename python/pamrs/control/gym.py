@@ -39,7 +39,7 @@ from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import keywords_of
 from pamrs.control._values import positive_number
-from pamrs.control.trajectories import JointTrajectories, Trajectory, lift_hold_return
+from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach, lift_hold_return
 from pamrs.errors import ParameterError, SimulationError, missing_package
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator, core_rig
@@ -173,14 +173,21 @@ class _Task:
         if isinstance(trajectory, JointTrajectories):
             trajectory = trajectory.of_joint
         names = [one.name for one in self.moved]
-        if trajectory is None or (isinstance(trajectory, Trajectory) and len(names) == 1):
+        if trajectory is None:
+            return None
+        if isinstance(trajectory, Trajectory) and len(names) == 1:
+            one = self.moved[0]
+            lengths = (one.low, one.high) if one.angle == "length" else None
+            check_reach(trajectory, trajectory.duration, lengths)
             return trajectory
         if not isinstance(trajectory, Mapping) or sorted(trajectory) != sorted(names):
             raise ParameterError(
                 "trajectory is not allowed: a mapping of "
                 f"{', '.join(map(repr, names))} to a trajectory each is needed"
             )
-        return JointTrajectories({name: trajectory[name] for name in names})
+        every = JointTrajectories({name: trajectory[name] for name in names})
+        check_reach(every, every.duration)
+        return every
 
     def _commands(self, limit: float | None) -> tuple[Array, Array, float]:
         """Middle and half range of every command, and the largest pressure [Pa]."""
@@ -472,6 +479,12 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
         _check_render_mode(render_mode)
         self.render_mode = None
+        whole = isinstance(num_envs, (int, np.integer)) and not isinstance(num_envs, bool)
+        if not whole or num_envs < 1:
+            raise ParameterError(
+                f"num_envs = {num_envs!r} is not allowed: a whole number of rigs, 1 at least, is "
+                "needed; the rig comes behind it, RigVectorEnv(64, rig)"
+            )
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
         self.num_envs = num_envs

@@ -25,7 +25,7 @@ from pamrs.control._live_commands import Command, LiveCommands, pair
 from pamrs.control._loop import trajectories_of
 from pamrs.control._protocol import Controller, Reference, check_controller
 from pamrs.control._termination import Termination
-from pamrs.control.trajectories import JointTrajectories, Trajectory, check_angles
+from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.simulation import whole_samples
 
@@ -291,9 +291,8 @@ class _Loop:
             self.period,
             least=1,
         )
-        of_joint = getattr(self.trajectory, "of_joint", {"": self.trajectory})
-        for one in of_joint.values():
-            check_angles(one, self.total * self.period)
+        lengths = getattr(controller, "lengths", None)
+        check_reach(self.trajectory, self.total * self.period, lengths)
         self.k = 0
         self.held = self.commands.safe
         self.last: Mapping[str, float] | None = None

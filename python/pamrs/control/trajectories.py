@@ -28,7 +28,7 @@ __all__ = [
     "TABLE_5_1",
     "JointTrajectories",
     "Trajectory",
-    "check_angles",
+    "check_reach",
     "compound",
     "cosine_cycles",
     "degrees",
@@ -45,6 +45,8 @@ TABLE_5_1 = ((20.0, 0.70), (13.0, 0.95), (7.0, 1.55), (5.0, 0.80))
 
 #: No joint of a rig turns farther either way [rad].
 MOST_ANGLE = 7.0
+_ROUNDED = 1e-9
+"""A length that is beyond its range by less is at its end [m]."""
 
 
 class _Shape(Protocol):
@@ -303,21 +305,43 @@ def degrees(*values: float) -> tuple[float, ...]:
     return tuple(math.radians(value) for value in values)
 
 
-def check_angles(trajectory: Trajectory, duration: float) -> None:
-    """Refuse a reference that no joint can follow: degrees given for radians, most of the time.
+def check_reach(
+    trajectory: Trajectory | JointTrajectories,
+    duration: float,
+    lengths: tuple[float, float] | None = None,
+) -> None:
+    """Refuse a reference that nothing can follow: degrees given for radians, or an angle for a
+    length, most of the time.
 
     Parameters
     ----------
-    trajectory : Trajectory
+    trajectory : Trajectory or JointTrajectories
     duration : float
         How much of it is looked at [s].
+    lengths : (float, float), optional
+        Shortest and longest length [m] of a mass that hangs, where that is what follows.
 
     Raises
     ------
     ParameterError
-        If an angle is beyond 7 rad either way.
+        If an angle is beyond 7 rad either way, or a length outside its range.
     """
-    largest = float(np.max(np.abs(trajectory(np.linspace(0.0, duration, 257)).angle)))
+    if isinstance(trajectory, JointTrajectories):
+        for one in trajectory.of_joint.values():
+            check_reach(one, duration)
+        return
+    wanted = np.asarray(trajectory(np.linspace(0.0, duration, 257)).angle, dtype=np.float64)
+    if lengths is not None:
+        low, high = lengths
+        worst = float(wanted[np.argmax(np.maximum(low - wanted, wanted - high))])
+        if not low - _ROUNDED <= worst <= high + _ROUNDED:
+            raise ParameterError(
+                f"the trajectory goes to {worst:.4g} m, and the lengths that the hanging mass can "
+                f"have go from load.min_length = {low:.4g} m to load.max_length = {high:.4g} m: "
+                "its reference is the length of the muscle [m], no angle"
+            )
+        return
+    largest = float(np.max(np.abs(wanted)))
     if largest > MOST_ANGLE:
         raise ParameterError(
             f"the trajectory goes to {largest:.4g} rad, and {MOST_ANGLE:g} rad either way is "

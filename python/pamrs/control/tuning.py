@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.control._groups import payload_of
 from pamrs.control._protocol import Controller
 from pamrs.control._sweeping import sweep
 from pamrs.control.metrics import WEIGHTS, combined
@@ -173,7 +174,8 @@ def gain_map(
         Values of each gain.
     trajectory : Trajectory
     payloads : sequence of float, optional
-        ``arm.payload`` [kg]; the plant's own by default. The controller is told none of them.
+        ``arm.payload`` [kg], that of the last link, or the mass that hangs; the plant's own by
+        default. The controller is told none of them.
     weights : (float, float)
         Of (4.18).
     unit : {"rad", "deg"}
@@ -200,8 +202,9 @@ def gain_map(
                 f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n "
                 ">= 1, are needed"
             )
+    payload = payload_of(plant)
     masses = (
-        np.array([plant.parameter("arm.payload").value])
+        np.array([plant.parameter(payload).value])
         if payloads is None
         else np.asarray(payloads, dtype=np.float64)
     )
@@ -214,7 +217,7 @@ def gain_map(
         for name, values in zip(grid, points, strict=True)
     }
     loaded = [
-        plant if payloads is None else plant.with_parameters({"arm.payload": float(mass)})
+        plant if payloads is None else plant.with_parameters({payload: float(mass)})
         for mass in masses
     ]
     rigs = [rig for rig in loaded for _ in range(points[0].size)]

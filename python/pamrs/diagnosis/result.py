@@ -112,8 +112,8 @@ class Diagnosis(Findings):
     unexplained : list of Unexplained
         Blocks with a mismatch that stays unexplained: ``block``, ``channel``, ``unit``, ``noises``,
         ``size`` (SI), the ``verdict`` of their group, its ``share`` of the budget with
-        ``interval``, the ``conditions`` under which it is largest, and the ``form`` that carries
-        over, in words.
+        ``interval``, the ``conditions`` under which it is largest, the ``form`` that carries
+        over, in words, and the ``role`` of the recordings that show it.
     free_run : list of FreeRun or None
         The whole rig simulated from its commands alone, for each held-out recording (each fitted
         one where none was held out): ``recording``, ``role``, ``seconds``, ``channels`` {channel:
@@ -282,13 +282,14 @@ class Diagnosis(Findings):
     def _summary_budget(self) -> list[str]:
         """What takes the mismatch of each block."""
         lines = []
-        for block, own in words.budgets(self).items():
-            told = (
-                f"Budget of the {words.spoken_name(block)}: {words.budget_sentence(own)}".translate(
-                    _ASCII
-                )
-            )
+        for block, sentence in words.budget_sentences(self):
+            told = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
             lines += textwrap.wrap(told, 96, subsequent_indent="  ")
+        # where parameters alone take all there is nothing to read wrongly
+        shares = [t for t in self.budget if t.kind != "unexplained"]
+        plain = all(t.kind == "parameters" and 0.0 <= t.share <= 1.0 for t in shares)
+        note = "" if plain else f"({words.BUDGET_NOTE})"
+        lines += textwrap.wrap(note, 96, initial_indent="  ", subsequent_indent="  ")
         return ["", *lines] if lines else []
 
     def _summary_data(self) -> list[str]:
@@ -330,7 +331,10 @@ class Diagnosis(Findings):
             lines.append(row)
         gap = self.fit.gap_closed
         if words.is_number(gap):
-            lines.append(f"gap to the noise closed on {self.proof}: {100 * float(gap):.0f} %")
+            lines.append(
+                f"gap to the noise closed over all channels, on {self.proof}: "
+                f"{100 * float(gap):.0f} %"
+            )
         return lines
 
     def report(self, path: str | os.PathLike[str]) -> Path:
@@ -376,7 +380,8 @@ class Diagnosis(Findings):
         )
         gap = self.fit.gap_closed
         closed = (
-            f"<p>{100 * float(gap):.0f} % of the gap to the noise closed on {self.proof}.</p>"
+            f"<p>{100 * float(gap):.0f} % of the gap to the noise closed over all channels, on "
+            f"{self.proof}.</p>"
             if words.is_number(gap)
             else ""
         )

@@ -285,6 +285,8 @@ class Unexplained(Entry):
         Under which it is largest, the most telling first.
     form : str
         What it is a function of, in words, where such a form carries over to other recordings.
+    role : str
+        Of the recordings that its size is of: ``held_out`` or ``fit``.
     """
 
     block: str
@@ -307,6 +309,10 @@ class Unexplained(Entry):
         metadata=told(
             "what it is a function of, in words, where that carries over to other recordings"
         ),
+    )
+    role: str = field(
+        default="",
+        metadata=told("of the recordings that its size is of: held_out or fit", required=False),
     )
 
 

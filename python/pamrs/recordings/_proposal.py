@@ -272,7 +272,8 @@ def _proposal(
     remarks += _suspect(matches, rig)
     missing = [name for name in wanted if name not in times and channel_of(name) not in SLOW]
     if missing and rig is not None:
-        remarks.append(f"not found in this log: {', '.join(missing)}")
+        told = ", ".join(_spoken(name, rig) for name in missing)
+        remarks.append(f"not found in this log: {told}")
     stepped = [times[m.channel] for m in matches if not m.hold and times[m.channel] is not None]
     split, parts = _split(log, stepped[0] if stepped else None)
     listed = [
@@ -280,6 +281,30 @@ def _proposal(
         for series in log.series.values()
     ]
     return LogProposal(log, listed, matches, shared, split, parts, remarks)
+
+
+_SENSORS: Final = {
+    "valve_command": "voltage of the valve",
+    "supply_command": "set pressure of the regulator",
+    "supply_pressure": "pressure in the tank or behind the regulator",
+    "line_pressure": "pressure between valve and hose",
+    "muscle_pressure": "pressure in the muscle or its chamber",
+    "joint_angle": "angle of the joint",
+    "length": "length of the muscle",
+    "force": "pull of the muscles, by a load cell",
+    "joint_torque": "torque of the muscles at the joint, by a torque sensor",
+}
+"""What is measured on each channel that a rig can have."""
+_EXTRA: Final = ("line_pressure", "force", "joint_torque")
+"""Channels that few stands have, and that only tell one block from the next; but for a frame."""
+
+
+def _spoken(channel: str, rig: Rig) -> str:
+    """A channel, what it measures, and whether a case can do without it."""
+    kind = channel_of(channel)
+    frames = [t for t in rig.tables("load").values() if t.get("kind", "mass") == "frame"]
+    extra = kind in _EXTRA and not (kind == "force" and frames)
+    return f"{channel} ({_SENSORS[kind]}{'; not needed, tells blocks apart' * extra})"
 
 
 def _like_a_clock(series: Series) -> bool:

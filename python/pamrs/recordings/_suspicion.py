@@ -25,6 +25,7 @@ _LOW: Final = 0.005
 _HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
 _RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
 _OVER: Final = 1.15  # a muscle beside what feeds it
+_CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gauge is believed
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
@@ -115,7 +116,7 @@ def suspicions(
         if not unit or not np.isfinite(values).any():
             continue
         if kind in PRESSURES:
-            found += _pressure(name, unit, channels, rig)
+            found += _pressure(name, unit, channels, said, rig)
         elif kind in ("temperature", "ambient_temperature"):
             found += _temperature(name, unit, values)
         elif kind in ("joint_angle", "length"):
@@ -132,12 +133,44 @@ def _other(values: Array | float, said: str, other: str) -> Array | float:
 # ---------------------------------------------------------------------- pressures
 
 
-def _fed_by(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[float, str] | None:
-    """The pressure that a channel is judged by, and what it is.
+def _fed_by(
+    name: str, channels: Mapping[str, Array], said: Mapping[str, str], rig: Rig | None
+) -> tuple[float, str] | None:
+    """The pressure that a channel is judged by, and what it is: of a muscle or a line the lower one
+    of what was recorded of its supply and what the rig file or a command says of it.
 
     A regulator may be set to anything: its largest command says how far, and nothing does where
     that was not recorded.
     """
+    rated = _rated(name, channels, rig)
+    if channel_of(name) == "supply_pressure":
+        return rated
+    recorded = _recorded_supply(channels, said, rig)
+    if rated is None:
+        return (recorded, "the recorded supply") if recorded > 0.0 else None
+    # a gauge that is not connected tells nothing of what it should measure
+    if _CONNECTED * rated[0] < recorded < rated[0]:
+        return recorded, "the recorded supply"
+    return rated
+
+
+def _recorded_supply(
+    channels: Mapping[str, Array], said: Mapping[str, str], rig: Rig | None
+) -> float:
+    """The highest recorded pressure of a supply, in the unit that is likelier; 0 without one."""
+    tops = [0.0]
+    for name, values in channels.items():
+        if channel_of(name) != "supply_pressure":
+            continue
+        tops.append(top_of(values))
+        unit = said.get(name, "")
+        for wrong in _pressure(name, unit, channels, said, rig) if unit else ():
+            tops[-1] = float(_other(tops[-1], unit, wrong.likely))
+    return max(tops)
+
+
+def _rated(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[float, str] | None:
+    """What the rig file, or the command of a regulator, says of a supply."""
     rated: list[tuple[float, str]] = []
     for block, table in (rig.tables("supply") if rig else {}).items():
         if channel_of(name) == "supply_pressure" and dotted("supply_pressure", block) != name:
@@ -147,21 +180,19 @@ def _fed_by(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[
             rated.append((float(table["initial_pressure"]), "the supply of the rig file"))
         elif command is not None:
             rated.append((top_of(command), "the largest command of the regulator"))
-    if rated and max(rated)[0] > 0.0:
-        return max(rated)
-    if channel_of(name) != "supply_pressure":
-        tops = [top_of(v) for key, v in channels.items() if channel_of(key) == "supply_pressure"]
-        if tops and max(tops) > 0.0:
-            return max(tops), "the recorded supply"
-    return None
+    return max(rated) if rated and max(rated)[0] > 0.0 else None
 
 
 def _pressure(
-    name: str, unit: str, channels: Mapping[str, Array], rig: Rig | None
+    name: str,
+    unit: str,
+    channels: Mapping[str, Array],
+    said: Mapping[str, str],
+    rig: Rig | None,
 ) -> Iterator[Suspicion]:
     values = channels[name]
     top = top_of(values)
-    beside = _fed_by(name, channels, rig)
+    beside = _fed_by(name, channels, said, rig)
     supply = channel_of(name) == "supply_pressure"
     reference, what = beside or (_HIGHEST, "what pneumatic muscles take")
     least = _RATED[0] if supply and beside else 0.0

@@ -29,6 +29,7 @@ from pamrs.report.text import (
     is_named,
     is_number,
     label,
+    noise_alone,
     ranked_probabilities,
     spoken_name,
     term_label,
@@ -423,12 +424,12 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
         figure = Figure(figsize=(7.2, 0.5 + 0.3 * rows + 0.45 * len(blocks)), layout="constrained")
         panels = figure.subplots(len(blocks), 1, squeeze=False, height_ratios=heights)[:, 0]
         for axes, (block, own) in zip(panels, blocks.items(), strict=True):
-            _draw_budget(axes, block, own)
+            _draw_budget(axes, block, own, noise_only=noise_alone(diagnosis, block))
         panels[-1].set_xlabel("share of the nominal model's excess over the noise [%]")
         return svg_text(figure, prefix)
 
 
-def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
+def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm], *, noise_only: bool) -> None:
     colours = {
         "held": COLOURS["refit"],
         "parameters": COLOURS["quiet"],
@@ -453,7 +454,7 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm]) -> None:
         if not rest:
             side = max(side, *ends)
         _beside(axes, side, row, format_share(term.share))
-        names.append(term_label(term))
+        names.append("left, no more than noise" if rest and noise_only else term_label(term))
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     low, high = min(reached), max(reached)

@@ -381,7 +381,7 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
         facts.append(
             (
                 f"{100 * float(gap):.0f} %".replace("-", "−"),
-                f"of the gap to the noise closed on {diagnosis.proof}",
+                f"of the gap to the noise closed over all channels on {diagnosis.proof}",
             )
         )
     if diagnosis.where.block:
@@ -482,9 +482,10 @@ def render(diagnosis: Findings) -> str:
         effects=_effects(diagnosis),
         verdicts=_blocks(diagnosis),
         budget=_markup(figures.budget_svg(diagnosis)),
+        budget_note=words.BUDGET_NOTE,
         budgets=[
-            f"{words.spoken_name(block)}: {words.budget_sentence(own)}"
-            for block, own in words.budgets(diagnosis).items()
+            f"{words.spoken_name(block)}: {sentence}"
+            for block, sentence in words.budget_sentences(diagnosis)
         ],
         wrong=_wrong(diagnosis),
         kept=[words.kept_details(u) for u in diagnosis.unexplained],

@@ -26,7 +26,9 @@ from pamrs.units import with_unit
 
 __all__ = [
     "blocks_label",
+    "BUDGET_NOTE",
     "budget_sentence",
+    "budget_sentences",
     "budgets",
     "chance_of",
     "claim",
@@ -40,6 +42,7 @@ __all__ = [
     "format_probability",
     "format_share",
     "format_uncertain",
+    "gap_sentence",
     "headline",
     "hypothesis_label",
     "is_named",
@@ -51,6 +54,7 @@ __all__ = [
     "leading",
     "moved_parameters",
     "name_chance",
+    "noise_alone",
     "ranked_probabilities",
     "sentence_of",
     "set_label",
@@ -75,6 +79,14 @@ _LABELS = {
 SETTLED = 0.75
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
 settled, `VerdictSettings.settled`)."""
+
+BUDGET_NOTE = (
+    "A share is of the variance beyond the noise that the nominal model leaves: what a term takes, "
+    "averaged over two orders of adding them, with the values of the final model, so that "
+    "parameters refitted by themselves take another share. Below 0 % a term makes it worse by "
+    "itself, and others then take more than 100 %."
+)
+"""What the shares of a budget are."""
 
 _INSTRUCTION = 40
 """Characters that two texts share at least before they are said to begin with one instruction."""
@@ -283,8 +295,8 @@ def considered_sentence(own: Considered) -> str:
 
 
 def kept_sentence(kept: Unexplained) -> str:
-    """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg), and
-    no listed effect explains it``.
+    """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
+    held-out recordings, and no listed effect explains it``.
     """
     unit, factor = display_unit(kept.unit, abs(kept.size))
     size = format_number(kept.size * factor, 2, unicode=False)
@@ -294,9 +306,10 @@ def kept_sentence(kept: Unexplained) -> str:
         else "what is named does not explain it"
     )
     times = format_number(kept.noises, 2, unicode=False)
+    on = {"held_out": " on held-out recordings", "fit": " on the fitted recordings"}
     return (
         f"the residual of the {spoken_name(kept.block)} is {times} times the noise level ({size} "
-        f"{unit}), and {why}"
+        f"{unit}){on.get(kept.role, '')}, and {why}"
     ).replace("°", "deg")
 
 
@@ -407,9 +420,22 @@ def claim(diagnosis: Findings) -> str:
     doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
     if not named and not doubtful:
         return _unnamed(diagnosis)
-    found = [_found(diagnosis, block) for block in sorted(named, key=lambda b: not b.effects)]
+    found = [
+        _found(diagnosis, *blocks) for blocks in _alike(sorted(named, key=lambda b: not b.effects))
+    ]
     text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
     return text[:1].upper() + text[1:]
+
+
+def _alike(blocks: Sequence[BlockVerdict]) -> list[list[BlockVerdict]]:
+    """Groups of blocks that name the same and leave nothing else open, side by side: one cause that
+    several groups see (an encoder, of what it moves and of the air that this moves).
+    """
+    found: dict[Any, list[BlockVerdict]] = {}
+    for k, block in enumerate(blocks):
+        names = frozenset((*block.effects, *block.wrong_parameters))
+        found.setdefault(k if len(block.ambiguity) > 1 else names, []).append(block)
+    return list(found.values())
 
 
 def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
@@ -441,8 +467,8 @@ def _place(diagnosis: Findings, block: BlockVerdict) -> str:
     return f" in the {spoken_name(located)}" if located else ""
 
 
-def _found(diagnosis: Findings, block: BlockVerdict) -> str:
-    """What was found in one group of blocks."""
+def _found(diagnosis: Findings, block: BlockVerdict, *others: BlockVerdict) -> str:
+    """What was found in one group of blocks, and in others that name the same."""
     place = _place(diagnosis, block)
     if len(block.ambiguity) > 1:
         if where := _places(block, place):
@@ -461,11 +487,21 @@ def _found(diagnosis: Findings, block: BlockVerdict) -> str:
     told = {e.term: effect_name(e) for e in diagnosis.effects}
     if block.effects:
         names = " and ".join(told.get(e) or label(e) for e in block.effects)
-        how_sure = _how_sure(_of_names(diagnosis, block))
-        return f"the model leaves out: {names}{place}{how_sure}"
+        return f"the model leaves out: {names}{place}{_seen_in(diagnosis, block, others)}"
     wrong = {w.name: w for w in diagnosis.wrong_parameters}
     values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
-    return f"the rig file is wrong: {values}{_how_sure(_of_names(diagnosis, block))}"
+    seen = f", seen{place}" if others else ""
+    return f"the rig file is wrong: {values}{seen}{_seen_in(diagnosis, block, others)}"
+
+
+def _seen_in(diagnosis: Findings, block: BlockVerdict, others: Sequence[BlockVerdict]) -> str:
+    """How sure a group is of what it names, and each other one that names the same: ``, probability
+    0.99, and in the chamber, probability 0.93``.
+    """
+    told = _how_sure(_of_names(diagnosis, block))
+    for other in others:
+        told += f", and{_place(diagnosis, other)}{_how_sure(_of_names(diagnosis, other))}"
+    return told
 
 
 def _places(block: BlockVerdict, place: str) -> str:
@@ -515,10 +551,16 @@ def _of_names(diagnosis: Findings, block: BlockVerdict) -> float:
 
 def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str:
     """Probability of one name, and that it counts sets with others where these make a
-    difference: ``0.93, alone or with others``.
+    difference: ``0.93, alone or with others``; where several groups of blocks name it, that of
+    each: ``0.94 in the chamber, 0.92 in the arm``.
     """
     name = entry.term if isinstance(entry, EffectFound) else entry.name
     text = format_probability(entry.probability)
+    naming = [b for b in told_blocks(diagnosis) if name in (*b.effects, *b.wrong_parameters)]
+    if len(naming) > 1 and all(len((*b.effects, *b.wrong_parameters)) == 1 for b in naming):
+        return ", ".join(
+            f"{format_probability(_of_names(diagnosis, b))}{_place(diagnosis, b)}" for b in naming
+        )
     for block in told_blocks(diagnosis):
         named = [*block.effects, *block.wrong_parameters]
         if name in named and format_probability(_of_names(diagnosis, block)) != text:
@@ -551,6 +593,39 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
         ambiguity=[],
     )
     return set_label(names), _of_names(diagnosis, whole)
+
+
+def gap_sentence(diagnosis: Findings, by: str) -> str:
+    """How much of the gap between the refitted model and the noise closes, over which channels, and
+    over those of the blocks with a name where these are fewer.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+    by : str
+        What closes it, as the begin of the sentence: ``With it``.
+
+    Returns
+    -------
+    str
+        Empty where the gap is not known.
+    """
+    gap, errors = diagnosis.fit.gap_closed, diagnosis.fit.held_out or diagnosis.fit.channels
+    if not is_number(gap):
+        return ""
+    named = [b for b in diagnosis.blocks if b.effects or b.wrong_parameters]
+    own = [m.channel for b in named for m in b.mismatch if m.channel in errors]
+    every = ", ".join(map(spoken_name, errors))
+    text = (
+        f"{by} {100.0 * gap:.0f} % of the gap between refitted model and noise closes over all "
+        f"channels ({every})"
+    )
+    room = sum(errors[c].refit / errors[c].noise - 1.0 for c in own)
+    if own and len(own) < len(errors) and room > 0.0:
+        closed = sum((errors[c].refit - errors[c].after) / errors[c].noise for c in own) / room
+        alone = " and ".join(map(spoken_name, own))
+        text += f" and {100.0 * min(1.0, max(0.0, closed)):.0f} % in {alone} alone"
+    return text
 
 
 def is_open(diagnosis: Findings) -> bool:
@@ -697,8 +772,24 @@ def effect_heading(diagnosis: Findings, effect: EffectFound) -> str:
     return title if diagnosis.verdict == "effects" else f"not named, but closest: {title}"
 
 
-def budget_sentence(terms: Sequence[BudgetTerm]) -> str:
-    """The budget of one block in words."""
+def noise_alone(diagnosis: Findings, block: str) -> bool:
+    """Whether noise could be as large as what a block keeps with the final model, on the recordings
+    of its budget; False where a result does not say.
+    """
+    own = [m for b in diagnosis.blocks for m in b.mismatch if m.block == block]
+    return bool(own) and not (own[0].held_out or own[0].fitted).after.more_than_noise
+
+
+def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
+    """Each block with a budget and that in words."""
+    return [
+        (block, budget_sentence(own, noise_only=noise_alone(diagnosis, block)))
+        for block, own in budgets(diagnosis).items()
+    ]
+
+
+def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) -> str:
+    """The budget of one block in words; what is left is told as noise where it is no more."""
     told = [
         f"{term_label(term)} {format_share(term.share)} ({_span(term.interval)})"
         for term in terms[:-1]
@@ -708,8 +799,8 @@ def budget_sentence(terms: Sequence[BudgetTerm]) -> str:
     left = (
         f"{format_share(last.share)} unexplained: {format_number(last.noises, 2)} noise levels, "
         f"{format_number(last.size * factor, 2)} {unit}"
-        if last.noises > 0.0
-        else "nothing unexplained beyond the noise"
+        if last.noises > 0.0 and not noise_only
+        else "only noise is left"
     )
     return "; ".join([*told, left]) + "."
 

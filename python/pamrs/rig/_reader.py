@@ -323,15 +323,14 @@ class Reader:
         if key.kind == "vector":
             self.spread(f"{block}.{key.name}", label, key, unit, extra)
             return self.vector(label, key, number, unit)
-        value = self.scalar(label, key.unit, number, unit, key.lower, key.upper)
+        whole = key.kind == "count"
+        value = self.scalar(label, key.unit, number, unit, key.lower, key.upper, whole=whole)
         if value is None:
             return None
-        if key.kind == "count":
+        if whole:
             for word in ("tol", "unknown"):
                 if extra.get(word):
                     self.problem(f"{label}.{word} is not allowed: a count is known")
-            if not value.is_integer():
-                self.problem(f"{label} = {value:g} is not allowed: a whole number is needed")
             return int(value)
         self.spread(f"{block}.{key.name}", label, key, unit, extra)
         return value
@@ -369,10 +368,13 @@ class Reader:
         upper: float,
         *,
         difference: bool = False,
+        whole: bool = False,
     ) -> float | None:
         """``number`` in SI, or None after noting what is wrong with it."""
+        what = "a whole number" if whole else "a finite number"
         if isinstance(number, bool) or not isinstance(number, (int, float)):
-            self.problem(f"{label} = {_shown(number)} is not allowed: a number is needed")
+            needed = what if whole else "a number"
+            self.problem(f"{label} = {_shown(number)} is not allowed: {needed} is needed")
             return None
         try:
             value = to_si(float(number), unit, si_unit, difference=difference)
@@ -381,9 +383,11 @@ class Reader:
             return None
         except OverflowError:
             value = math.inf
-        if not (math.isfinite(value) and lower <= value <= upper):
+        if not (math.isfinite(value) and lower <= value <= upper) or (
+            whole and not value.is_integer()
+        ):
             given = "" if unit == si_unit else f" ({with_unit(f'{number:g}', unit)})"
-            allowed = with_unit(f"a finite number from {lower:g} to {upper:g}", si_unit)
+            allowed = with_unit(f"{what} from {lower:g} to {upper:g}", si_unit)
             wrong = with_unit(f"{label} = {value:g}", si_unit)
             self.problem(f"{wrong}{given} is not allowed: {allowed}")
             return None

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from pamrs._checks import checked_number, checked_table
 from pamrs._files import read_toml
 from pamrs.errors import ParameterError, RigError, joined, meant
+from pamrs.rig._cautions import cautions_of
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
 from pamrs.rig._switching import Entry, full_name, new_entry, placed, without
@@ -154,6 +155,13 @@ class Rig:
         ``"air: supply -> valve -> chamber -> ambient"``.
         """
         return wiring(self._model, self._ports())
+
+    @property
+    def cautions(self) -> list[str]:
+        """What of the rig is possible, and most likely a mistake, one sentence each: valves that
+        never pass air, delays as long as the period of the pulses. Empty where nothing is.
+        """
+        return cautions_of(self._model)
 
     def _ports(self) -> Ports:
         cached: Ports | None = self.__dict__.get("_connected")

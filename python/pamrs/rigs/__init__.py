@@ -139,16 +139,19 @@ def shoulder() -> Rig:
     return named("shoulder")
 
 
-def bench(muscle: Muscle, name: str = "bench") -> Rig:
-    """A bench: one muscle on a load frame over all lengths that it can have, and a dead volume of a
+def bench(muscle: Muscle | None = None, name: str = "bench") -> Rig:
+    """A bench: one muscle on a load frame that prescribes its length.
+
+    Without a muscle it is the packaged rig ``bench``, with pam_a_1in of the library and tolerances.
+    With one, the frame has all lengths that the muscle can have, and the chamber a dead volume of a
     tenth of the muscle's own.
 
     It has no valve: :func:`pamrs.simulate` takes the length and, where it is held, the pressure.
 
     Parameters
     ----------
-    muscle : Muscle
-        The muscle.
+    muscle : Muscle, optional
+        The muscle; that of the packaged rig by default.
     name : str
         What to call the rig.
 
@@ -159,6 +162,9 @@ def bench(muscle: Muscle, name: str = "bench") -> Rig:
     from pamrs.rig import Rig, parse_rig
     from pamrs.rig.schema import keys_of
 
+    if muscle is None:
+        text = _text("bench").replace('name = "bench"', f"name = {json.dumps(name)}", 1)
+        return parse_rig(text, source="bench.toml")
     rig = parse_rig(_BENCH.format(volume=0.1 * float(muscle.air_volume(0.0))), source="bench")
     low, high = muscle.contraction_range
     rest = float(muscle.parameters["rest_length"])

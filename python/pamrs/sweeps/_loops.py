@@ -52,19 +52,30 @@ class ClosedLoop(Drive):
     loop : dict
         Numbers for :func:`pamrs.control.sweep`: ``duration``, ``sample_time``, ``step``,
         ``initial``.
+    by_length : bool
+        Whether the length of a hanging mass is followed, in the place of an angle.
     """
 
     controller: Callable[..., Any]
     trajectory: Trajectory
     loop: dict[str, Any] = field(default_factory=dict)
+    by_length: bool = False
 
     def quantity(self, rig: Rig, name: str) -> Quantity:
         if name.startswith(GAIN):
             return Quantity(name, "1", -np.inf, np.inf, np.nan, 0.0)
-        return super().quantity(rig, name)
+        try:
+            return super().quantity(rig, name)
+        except ParameterError as error:
+            if name.isidentifier():
+                raise ParameterError(
+                    f"{name!r}: a gain is called '{GAIN}{name}'; {error}"
+                ) from None
+            raise
 
     def metric_units(self) -> dict[str, str]:
-        return dict(_UNITS)
+        angle = "m" if self.by_length else "rad"
+        return {name: unit.replace("rad", angle) for name, unit in _UNITS.items()}
 
     def describe(self) -> dict[str, str]:
         duration = self.loop.get("duration") or self.trajectory.duration
@@ -154,7 +165,7 @@ def gain_map(
     -------
     xarray.Dataset
         ``squared_error`` (nu, 4.15) [rad2 s], ``curvature`` (omega, 4.17), ``rms``, ``largest`` and
-        ``final`` [rad]; NaN where a run ended.
+        ``final`` [rad], of a hanging mass [m2 s] and [m]; NaN where a run ended.
 
     Raises
     ------
@@ -170,10 +181,11 @@ def gain_map(
     given = {"duration": duration, "sample_time": sample_time, "step": step}
     loop: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
     loop |= {"initial": {k: float(v) for k, v in initial.items()}} if initial else {}
+    hangs = any(load.get("kind", "mass") == "mass" for load in rig.tables("load").values())
     return run_plan(
         rig,
         over,
-        ClosedLoop(controller, trajectory, loop),
+        ClosedLoop(controller, trajectory, loop, by_length=hangs),
         store=store,
         executor=executor,
         chunk=chunk,

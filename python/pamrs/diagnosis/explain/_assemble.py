@@ -153,22 +153,19 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         free_run_note=runs_note,
         settings=settings,
     )
-    return _worded(diagnosis, case, gap, judged, forms)
+    return _worded(diagnosis, case, judged, forms)
 
 
 def _worded(
     diagnosis: Diagnosis,
     case: Case,
-    gap: float | None,
     judged: list[Judged],
     forms: dict[str, str],
 ) -> Diagnosis:
     """A diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
     told, settings = list(dict.fromkeys(forms.values())), diagnosis.settings.warnings
-    return replace(
-        diagnosis, text=words.verdict(diagnosis, case, gap, told, settings, sought=sought)
-    )
+    return replace(diagnosis, text=words.verdict(diagnosis, case, told, settings, sought=sought))
 
 
 def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:

@@ -130,7 +130,7 @@ def unexplained(
             left = _left(own, entry.verdict, stages)
             if left is None:
                 continue
-            size, problem, residual = left
+            size, problem, residual, role = left
             share, interval = _rest(own.block, terms)
             found.append(
                 Unexplained(
@@ -144,6 +144,7 @@ def unexplained(
                     interval,
                     _conditions(suspects[own.block], problem, residual, noise_level, nominal),
                     forms.get(own.block, "") if entry.verdict == "unlisted" else "",
+                    role,
                 )
             )
     return sorted(found, key=lambda u: -(u.noises or 0.0))
@@ -151,15 +152,18 @@ def unexplained(
 
 def _left(
     own: BlockMismatch, verdict: str, stages: list[tuple[Problem, Stages]]
-) -> tuple[MismatchSize, Problem, dict[Key, Residual]] | None:
-    """What a block keeps, and the recordings that show it; None where it is no more than noise."""
+) -> tuple[MismatchSize, Problem, dict[Key, Residual], str] | None:
+    """What a block keeps, and the recordings that show it with their role; None where it is no more
+    than noise.
+    """
     # a form without a name takes up what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
-    parts = [part for part in (own.held_out, own.fitted) if part is not None]
-    for part, (problem, residuals) in zip(parts, stages, strict=True):
+    parts = [(own.held_out, "held_out"), (own.fitted, "fit")]
+    there = [(part, role) for part, role in parts if part is not None]
+    for (part, role), (problem, residuals) in zip(there, stages, strict=True):
         size: MismatchSize = part[stage]
         if size.more_than_noise:
-            return size, problem, residuals[stage]
+            return size, problem, residuals[stage], role
     return None
 
 

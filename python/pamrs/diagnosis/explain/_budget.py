@@ -5,7 +5,7 @@ takes, and what stays unexplained.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -80,6 +80,8 @@ def budget(
         of a block add up to 1.
     """
     terms: list[BudgetTerm] = []
+    # of one effect in two groups the model has the parameters of the group that comes last
+    owners = {name: one for one in judged for name in one.named}
     bare = _without_held(problem, nominal, found["before"])
     for one in judged:
         steps = _steps(one, problem, found, nominal, final, events)
@@ -102,7 +104,7 @@ def budget(
                 _Stage(s.kind, s.name, kept(s.now), [(kept(a), kept(b)) for a, b in s.drops])
                 for s in (*held, *steps)
             ]
-            terms += _terms(block, before, stages, one, final, problem.settings)
+            terms += _terms(block, before, stages, one, owners, final, problem.settings)
     return terms
 
 
@@ -219,10 +221,13 @@ def _terms(
     before: Excess,
     stages: list[_Stage],
     judged: Judged,
+    owners: Mapping[str, Judged],
     final: Rig,
     settings: DiagnosisSettings,
 ) -> Iterator[BudgetTerm]:
-    """The terms of one block, and what is left."""
+    """The terms of one block, and what is left; ``owners`` are the groups whose values of an effect
+    the final model has.
+    """
     counts = np.array([n for _, n in before.pieces], dtype=np.float64)
     rng = np.random.default_rng(settings.seed)
     draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
@@ -245,7 +250,7 @@ def _terms(
             unit=unit_of(block.channel),
             at=place_of(name)
             or next((e.get("at", "") for e in final.effects if e["id"] == name), ""),
-            parameters=_values(name, judged),
+            parameters=_values(name, owners.get(name, judged)),
         )
         was = now
     share, interval = _share(before, [(was, None)], counts, draws)

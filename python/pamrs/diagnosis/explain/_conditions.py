@@ -203,15 +203,29 @@ def describe(
         mean = float(z[mask].mean())
         text = (
             f"{name}: {100 * share:.0f} % of what exceeds the noise, in {100 * time:.0f} % of the "
-            "time"
+            f"time{_sign(z[mask], rising=block.window is not None)}"
         )
-        # nearer to zero than half a digit of what is printed, or than chance puts it
-        if abs(mean) > max(0.05, 2.0 / math.sqrt(mask.sum())):
-            text += f"; mean {mean:+.2g} times the noise level"
         picture.conditions.append(Condition(name, share, time, mean, text))
     picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
     picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)
     return picture
+
+
+_ONE_SIDED = 0.5
+"""Mean over root mean square from which a residual is told to lie on one side."""
+
+
+def _sign(z: Array, *, rising: bool) -> str:
+    """On which side of the model what was measured lies there, or whether it rises or falls against
+    it; a mean alone would hide what goes both ways.
+    """
+    mean, size = float(z.mean()), float(np.sqrt(np.mean(z**2)))
+    if abs(mean) > max(_ONE_SIDED * size, 2.0 / math.sqrt(z.size)):
+        words = ("falling against", "rising against") if rising else ("below", "above")
+        return f", measured {words[mean > 0.0]} the model"
+    if size < 1.0:
+        return ""
+    return f", measured {'rising and falling against' if rising else 'above and below'} the model"
 
 
 def _change(values: Array, rows: NDArray[np.bool_], width: int) -> Array:

@@ -273,8 +273,13 @@ def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExp
         if j.verdict == "unlisted" and j.group.mismatch is not None
     ]
     if not ambiguity and verdict != "unlisted" and not missing:
-        answer = "answer" if verdict in HEALTHY else "name"
-        text = f"The {answer} is settled by these recordings; no further one is needed for it."
+        several = sum(len(j.named) + len(j.wrong) for j in asked.judged) > 1
+        text = (
+            "The names are settled by these recordings; no further one is needed for them."
+            if several and verdict not in HEALTHY
+            else f"The {'answer' if verdict in HEALTHY else 'name'} is settled by these "
+            "recordings; no further one is needed for it."
+        )
         return NextExperiment(text, {}, 0.0)
     names = [name for names in ambiguity for name in names]
     measurable = [n for n in names if is_parameter(n)]

@@ -17,6 +17,7 @@ from pamrs.report.text import (
     effect_name,
     format_number,
     format_probability,
+    gap_sentence,
     is_number,
     is_open,
     kept_sentence,
@@ -61,7 +62,8 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     text = (
         f"The mismatch lies in the {place}{parts}. With the measured signals of its "
         f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)}: what "
-        f"exceeds the noise is {found.systematic:.2g} times the noise level."
+        f"exceeds the noise is {found.systematic:.2g} times the noise level on the fitted "
+        "recordings."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
@@ -119,7 +121,6 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
 def verdict(
     diagnosis: Findings,
     case: Case,
-    gap: float | None,
     forms: list[str],
     settings: WarningSettings,
     *,
@@ -137,8 +138,10 @@ def verdict(
         )
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
-        return _mistaken(diagnosis, case, gap, settings) + _beside(
-            diagnosis, missing, forms, sought=sought
+        found = _mistaken(diagnosis, case, settings)
+        by = "With this value," if len(diagnosis.wrong_parameters) == 1 else "With these values,"
+        return (
+            found + _closed(diagnosis, by, case) + _beside(diagnosis, missing, forms, sought=sought)
         )
     if kind == "parameters":
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
@@ -169,28 +172,17 @@ def verdict(
                 " No form of it carries over to other recordings, so the model stays the "
                 "refitted one."
             )
-        closes = (
-            ""
-            if gap is None
-            else (
-                f" With it in the model, {100 * gap:.0f} % of the gap between refitted model and "
-                "noise closes."
-            )
-        )
+        closes = _closed(diagnosis, "With it in the model,", case)
         return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(
         f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e)})"
         for e in diagnosis.effects
     )
     text = f"{_opening(diagnosis, 'the model leaves out')}: {names}. {place}"
-    if gap is not None:
-        it = "it" if len(diagnosis.effects) == 1 else "them"
-        text += (
-            f" With {it}, {100 * gap:.0f} % of the gap between refitted model and noise closes, "
-            f"over all channels, on {_proof(case)}."
-        )
+    it = "it" if len(diagnosis.effects) == 1 else "them"
+    text += _closed(diagnosis, f"With {it},", case)
     if diagnosis.wrong_parameters:
-        text += " " + _mistaken(diagnosis, case, None, settings)
+        text += " " + _mistaken(diagnosis, case, settings)
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known. The recording determines the time constant and "
@@ -211,6 +203,12 @@ def _outside(chance: float) -> str:
     return f" (probability of an effect outside it: {format_probability(chance)})" if known else ""
 
 
+def _closed(diagnosis: Findings, by: str, case: Case) -> str:
+    """How much of the gap closes; empty where that is not known."""
+    told = gap_sentence(diagnosis, by)
+    return f" {told}, on {_proof(case)}." if told else ""
+
+
 def _proof(case: Case) -> str:
     return (
         "held-out recordings"
@@ -219,7 +217,7 @@ def _proof(case: Case) -> str:
     )
 
 
-def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: WarningSettings) -> str:
+def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     for wrong in diagnosis.wrong_parameters:
@@ -239,13 +237,7 @@ def _mistaken(diagnosis: Findings, case: Case, gap: float | None, settings: Warn
             f"{sentence_of(wrong)} (probability {name_chance(diagnosis, wrong)}, "
             f"{abs(wrong.moved_sigmas):.0f} tolerances away); on {_proof(case)} {errors}."
         )
-    text = f"{_opening(diagnosis, 'the rig file is wrong')}: " + " ".join(told)
-    if gap is not None:
-        text += (
-            f" Over all channels, {100 * gap:.0f} % of the gap between the model refitted inside "
-            "its tolerances and the noise closes."
-        )
-    return text
+    return f"{_opening(diagnosis, 'the rig file is wrong')}: " + " ".join(told)
 
 
 def _instead(value: float, before: float, unit: str) -> str:

@@ -16,6 +16,8 @@ __all__ = ["AMBIENT", "at_ambient"]
 
 AMBIENT = "ambient_temperature"
 _NAME = "gas.temperature"
+_SAME = 0.1
+"""Temperatures that differ by less are told as the same [K]."""
 
 
 def at_ambient(
@@ -69,16 +71,17 @@ def at_ambient(
     except ParameterError as error:
         names = ", ".join(name for name, _ in found)
         raise DiagnosisError(f"{AMBIENT} of {names}: {error}") from error
+    same = abs(value - before.value) < _SAME
+    stated = f"to {_SAME:g} K the rig file's" if same else f"{before.value:.5g} K in the rig file"
     said = [
-        f"{_NAME} is {value:.1f} K, as {AMBIENT} was measured ({before.value:.1f} K in the rig "
-        "file)",
+        f"{_NAME} is {value:.5g} K, as {AMBIENT} was measured ({stated})",
         *_doubted(value, before, settings),
     ]
     low, high = min(one for _, one in found), max(one for _, one in found)
     if high - low > settings.most_room_spread:
         said.append(
             f"{AMBIENT} differs between the recordings, from {low:.1f} to {high:.1f} K; all of "
-            f"them are judged at {value:.1f} K"
+            f"them are judged at {value:.5g} K"
         )
     return moved, said
 

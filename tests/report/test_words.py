@@ -1,0 +1,136 @@
+"""What a reader is told of shares, gaps and noise, and of one cause that several groups see."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from pamrs.diagnosis.explain._conditions import _sign
+from pamrs.findings import (
+    BlockMismatch,
+    BlockVerdict,
+    BudgetTerm,
+    MismatchSize,
+    MismatchStages,
+    Unexplained,
+)
+from pamrs.report import text as words
+from tests.diagnosis import synthetic
+
+KEYS = ("noise", "before", "refit", "after")
+
+
+def stages(noises: float, *, more: bool) -> MismatchStages:
+    size = MismatchSize(noises, 1e-3 * noises, more)
+    return MismatchStages(size, size, size)
+
+
+def group(block: str, channel: str, chance: float, **named: list[str]) -> BlockVerdict:
+    """A group of one block, which keeps noise alone with the final model."""
+    names = [*named.get("effects", []), *named.get("wrong", [])]
+    mismatch = BlockMismatch(block, channel, "rad", stages(0.5, more=True), stages(0.4, more=False))
+    return BlockVerdict(
+        blocks=[block],
+        verdict="effects",
+        probabilities={"+".join(names): chance, "unlisted": 1.0 - chance},
+        effects=named.get("effects", []),
+        wrong_parameters=named.get("wrong", []),
+        ambiguity=[],
+        mismatch=[mismatch],
+    )
+
+
+def term(kind: str, share: float, noises: float, name: str = "") -> BudgetTerm:
+    return BudgetTerm("arm", kind, name, "", share, [share, share], None, noises, 0.001, "rad")
+
+
+def seen(*blocks: BlockVerdict, **more: Any) -> Any:
+    """A diagnosis with the groups of blocks that are given."""
+    where = {"block": blocks[-1].blocks[0], "channel": "joint_angle", "text": "There."}
+    found = [
+        {"id": name, "probability": 0.9, "parameters": {}}
+        for name in dict.fromkeys(e for b in blocks for e in b.effects)
+    ]
+    return synthetic.diagnosis(blocks=list(blocks), where=where, effects=found, **more)
+
+
+def test_one_cause_that_two_groups_see_is_told_once() -> None:
+    one = group("chamber", "muscle_pressure", 0.93, effects=["encoder_error"])
+    two = group("arm", "joint_angle", 0.984, effects=["encoder_error"])
+    told = words.claim(seen(one, two))
+    assert told == (
+        "The model leaves out: encoder error in the chamber, probability 0.93, and in the arm, "
+        "probability 0.98"
+    )
+    found = seen(one, two)
+    assert words.name_chance(found, found.effects[0]) == "0.93 in the chamber, 0.98 in the arm"
+    # another name, or a group that leaves something open, is told by itself
+    other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
+    assert words.claim(seen(one, other)).count("the model leaves out") == 1
+    assert words.claim(seen(one, other)).startswith("The model leaves out: encoder error in the ch")
+
+
+def test_noise_that_is_left_is_not_called_unexplained(tmp_path: Any) -> None:
+    terms = [term("parameters", 0.99, 0.1), term("unexplained", 0.01, 0.029)]
+    found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), budget=terms)
+    ((block, told),) = words.budget_sentences(found)
+    assert (block, words.noise_alone(found, "arm")) == ("arm", True)
+    assert told == "parameters inside tolerance 99 % (99 to 99); only noise is left."
+    assert "unexplained" not in words.budget_sentences(found)[0][1]
+    # where it is more than noise, or a result does not say, the size is told
+    assert "1 % unexplained: 0.029 noise levels" in words.budget_sentence(terms)
+
+
+def test_shares_are_explained_where_they_can_be_misread() -> None:
+    rest = term("unexplained", 0.0, 0.0)
+    quiet = synthetic.diagnosis(budget=[term("parameters", 1.0, 0.1), rest])
+    assert words.BUDGET_NOTE[:30] not in " ".join(quiet.summary().split())
+    for taken in (
+        [term("parameters", -0.2, 0.1), term("effect", 1.2, 0.1, "muscle_creep")],
+        [term("parameters", -0.1, 0.1)],
+        [term("parameters", 0.7, 0.1), term("effect", 0.3, 0.1, "muscle_creep")],
+    ):
+        told = " ".join(synthetic.diagnosis(budget=[*taken, rest]).summary().split())
+        assert words.BUDGET_NOTE in told
+
+
+@pytest.mark.parametrize(
+    ("role", "where"),
+    [("held_out", " on held-out recordings,"), ("fit", " on the fitted recordings,"), ("", ",")],
+)
+def test_a_size_says_which_recordings_it_is_of(role: str, where: str) -> None:
+    kept = Unexplained("arm", "joint_angle", "rad", 21.0, 0.007, "unlisted", role=role)
+    assert f"is 21 times the noise level (0.40 deg){where} and" in words.kept_sentence(kept)
+
+
+def test_a_gap_says_which_channels_it_is_over() -> None:
+    errors = {
+        "muscle_pressure": (100.0, 500.0, 500.0, 400.0),  # refit 4, closes 1 of them
+        "joint_angle": (0.001, 0.02, 0.011, 0.001),  # 10, closes all
+    }
+    fit = {
+        "channels": {},
+        "held_out": {name: dict(zip(KEYS, told, strict=True)) for name, told in errors.items()},
+        "gap_closed": 11.0 / 14.0,
+    }
+    found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), fit=fit)
+    assert words.gap_sentence(found, "With it,") == (
+        "With it, 79 % of the gap between refitted model and noise closes over all channels "
+        "(muscle pressure, joint angle) and 100 % in joint angle alone"
+    )
+    assert "gap to the noise closed over all channels, on held-out recordings: 79 %" in (
+        found.summary()
+    )
+    none = seen(group("arm", "joint_angle", 0.9), fit={**fit, "gap_closed": None})
+    assert words.gap_sentence(none, "With it,") == ""
+
+
+def test_residuals_of_both_signs_do_not_cancel() -> None:
+    swings = 20.0 * np.sin(np.linspace(0.0, 6 * np.pi, 300))
+    assert _sign(swings, rising=False) == ", measured above and below the model"
+    assert _sign(swings, rising=True) == ", measured rising and falling against the model"
+    assert _sign(np.abs(swings), rising=False) == ", measured above the model"
+    assert _sign(-np.abs(swings), rising=True) == ", measured falling against the model"
+    assert _sign(0.01 * swings, rising=False) == ""  # noise has no side
