@@ -104,12 +104,15 @@ def test_a_healthy_regulator_misses_nothing() -> None:
 def test_a_longer_dead_time_is_told_but_not_from_another_clock() -> None:
     """Pressures that come later than commands come later by either: the data are the same."""
     found = diagnosed(dead_time=0.03)
-    assert found.ambiguity[:2] == [["supply.dead_time"], ["clock_skew"]]
+    first, second, *_ = found.ambiguity
+    assert {*first, *second} == {"supply.dead_time", "clock_skew"}
     odds = found.probabilities
     assert odds["supply.dead_time"] + odds["clock_skew"] > 0.85
     assert min(odds["supply.dead_time"], odds["clock_skew"]) > 0.2
-    (wrong,) = found.wrong_parameters
-    assert wrong["value"] == pytest.approx(0.03, abs=5e-4)
+    # 25 ms more than the file says, whichever of the two is thought of
+    late = [w["value"] - 0.005 for w in found.wrong_parameters]
+    late += [e["parameters"]["offset"]["value"] for e in found.effects]
+    assert late == [pytest.approx(0.025, abs=5e-4)]
 
 
 def test_a_slower_rise_is_named() -> None:
