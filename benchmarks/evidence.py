@@ -30,6 +30,8 @@ from pamrs.errors import PamrsError
 SCHEMES = {"what is left": 0.0, "prediction": 1.0, "both": 0.5}
 """Share of prediction in each scheme."""
 MARKED_UNLISTED = "unlisted"
+UNSPLIT = 4
+"""Further arguments where all blocks of a group are weighed together."""
 LEAST = 1e-3
 SURE = 0.9
 
@@ -72,7 +74,8 @@ def weighed(case: Path) -> Iterator[dict[str, dict[str, float]]]:
     last: dict[tuple[str, ...], tuple[Any, ...]] = {}
 
     def kept(candidates: Any, suspects: Any, *more: Any) -> dict[str, float]:
-        last[tuple(b.name for b in suspects)] = (candidates, suspects, *more)
+        if len(more) == UNSPLIT:  # and not one block of a group by itself
+            last[tuple(b.name for b in suspects)] = (candidates, suspects, *more)
         return weigh(candidates, suspects, *more)
 
     with mock.patch("pamrs.diagnosis.search._hypotheses.weigh", kept):

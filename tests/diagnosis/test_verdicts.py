@@ -113,7 +113,9 @@ def with_encoder(found: Group, size: float) -> Group:
     fit = found.candidates[0].fit
     values = {"encoder_error.sine": size}
     own = [
-        replace(c, fit=replace(fit, effects=c.effects, values=values))
+        replace(
+            c, fit=replace(fit, effects=c.effects, values=values, std=dict.fromkeys(values, 0.01))
+        )
         if c.names == ("encoder_error",)
         else c
         for c in found.candidates
@@ -126,15 +128,18 @@ def test_what_two_groups_have_is_paid_for_once() -> None:
     gas = {"encoder_error": 0.95, "unlisted": 0.05}
     arm = {"sensors.pressure_zero": 0.9, "encoder_error": 0.05, "unlisted": 0.05}
 
-    def of_arm(size: float) -> float:
+    def of_arm(size: float, other: float | None = None) -> float:
         judged, _ = said(
-            with_encoder(group("chamber", gas), size), with_encoder(group("arm", arm), size)
+            with_encoder(group("chamber", gas), size if other is None else other),
+            with_encoder(group("arm", arm), size),
         )
         return judged[1].probability("encoder_error")
 
     alone = judge([group("arm", arm)], SETTINGS)[0].probability("encoder_error")
     usual, rare = of_arm(0.0), of_arm(0.2)  # 20 standard deviations of what is usual
     assert alone < usual < 0.5 < rare
+    # values that differ are two effects
+    assert of_arm(0.2, other=-0.2) == pytest.approx(alone)
 
 
 def test_open_sets_stand_beside_what_is_settled() -> None:

@@ -11,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
+from pamrs.diagnosis.evidence import Attempts, Candidate, room_beside, weigh
 from pamrs.diagnosis.evidence._weighing import _trusted_parts, unlikely
 from pamrs.diagnosis.fit import Events, Fit, Problem, fits
 from pamrs.diagnosis.noise import Excess
@@ -122,6 +122,63 @@ def test_of_two_that_leave_less_than_forms_do_the_one_that_leaves_less() -> None
     far = weighed(hypothesis(CREEP, 1e-2), damping)
     assert far["muscle_creep"] < 0.2 * near["muscle_creep"]
     assert far["muscle_rate_damping"] > 0.7
+
+
+def predicting(found: Candidate, each: float, stretches: int = 40) -> Candidate:
+    """The hypothesis with so much logarithmic density in every stretch of time."""
+    return replace(found, densities=lambda: {"arm": np.full(stretches, each)})
+
+
+def both_known(left: float, other: float, lead: float) -> dict[str, float]:
+    """Probabilities of creep and of damping, which leave these shares; damping leads so much in
+    each stretch.
+    """
+    creep = predicting(hypothesis(CREEP, left), -1.0)
+    damping = predicting(hypothesis(DAMPING, other), -1.0 + lead)
+    return weighed(creep, damping)
+
+
+def test_names_are_weighed_by_what_they_leave_and_by_what_they_predict() -> None:
+    alike = both_known(1e-3, 1e-3, 0.0)
+    led = both_known(1e-3, 1e-3, 1.0)
+    assert led["muscle_rate_damping"] > alike["muscle_rate_damping"]
+    # half of the evidence stays with what is left, and the whole is what it was
+    assert led["muscle_creep"] >= 0.5 * alike["muscle_creep"] - 1e-9
+    assert sum(led.values()) == pytest.approx(1.0)
+    order = weighed(
+        predicting(hypothesis(DAMPING, 1e-3), 0.0), predicting(hypothesis(CREEP, 1e-3), -1.0)
+    )
+    assert order == pytest.approx(led)
+
+
+def test_prediction_names_nothing_that_leaves_most_of_a_mismatch() -> None:
+    """A drift that an autoregression follows is not explained by what predicts it best."""
+    found = both_known(1e-3, 0.9, 1.0)
+    assert found["muscle_rate_damping"] < 0.02
+    assert found["unlisted"] > 0.4
+
+
+@pytest.mark.parametrize("spoilt", [np.array([]), np.array([math.nan, 0.0]), np.zeros(3)])
+def test_what_cannot_be_predicted_is_weighed_by_what_is_left(spoilt: np.ndarray) -> None:
+    creep = predicting(hypothesis(CREEP, 1e-3), -1.0, 2)
+    other = hypothesis(DAMPING, 1e-3)
+    plain = weighed(hypothesis(CREEP, 1e-3), other)
+    assert weighed(creep, other) == pytest.approx(plain)
+    odd = replace(other, densities=lambda: {"arm": spoilt})
+    assert weighed(creep, odd) == pytest.approx(plain)
+
+
+def test_room_beside_is_what_a_perfect_companion_could_gain() -> None:
+    evidence = SETTINGS.evidence
+    start = hypothesis({}, 1.0)
+    rooms = [
+        room_beside(hypothesis(CREEP, left), start, ARM, evidence)
+        for left in (0.0, 1e-4, 1e-3, 1e-2, 0.1)
+    ]
+    assert rooms[0] == pytest.approx(0.0, abs=1e-9)
+    assert rooms == sorted(rooms)
+    least = evidence.further_price + evidence.parameter_price
+    assert rooms[1] < least < rooms[-1]
 
 
 def test_what_a_set_is_not_trusted_with_falls_to_its_part() -> None:

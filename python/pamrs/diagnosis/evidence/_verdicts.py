@@ -135,9 +135,9 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
         Odds of what is shared, probabilities from which something is named or left open.
     """
     own = [_own(group, settings) for group in groups]
-    several = _in_several(own)
-    paid = [_paid(group, several, settings) for group in groups]
     beside: list[dict[str, float]] = [{} for _ in groups]
+    several = _in_several(own)
+    fitted = [{c.key: c for c in group.candidates} for group in groups]
     for choice in itertools.product(*(p.items() for p in own)):
         keys = [key for key, _ in choice]
         names = [n for key in keys for n in key.split("+") if n not in WITHOUT_NAME]
@@ -145,12 +145,12 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
             continue  # one effect everywhere and at a place of its own
         weight = math.prod(p for _, p in choice)
         for name in several:
-            prices = [
-                prices.get((key, name), 0.0)
-                for key, prices in zip(keys, paid, strict=True)
+            holders = [
+                (group, known[key])
+                for group, known, key in zip(groups, fitted, keys, strict=True)
                 if name in key.split("+")
             ]
-            weight *= _odds_shared(prices, settings.verdict)
+            weight *= _odds_shared(name, holders, settings)
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
     return [
@@ -165,29 +165,41 @@ def _in_several(own: Sequence[Mapping[str, float]]) -> set[str]:
     return {name for one, two in itertools.combinations(named, 2) for name in one & two}
 
 
-def _paid(
-    group: Group, names: set[str], settings: DiagnosisSettings
-) -> dict[tuple[str, str], float]:
-    """What each set of a group lost by each of these names before any data, as far as it counts."""
-    if group.mismatch is None or group.below_noise:
-        return {}
-    certainty = settings.verdict.certainty
-    return {
-        (c.key, name): certainty * paid_for(c, name, settings)
-        for c in group.candidates
-        for name in names & set(c.names)
-    }
+def _odds_shared(
+    name: str, holders: Sequence[tuple[Group, Candidate]], settings: DiagnosisSettings
+) -> float:
+    """Odds of one name in several groups of blocks, each with a hypothesis that has it, to as many
+    names of which each happens to be there.
 
-
-def _odds_shared(prices: Sequence[float], settings: VerdictSettings) -> float:
-    """Odds of one name in so many groups of blocks to as many names, by what each paid for it.
-
-    What is there once is paid for once: the dearest price stays, the others are given back.
+    What is there once is paid for once: the dearest price stays, the others are given back. Where
+    the groups ask for other values, they are two.
     """
-    if len(prices) < 2:
+    if len(holders) < 2 or not _alike(name, [c for _, c in holders], settings.verdict):
         return 1.0
-    again = sum(prices) - max(prices)
-    return settings.shared_odds ** (len(prices) - 1) * math.exp(again)
+    prices = [
+        paid_for(c, name, settings)
+        for group, c in holders
+        if group.mismatch is not None and not group.below_noise
+    ]
+    again = settings.verdict.certainty * (sum(prices) - max(prices, default=0.0))
+    return settings.verdict.shared_odds ** (len(holders) - 1) * math.exp(again)
+
+
+def _alike(name: str, candidates: Sequence[Candidate], settings: VerdictSettings) -> bool:
+    """Whether hypotheses give one name the same values, as far as each knows them."""
+
+    def same(parameter: str, one: Candidate, two: Candidate) -> bool:
+        first, second = one.fit.values[parameter], two.fit.values[parameter]
+        spread = math.hypot(*(c.fit.std.get(parameter, math.inf) for c in (one, two)))
+        known = settings.alike_stds * spread, settings.alike_share * max(abs(first), abs(second))
+        return abs(first - second) <= max(known)
+
+    return all(
+        same(parameter, one, two)
+        for one, two in itertools.combinations(candidates, 2)
+        for parameter in one.fit.values.keys() & two.fit.values.keys()
+        if parameter == name or parameter.partition(".")[0] == name
+    )
 
 
 def _together(names: list[str]) -> bool:

@@ -130,8 +130,12 @@ def weigh(
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
-    Between sets: the logarithm of what each leaves of the mismatch, fitted and held out, on a
-    nominal number of independent looks; what the form of an equation may leave (``form_share`` of
+    The mean of two kinds of evidence (docs/decisions/0114): by what each set leaves, and by how
+    probable it makes the recordings, stretch by stretch of time; both pay the same prices.
+
+    Between sets, by what they leave: the logarithm of what each leaves of the mismatch, fitted and
+    held out, on a nominal number of independent looks (and one more of what is left, whatever is
+    granted); what the form of an equation may leave (``form_share`` of
     the settings) is granted to all of them, so that no second effect is asked for to mend the form
     of the first; among sets of as many effects less is granted (``form_share_alike``). What is left
     of a mismatch near the noise counts by what noise could leave of it. Each parameter and each
@@ -186,41 +190,41 @@ def weigh(
     weights = _between_places(weights, suspects, evidence)
     out = _trusted_parts(weights, trusted)
     lost = _lost_by_priors(plain, evidence)
-    priors = {
-        c: math.log(max(trusted[c], 1e-300)) - _before(c, settings) - against[c] - lost[c]
-        for c in named
-    }
-    out = _with_prediction(out, priors, suspects, evidence)
+    prior = {c: -(_before(c, settings) + against[c] + lost[c] + _of_events(c)) for c in named}
+    predicted = _by_prediction(prior, suspects, evidence)
+    if predicted is not None:
+        by_prediction, share = _trusted_parts(predicted, trusted), evidence.predictive_share
+        out = {key: (1.0 - share) * p + share * by_prediction[key] for key, p in out.items()}
     _shared_out(out, named, start, suspects, seconds, evidence)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
-def _with_prediction(
-    out: Mapping[str, float],
-    priors: Mapping[Candidate, float],
-    suspects: list[Block],
-    settings: EvidenceSettings,
-) -> dict[str, float]:
-    """Probabilities of sets by what each leaves, and by how well each predicts, in equal parts.
-
-    The two err in other places: what is left counts few independent looks of the whole, prediction
-    many stretches of time, each with its own correlation. Together the sets keep the probability
-    that they have against what has no name. ``priors`` are logarithms of what each set weighs
-    before any stretch.
+def _by_prediction(
+    prior: Mapping[Candidate, float], suspects: list[Block], settings: EvidenceSettings
+) -> dict[Candidate, float] | None:
+    """Weights of sets by how probable each makes every stretch of the recordings; None where that
+    is not known of all of them. ``prior`` is the logarithm of what each weighs before.
     """
-    whole = sum(out.values())
-    densities = [c.densities() for c in priors]
-    if whole <= 0.0 or not all(b.name in d for b in suspects for d in densities):
-        return dict(out)
-    scores = np.array([np.concatenate([d[b.name] for b in suspects]) for d in densities])
-    if scores.size == 0:
-        return dict(out)
-    shares = bootstrapped(scores, np.array(list(priors.values())), settings)
-    found = {key: (1.0 - settings.predictive_share) * p for key, p in out.items()}
-    for c, share in zip(priors, shares, strict=True):
-        found[c.key] += settings.predictive_share * whole * float(share)
-    return found
+    densities = [c.densities() for c in prior]
+    if not all(b.name in d for b in suspects for d in densities):
+        return None
+    rows = [np.concatenate([d[b.name] for b in suspects]) for d in densities]
+    if len({row.size for row in rows}) > 1:
+        return None  # not the same stretches
+    scores = np.array(rows)
+    if scores.size == 0 or not np.isfinite(scores).all():
+        return None
+    shares = bootstrapped(scores, np.array(list(prior.values())), settings)
+    return dict(zip(prior, shares.tolist(), strict=True))
+
+
+def _of_events(candidate: Candidate) -> float:
+    """What a set loses in prediction by events: their times and sizes were fitted in the recordings
+    that are predicted, a nat for each (as Akaike's criterion counts them).
+    """
+    events = candidate.fit.events
+    return 0.0 if events is None else float(sum(len(v) for v in events.values.values()))
 
 
 def _plain(
@@ -689,15 +693,17 @@ def room_beside(
 
 
 def paid_for(candidate: Candidate, name: str, settings: DiagnosisSettings) -> float:
-    """What a set loses by one of its names before any data: by the parameters of an effect and
-    their values, or by how far a parameter of the file is wrong.
+    """What a set loses by one of its names before any data: by the parameters of an effect, their
+    values and its place, or by how far a parameter of the file is wrong.
     """
     evidence = settings.evidence
     if name in candidate.wrong:
         return evidence.wrong_price + candidate.outside_of(name, settings.fit.most_tolerances)
     own = [n for n in candidate.fit.effect_values if n.partition(".")[0] == name]
     counted = sum(not find_parameter(n).repeats for n in own)
-    return evidence.parameter_price * counted + sum(_rare(candidate, n, evidence) for n in own)
+    rare = sum(_rare(candidate, n, evidence) for n in own)
+    places = candidate.places / max(1, len(candidate.effects))
+    return evidence.parameter_price * counted + rare + places
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:

@@ -61,8 +61,8 @@ class EvidenceSettings(SettingsGroup):
         1.0,
         unit="1",
         least=0.0,
-        reason="the same of what is left below what a form is granted: of two "
-        "equations that leave less than forms do, the one that leaves less",
+        reason="further looks, of what is left whatever a form is granted: of two equations that "
+        "leave less than forms do, the one that leaves less is the more probable",
         origin="docs/decisions/0114: seeds 11301 and 11501",
     )
     predictive_share: float = setting(
@@ -306,6 +306,21 @@ class VerdictSettings(SettingsGroup):
         above=0.0,
         reason="odds of one effect that acts in two groups of blocks to two effects",
         origin="docs/decisions/0024",
+    )
+    alike_stds: float = setting(
+        3.0,
+        unit="standard deviations",
+        above=0.0,
+        reason="by which the values of one name in two groups may differ",
+        origin="judgement",
+    )
+    alike_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        reason="share of the larger value by which they may differ however well each is known: "
+        "each stands for what is not modelled in its own blocks as well",
+        origin="judgement: a factor of two",
     )
     settled: float = setting(
         0.75,
