@@ -45,8 +45,6 @@ Mask = NDArray[np.bool_]
 _LEAST_SHARE = 0.14
 """Least flow that a command is found for, as a share of the choked one: near equal pressures the
 valve would open without bound."""
-_RAMP = 15.0
-"""Time in which pressures rise to find where a joint moves [s]."""
 
 
 @dataclass(frozen=True)
@@ -522,7 +520,7 @@ def spans_of(
     rig : Rig
         A rig of several chains.
     settings : NextExperimentSettings
-        Bandwidth of the loops that find them.
+        Bandwidth of the loops that find them, and how slowly the pressures rise.
     highest : mapping of str to float, optional
         Gauge pressures by chain that are not to be exceeded [Pa].
 
@@ -531,13 +529,11 @@ def spans_of(
     DiagnosisError
         If nothing says how high the set pressure of a regulator may go.
     """
-    chains = chains_of(rig)
+    chains, ramp = chains_of(rig), settings.ramp_time
     tops = {chain.name: _top(rig, chain, highest) for chain in chains}
-    time = np.asarray(np.arange(round(_RAMP / 0.01) + 1) * 0.01, dtype=np.float64)
+    time = np.asarray(np.arange(round(ramp / 0.01) + 1) * 0.01, dtype=np.float64)
     # vented muscles may push like struts: nobody goes below a tenth
-    rising: dict[str, Array] = {
-        name: top * (0.1 + 0.9 * time / _RAMP) for name, top in tops.items()
-    }
+    rising: dict[str, Array] = {name: top * (0.1 + 0.9 * time / ramp) for name, top in tops.items()}
     found = _played(rig, rising, settings)
     held = {c.name: _free(rig, c, chains, found, tops[c.name]).at(0.5) for c in chains}
     alone = {}
@@ -546,7 +542,7 @@ def spans_of(
             c.name: _line(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
         }
         moving = _line(
-            time, [0.0, 2.0, _RAMP], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
+            time, [0.0, 2.0, ramp], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
         )
         found = _played(rig, {**still, chain.name: moving}, settings)
         alone[chain.name] = _free(rig, chain, [chain], found, tops[chain.name], first=200)

@@ -47,8 +47,11 @@ Array = NDArray[np.float64]
 class _Maker:
     """Builds the experiments of one rig."""
 
-    def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
-        self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
+    def __init__(
+        self, rig: Rig, sample_time: float, span: Range, settings: NextExperimentSettings
+    ) -> None:
+        self.rig, self.dt, self.span = rig, sample_time, span
+        self.bandwidth, self.frequencies = settings.bandwidth, settings.multisine_frequencies
         (self.chain,) = chains_of(rig)
         self.regulated = self.chain.regulator is not None
         self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
@@ -182,7 +185,7 @@ class _Maker:
         )
 
     def multisine(self) -> Experiment:
-        frequencies = [0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1]
+        frequencies = list(self.frequencies)
         time = np.arange(round(30.0 / self.dt) + 1) * self.dt
         size = 1.0 / np.sqrt(1.0 + (np.array(frequencies) / 0.6) ** 2)
         phase = (
@@ -393,13 +396,9 @@ def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> 
             f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
             f"bar, open what lies between and record {seconds:.2g} s from that moment"
         )
-        step = max(settings.least_sample_time, seconds / _MOST_ROWS)
+        step = max(settings.least_sample_time, seconds / settings.most_blown_samples)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
-
-
-_MOST_ROWS = 3000
-"""Samples of a pressure that blows over."""
 
 
 def _segments(rig: Rig) -> bool:
@@ -490,7 +489,7 @@ def library(
         return [e for e in sealed if only is None or e.name in only or e.kind in only]
     if len(chains) == 1:
         span = pressure_range(rig, settings, highest=highest)
-        makers = _of_one(_Maker(rig, step, span, settings.bandwidth))
+        makers = _of_one(_Maker(rig, step, span, settings))
     else:
         if not isinstance(highest, Mapping):
             highest = {} if highest is None else {c.name: highest for c in chains}

@@ -39,9 +39,6 @@ Array = NDArray[np.float64]
 
 SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
 """Experiments that need a valve which can be shut."""
-_FREQUENCIES = (0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1)
-_BETWEEN = 1.7
-"""Ratio from one of these to the next, which several chains share out."""
 
 
 def several_library(
@@ -99,7 +96,7 @@ class _Several:
         highest: Mapping[str, float],
     ) -> None:
         self.rig, self.chains, self.dt = rig, list(chains), sample_time
-        self.bandwidth = settings.bandwidth
+        self.bandwidth, self.settings = settings.bandwidth, settings
         self.spans = spans_of(rig, settings, highest=highest)
         self.regulated = chains[0].regulator is not None
         self.what = "set pressure" if self.regulated else "pressure"
@@ -219,9 +216,10 @@ class _Several:
 
     def multisine(self) -> Experiment:
         time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        usual, ratio = self.settings.multisine_frequencies, self.settings.frequency_ratio
         references, used = {}, {}
         for k, chain in enumerate(self.chains):
-            frequencies = np.array(_FREQUENCIES) * _BETWEEN ** (k / len(self.chains))
+            frequencies = np.array(usual) * ratio ** (k / len(self.chains))
             count = frequencies.size
             size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
             phase = -np.pi * np.arange(count) * np.arange(1, count + 1) / count + 2.0 * k
@@ -235,7 +233,7 @@ class _Several:
         words, numbers = self.levels()
         text = (
             f"drive every {self.what} as a multisine of its own, with no frequency in common, of "
-            f"{_FREQUENCIES[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, for 30 s"
+            f"{usual[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, for 30 s"
         )
         return self.driven("multisine", text, {"frequencies_hz": used, **numbers}, references)
 
