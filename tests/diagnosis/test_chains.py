@@ -213,6 +213,22 @@ def test_each_chain_stays_inside_its_own_recorded_pressures() -> None:
     assert waves.simulate(JOINT)["muscle_pressure.extensor"].max() <= 1.06 * 3e5
 
 
+@pytest.mark.parametrize("flexor", [4e5, 0.15e5], ids=["one filled", "none filled"])
+def test_what_was_recorded_without_pressure_is_not_filled(flexor: float) -> None:
+    peaks = {"muscle_pressure.flexor": flexor, "muscle_pressure.extensor": 0.19e5}
+    (waves,) = experiments_of(JOINT, [recording(peaks)], OWN, {"multisine"})
+    run = waves.simulate(JOINT)
+    late = run.time > 5.0  # the rig begins at 2 bar
+    for name, peak in peaks.items():
+        assert run[name][late].max() <= 1.06 * max(peak, OWN.least_highest)
+    # what has no gauge is no higher than what has one, and what has one was not filled
+    (waves,) = experiments_of(
+        JOINT, [recording({"muscle_pressure.flexor": flexor})], OWN, {"multisine"}
+    )
+    top = 1.06 * max(flexor, OWN.least_highest)
+    assert waves.simulate(JOINT)["muscle_pressure.extensor"][late].max() <= top
+
+
 @pytest.mark.parametrize(
     ("rig", "kind"),
     [(JOINT, "staircase"), (PULSED, "step_and_shut"), (parse_rig(REGULATORS), "multisine")],

@@ -543,11 +543,10 @@ def experiments_of(
     """
     if not records:
         return library(rig, settings, only=only)
-    usual, least, most = settings.sample_time, settings.least_sample_time, settings.most_sample_time
+    shortest, longest = settings.least_sample_time, settings.most_sample_time
     if is_sealed(rig):
-        usual = settings.sealed_sample_time
-        least, most = settings.least_sealed_sample_time, settings.most_sealed_sample_time
-    step = min(max(min((r.sample_time for r in records), default=usual), least), most)
+        shortest, longest = settings.least_sealed_sample_time, settings.most_sealed_sample_time
+    step = min(max(min(r.sample_time for r in records), shortest), longest)
     every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
     seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
     limits = {}
@@ -558,11 +557,12 @@ def experiments_of(
             for name in names
             if name in r.channels and np.isfinite(r.channels[name]).any()
         ]
-        if max(peaks, default=0.0) > 2e4:
-            limits[chain] = 1.05 * max(peaks)
-    # what has no gauge is moved no higher than what has one
-    most = max(limits.values(), default=0.0)
-    limits = {chain: limits.get(chain, most) for chain in seen if limits}
+        if peaks:  # of one that nobody filled as well: it is filled no further
+            limits[chain] = max(1.05 * max(peaks), settings.least_highest)
+    if limits:
+        # what has no gauge is moved no higher than what has one
+        highest = max(limits.values())
+        limits = {chain: limits.get(chain, highest) for chain in seen}
     return library(rig, settings, sample_time=step, highest=limits or None, only=only)
 
 

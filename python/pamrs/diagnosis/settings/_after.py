@@ -144,6 +144,13 @@ class NextExperimentSettings(SettingsGroup):
         reason="bandwidth of the pressure loop by which commands are found on the model",
         origin="judgement",
     )
+    least_highest: float = setting(
+        2e4,
+        unit="Pa",
+        above=0.0,
+        reason="gauge pressure that experiments may reach of what was never recorded above it",
+        origin="judgement: small beside any pressure that moves a muscle, large beside its noise",
+    )
     ramp_time: float = setting(
         15.0,
         unit="s",
