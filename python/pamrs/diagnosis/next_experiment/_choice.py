@@ -292,7 +292,8 @@ def propose(
         parameters are known, half of the value where it does not). What has no model, ``unlisted``,
         cannot be simulated and is left out by the caller.
     noise : mapping of str to float, optional
-        Sample noise by channel [SI]; typical transducers where it is missing.
+        Sample noise by channel, or by kind of channel [SI]; typical transducers where it is
+        missing.
     recordings : sequence of Recording or Prepared, optional
         What there is already: its channels, its sample time and its highest pressure hold for what
         comes.
@@ -332,7 +333,7 @@ def propose(
     own_settings = settings.next_experiment
     chosen = _checked(hypotheses, own_settings)
     usual = noise_of(nominal, own_settings)
-    sound = {**usual, **(noise or {})}
+    sound = {**noise_of(nominal, own_settings, noise), **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
     uncertainty = entropy([p for _, _, p in chosen])

@@ -22,6 +22,7 @@ from pamrs.diagnosis.next_experiment._chains import (
     can_shut,
     chains_of,
     commands_for,
+    joined,
     pressure_range,
     trial_of,
 )
@@ -33,15 +34,19 @@ from pamrs.diagnosis.next_experiment._experiment import (
     then,
     through,
 )
-from pamrs.diagnosis.next_experiment._several import SHUTTING, several_library
+from pamrs.diagnosis.next_experiment._several import several_library
 from pamrs.diagnosis.settings import NextExperimentSettings
-from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
 __all__ = ["library"]
 
 Array = NDArray[np.float64]
+
+_SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
+"""Experiments that need a valve which can be shut."""
 
 
 class _Maker:
@@ -388,10 +393,16 @@ def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> 
         )
         begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
         out.append(_left_alone(name, text, begin, seconds, settings.sealed_sample_time))
-    for chamber in chambers if len(chambers) > 1 else ():
+    for chamber in chambers:
+        reached = joined(rig, qualified("chamber", chamber))
+        if not reached:
+            continue
         begin = {dotted("muscle_pressure", other): span.low for other in chambers}
         begin[dotted("muscle_pressure", chamber)] = span.high
-        seconds = _equalised(rig, begin, settings)
+        try:
+            seconds = _equalised(rig, begin, [chamber, *reached], settings)
+        except SimulationError:
+            continue  # the model does not hold there: nothing to propose to anyone
         text = (
             f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
             f"bar, open what lies between and record {seconds:.2g} s from that moment"
@@ -411,12 +422,14 @@ def _outlets(rig: Rig) -> bool:
     return any(ends["to"] == "ambient" for ends in rig.ports("line").values())
 
 
-def _equalised(rig: Rig, begin: dict[str, float], settings: NextExperimentSettings) -> float:
-    """Three times as long as chambers take to come within a hundredth of each other [s], from 1 s
-    to 60 s.
+def _equalised(
+    rig: Rig, begin: dict[str, float], joining: Collection[str], settings: NextExperimentSettings
+) -> float:
+    """Three times as long as chambers that lines join take to come within a hundredth of each other
+    [s], from 1 s to 60 s.
     """
     found = simulate(rig, sample_time=settings.sample_time, duration=20.0, initial=begin)
-    each = np.array([found[channel] for channel in begin])
+    each = np.array([found[dotted("muscle_pressure", name)] for name in joining])
     apart = each.max(axis=0) - each.min(axis=0)
     late = np.flatnonzero(apart > 0.01 * apart[0])
     return float(np.clip(3.0 * found.time[late[-1]], 1.0, 60.0))
@@ -467,7 +480,10 @@ def library(
     Raises
     ------
     DiagnosisError
-        If no experiment is made for such a rig, or nothing says how high a regulator may be set.
+        If no experiment is made for such a rig, nothing says how high a regulator may be set, or
+        the model of the rig does not hold while its pressures rise.
+    ParameterError
+        If ``highest`` has a name that is none of a chain.
     """
     if has_frame(rig):
         raise DiagnosisError(
@@ -479,6 +495,13 @@ def library(
         raise DiagnosisError(
             f"rig {rig.name!r} has no valve that a person could command, and no regulator; "
             "experiments need one, or a sealed chamber"
+        )
+    names = [chain.name for chain in chains] or [""]
+    unknown = [n for n in highest if n not in names] if isinstance(highest, Mapping) else []
+    if unknown:
+        raise ParameterError(
+            f"highest has {unknown[0]!r}, which is not allowed: of rig {rig.name!r} one of "
+            f"{', '.join(map(repr, names))}"
         )
     step = settings.sample_time if sample_time is None else sample_time
     if not chains:
@@ -500,10 +523,10 @@ def library(
             continue
         try:
             found = maker()
+            if found is not None and not _exceeds(found, rig):
+                out.append(found)
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
-        if found is not None and not _exceeds(found, rig):
-            out.append(found)
     return out
 
 
@@ -528,7 +551,7 @@ def _of_one(make: _Maker) -> dict[str, Callable[[], Experiment | None]]:
         makers = {name: makers[name] for name in (*hold, "fast_triangle")}
         makers |= {"set_steps": make.set_steps, "fine_staircase": make.fine_staircase}
     elif not can_shut(rig, chain):
-        makers = {name: m for name, m in makers.items() if name not in SHUTTING}
+        makers = {name: m for name, m in makers.items() if name not in _SHUTTING}
         makers |= {"set_steps": make.set_steps}
     if not degrees or len(chain.valves) > 1:
         makers = {n: m for n, m in makers.items() if n not in ("null_ramp", "holds_both_sides")}

@@ -9,7 +9,7 @@ that muscles on two sides of a joint are moved against each other as well as tog
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.next_experiment._chains import (
     Chain,
     Range,
+    Spans,
     can_shut,
     commands_for,
     spans_of,
@@ -33,12 +34,9 @@ from pamrs.diagnosis.next_experiment._experiment import (
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.rig import Rig
 
-__all__ = ["SHUTTING", "several_library"]
+__all__ = ["several_library"]
 
 Array = NDArray[np.float64]
-
-SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
-"""Experiments that need a valve which can be shut."""
 
 
 def several_library(
@@ -97,9 +95,14 @@ class _Several:
     ) -> None:
         self.rig, self.chains, self.dt = rig, list(chains), sample_time
         self.bandwidth, self.settings = settings.bandwidth, settings
-        self.spans = spans_of(rig, settings, highest=highest)
+        self.highest = highest
         self.regulated = chains[0].regulator is not None
         self.what = "set pressure" if self.regulated else "pressure"
+
+    @cached_property
+    def spans(self) -> Spans:
+        """Between which pressures the chains move; found with the first experiment."""
+        return spans_of(self.rig, self.settings, highest=self.highest)
 
     def driven(
         self,
