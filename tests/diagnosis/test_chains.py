@@ -29,6 +29,7 @@ from pamrs.diagnosis.next_experiment import (
 )
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._chains import commands_for, driving
+from pamrs.diagnosis.next_experiment._several import _rests, _stairs, _turned
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -132,6 +133,20 @@ def test_valves_that_switch_hold_a_pressure(carrier: bool) -> None:
         assert values.min() >= 0.0
         if not carrier:
             assert set(np.unique(values)) <= {0.0, 24.0}
+
+
+def test_two_valves_of_a_chamber_are_told_as_two() -> None:
+    for experiment in only(PULSED, "sealed_hold", "step_and_shut"):
+        assert "the valves" in experiment.text
+        assert "the valve " not in experiment.text
+
+
+@pytest.mark.parametrize("count", range(2, 15))
+def test_every_chain_has_an_order_of_its_own(count: int) -> None:
+    for shares in (_rests(count), _stairs(count)):
+        orders = {tuple(np.round(_turned(shares, k), 9)) for k in range(count)}
+        assert len(orders) == count
+        assert all(set(order) <= set(np.round(shares, 9)) for order in orders)
 
 
 def test_what_cannot_be_shut_gets_no_holds() -> None:

@@ -74,14 +74,14 @@ _LOOPS = _Telling(
 _SHUT = _Telling(
     "step_and_shut",
     "step the pressure by two sizes, 1:3, inside the pressures that are already recorded, shut the "
-    "valve after each step and watch for 4 s",
-    "what goes on while the valve is shut is the chamber's own, what fades within seconds is heat "
+    "air in after each step and watch for 4 s",
+    "what goes on while the air is shut in is the chamber's own, what fades within seconds is heat "
     "or a lag, what is there only during the step goes with the flow",
 )
 _HOLDS = _Telling(
     "sealed_hold",
-    "fill to three pressures, shut the valve at each and hold it for 16 s",
-    "what the supply pressure does while the valve is shut is the supply's own, what it does only "
+    "fill to three pressures, shut the air in at each and hold it for 16 s",
+    "what the supply pressure does while the air is shut in is the supply's own, what it does only "
     "while air is drawn goes with the flow",
     alone=False,
 )

@@ -60,6 +60,7 @@ class _Maker:
         (self.chain,) = chains_of(rig)
         self.regulated = self.chain.regulator is not None
         self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
+        self.valves = "the valves" if len(self.chain.valves) > 1 else "the valve"
 
     def driven(
         self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any
@@ -128,7 +129,7 @@ class _Maker:
             "sealed_hold",
             pressures,
             hold,
-            f"fill to {words}, shut the valve at each and hold it for {hold:g} s",
+            f"fill to {words}, shut {self.valves} at each and hold it for {hold:g} s",
         )
 
     def both_sides(self, hold: float = 16.0) -> Experiment | None:
@@ -255,10 +256,11 @@ class _Maker:
         shut = np.zeros(reference.size, dtype=bool)
         for a, b in closed:
             shut |= (time >= a) & (time < b)
+        them = "them" if len(self.chain.valves) > 1 else "it"
         text = (
             f"step from {in_bar(base):g} bar to {in_bar(small):g} bar and back, then to "
-            f"{in_bar(large):g} bar and back (sizes 1:3), with the valve far open, shut it 0.35 s "
-            "after each step and watch for 4 s"
+            f"{in_bar(large):g} bar and back (sizes 1:3), with {self.valves} far open, shut {them} "
+            "0.35 s after each step and watch for 4 s"
         )
         excitation = {"levels_bar": [in_bar(base), in_bar(small), in_bar(large)], "watch_s": 4.0}
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
@@ -318,8 +320,8 @@ class _Maker:
         shown = round(math.degrees(turned - float(rest)), 0)
         initial = {self.chain.pressure: pressure, angle: turned}
         text = (
-            f"at {in_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} "
-            "deg, let it go and record 8 s from the release"
+            f"at {in_bar(pressure):g} bar with {self.valves} shut, lift the arm by hand by "
+            f"{shown:g} deg, let it go and record 8 s from the release"
         )
         excitation = {"level_bar": in_bar(pressure), "deflection_deg": shown}
         try:
