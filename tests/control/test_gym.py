@@ -311,7 +311,7 @@ def test_many_rigs_are_the_single_ones(rig):
     ("call", "word"),
     [
         (lambda: gym_module.RigEnv(pamrs.rigs.named("bench")), "bench.*joints or a mass"),
-        (lambda: gym_module.RigEnv(pamrs.rigs.named("regulated_joint")), "pressure_limit"),
+        (lambda: gym_module.RigEnv(with_regulator(pamrs.rigs.shoulder())), "pressure_limit"),
         (lambda: gym_module.RigEnv(REGULATED, pressure_limit=-1.0), "pressure_limit"),
         (lambda: gym_module.RigEnv(ARM, SHORT), "a mapping of 'elbow', 'wrist'"),
         (lambda: gym_module.RigEnv(ARM, {"elbow": SHORT}), "a mapping of 'elbow', 'wrist'"),
