@@ -159,6 +159,9 @@ PAIR, ARM, REGULATED, MASS, BUNDLE = (
         "recruitment",
     )
 )
+UNLIMITED = pamrs.Rig(
+    "unlimited", {key: part for key, part in REGULATED.model.items() if key != "limits"}
+)
 LIFTS = {"elbow": SHORT, "wrist": lift_hold_return(0.4, 0.8, ramp=0.2, hold=0.2, duration=0.8)}
 
 
@@ -311,7 +314,7 @@ def test_many_rigs_are_the_single_ones(rig):
     ("call", "word"),
     [
         (lambda: gym_module.RigEnv(pamrs.rigs.named("bench")), "bench.*joints or a mass"),
-        (lambda: gym_module.RigEnv(pamrs.rigs.named("regulated_joint")), "pressure_limit"),
+        (lambda: gym_module.RigEnv(UNLIMITED), "pressure_limit"),
         (lambda: gym_module.RigEnv(REGULATED, pressure_limit=-1.0), "pressure_limit"),
         (lambda: gym_module.RigEnv(ARM, SHORT), "a mapping of 'elbow', 'wrist'"),
         (lambda: gym_module.RigEnv(ARM, {"elbow": SHORT}), "a mapping of 'elbow', 'wrist'"),

@@ -58,6 +58,13 @@ def test_on_time_it_is_the_simulated_loop(rig):
     assert device.written[-1] == (pytest.approx(5.0), 5.0)
 
 
+def test_links_of_a_controller_are_not_lengths_of_a_mass(rig):
+    linked = SmallPid(period=0.01)
+    linked.lengths = (0.25, 0.3)  # of its links [m], within which its angles are not
+    run, _ = live(rig, linked)
+    assert run.reason == "finished"
+
+
 def test_jitter_is_measured_and_borne(rig):
     run, _ = live(rig, PID(2.0, 1.0, period=0.01), VirtualClock(1e-3, seed=2))
     assert run.reason == "finished"

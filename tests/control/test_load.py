@@ -238,7 +238,7 @@ def loops_of_a_length(trajectory):
     ]
 
 
-@pytest.mark.parametrize("end", [math.radians(20), math.radians(5), 25.0])
+@pytest.mark.parametrize("end", [math.radians(40), math.radians(2), 25.0])
 @pytest.mark.parametrize("way", range(5))
 def test_an_angle_is_no_length(way, end):
     told = rf"goes to {end:.4g} m, .*load.min_length = 0.18 m to load.max_length = 0.28 m.*\[m\]"
@@ -248,6 +248,21 @@ def test_an_angle_is_no_length(way, end):
 
 def test_the_ends_of_the_stroke_are_lengths():
     closed_loop(RIG, ByLength(PID(100.0, period=PERIOD), RIG), step(0.28, 0.18, duration=0.1))
+
+
+@pytest.mark.parametrize("way", range(5))
+def test_a_length_beyond_a_stop_lets_commands_saturate(way):
+    loops_of_a_length(step(0.27, 0.179, duration=0.1))[way]()
+
+
+def test_a_sweep_knows_the_lengths_of_every_rig():
+    """Of which one is first does not matter."""
+    short = RIG.with_parameters({"load.min_length": 0.25})
+    for plants in ([RIG, short], [short, RIG]):
+        pid = ByLength(PID(np.array([50.0, 100.0]), period=PERIOD), RIG)
+        assert sweep(plants, pid, step(0.27, 0.19, duration=0.1)).final.shape == (2,)
+        with pytest.raises(ParameterError, match=r"min_length = 0.18 m to load.max_length = 0.28"):
+            sweep(plants, pid, step(0.27, 0.07, duration=0.1))
 
 
 def test_a_map_of_gains_is_told_over_masses():

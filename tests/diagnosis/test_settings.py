@@ -24,7 +24,7 @@ CONSTANTS = {
     "prepare/_ambient.py": {"_SAME"},  # of temperatures that are told as one
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
-    "next_experiment/_protocols.py": {"_LEAST_SHARE"},  # of the choked flow
+    "next_experiment/_chains.py": {"_LEAST_SHARE"},  # of the choked flow
     "explain/_conditions.py": {"_MAP_CELLS", "_ONE_SIDED"},  # of a picture and of words
     "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358
     "explain/_closure_words.py": {"_UNITS"},  # of sizes that are told

@@ -83,6 +83,14 @@ class _Sums:
         self._last = time, square, slope
 
 
+def _widest(rigs: Sequence[Rig]) -> tuple[float, float] | None:
+    """Shortest and longest length that the mass of any of some rigs can have [m]; None where none
+    hangs.
+    """
+    found = [lengths for lengths in map(lengths_of, rigs) if lengths is not None]
+    return (min(low for low, _ in found), max(high for _, high in found)) if found else None
+
+
 def sweep(
     plants: Rig | Sequence[Rig],
     controller: Controller,
@@ -161,7 +169,7 @@ def sweep(
             f"unit = {unit!r} is not allowed where a length is followed: nu and omega are those of "
             "metres, and unit is left out"
         )
-    check_reach(trajectory, total * dt, lengths_of(batch.rigs[0]) if by_length else None)
+    check_reach(trajectory, total * dt, _widest(batch.rigs) if by_length else None)
     sums = _Sums(len(batch), factor)
     k = 0
 

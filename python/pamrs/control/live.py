@@ -291,7 +291,8 @@ class _Loop:
             self.period,
             least=1,
         )
-        lengths = getattr(controller, "lengths", None)
+        by_length = getattr(controller, "tracked", ()) == ("length",)
+        lengths = getattr(controller, "lengths", None) if by_length else None
         check_reach(self.trajectory, self.total * self.period, lengths)
         self.k = 0
         self.held = self.commands.safe

@@ -45,8 +45,6 @@ TABLE_5_1 = ((20.0, 0.70), (13.0, 0.95), (7.0, 1.55), (5.0, 0.80))
 
 #: No joint of a rig turns farther either way [rad].
 MOST_ANGLE = 7.0
-_ROUNDED = 1e-9
-"""A length that is beyond its range by less is at its end [m]."""
 
 
 class _Shape(Protocol):
@@ -319,12 +317,15 @@ def check_reach(
     duration : float
         How much of it is looked at [s].
     lengths : (float, float), optional
-        Shortest and longest length [m] of a mass that hangs, where that is what follows.
+        Shortest and longest length [m] of a mass that hangs, where that is what follows. A
+        reference beyond them is allowed, and drives the mass to its stop; one that is further off
+        than they are from each other is none.
 
     Raises
     ------
     ParameterError
-        If an angle is beyond 7 rad either way, or a length outside its range.
+        If an angle is beyond 7 rad either way, or a length outside its range by more than that
+        range.
     """
     if isinstance(trajectory, JointTrajectories):
         for one in trajectory.of_joint.values():
@@ -334,7 +335,8 @@ def check_reach(
     if lengths is not None:
         low, high = lengths
         worst = float(wanted[np.argmax(np.maximum(low - wanted, wanted - high))])
-        if not low - _ROUNDED <= worst <= high + _ROUNDED:
+        stroke = high - low
+        if not low - stroke <= worst <= high + stroke:
             raise ParameterError(
                 f"the trajectory goes to {worst:.4g} m, and the lengths that the hanging mass can "
                 f"have go from load.min_length = {low:.4g} m to load.max_length = {high:.4g} m: "

@@ -74,7 +74,8 @@ class Curves(Entry):
     noise : float
         Noise level of a bin.
     command : (n,) array or None
-        Valve command [V].
+        What is sent to the first chain of the rig: a valve's command [V], or the set pressure of a
+        regulator [Pa, gauge]; every command by its channel is in ``protocol``.
     samples_counted : float
         Independent samples that a recording counts as.
     """

@@ -15,6 +15,7 @@ import numpy as np
 from pamrs.diagnosis.evidence import Judged, is_parameter
 from pamrs.diagnosis.fit import Problem, depends, without_term
 from pamrs.diagnosis.next_experiment import (
+    Chain,
     Experiment,
     Hypothesis,
     apart,
@@ -22,6 +23,7 @@ from pamrs.diagnosis.next_experiment import (
     chains_of,
     experiments_of,
     is_sealed,
+    joined,
     noise_of,
     outcome_of,
     propose,
@@ -34,6 +36,7 @@ from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import regulators_of
 
 __all__ = ["next_experiment"]
@@ -51,11 +54,14 @@ class _Telling:
         The same in words, for a rig of which the library makes none.
     shows : str
         What it shows.
+    alone : bool
+        Whether it moves one chain of several while the others are held.
     """
 
     kind: str
     text: str
     shows: str
+    alone: bool = True
 
 
 _LOOPS = _Telling(
@@ -68,15 +74,16 @@ _LOOPS = _Telling(
 _SHUT = _Telling(
     "step_and_shut",
     "step the pressure by two sizes, 1:3, inside the pressures that are already recorded, shut the "
-    "valve after each step and watch for 4 s",
-    "what goes on while the valve is shut is the chamber's own, what fades within seconds is heat "
+    "air in after each step and watch for 4 s",
+    "what goes on while the air is shut in is the chamber's own, what fades within seconds is heat "
     "or a lag, what is there only during the step goes with the flow",
 )
 _HOLDS = _Telling(
     "sealed_hold",
-    "fill to three pressures, shut the valve at each and hold it for 16 s",
-    "what the supply pressure does while the valve is shut is the supply's own, what it does only "
+    "fill to three pressures, shut the air in at each and hold it for 16 s",
+    "what the supply pressure does while the air is shut in is the supply's own, what it does only "
     "while air is drawn goes with the flow",
+    alone=False,
 )
 _SET = _Telling(
     "set_steps",
@@ -118,15 +125,35 @@ def _telling(block: Block, rig: Rig) -> _Telling:
     if block.mechanical:
         return _LOOPS
     if is_sealed(rig):
-        if len(rig.tables("chamber")) > 1:
+        if _joining(block, rig):
             return _OVER
         lines = rig.tables("line") or rig.tables("muscle")
         return _BLOWN if lines else _ONCE_MORE
     if regulators_of(rig) and not rig.tables("valve"):
         return _SET
-    if not all(can_shut(rig, chain) for chain in chains_of(rig)):
+    if not all(can_shut(rig, chain) for chain in _driving(block, rig)):
         return _KEPT
     return _HOLDS if block.kind == "supply" else _SHUT
+
+
+def _driving(block: Block, rig: Rig) -> list[Chain]:
+    """The chains that drive a block: those whose pressure or joint it is, or else those of whose
+    commands it is predicted, or else all.
+    """
+    chains = chains_of(rig)
+    own = [c for c in chains if block.channel in (c.pressure, *c.moves)]
+    return own or [c for c in chains if set(c.commands) & set(block.drives)] or chains
+
+
+def _joining(block: Block, rig: Rig) -> list[str]:
+    """Names of the chambers between which air blows over where nobody sends a command, that of the
+    block first; none where no line joins its chamber to another one.
+    """
+    own = block.channel.partition(".")[2]
+    if own in rig.tables("chamber"):
+        reached = joined(rig, qualified("chamber", own))
+        return [own, *reached] if reached else []
+    return [n for n in rig.tables("chamber") if joined(rig, qualified("chamber", n))]
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,8 +172,8 @@ class _Question:
         What there is already.
     problem : Problem
         Any of them, for its settings.
-    made : dict of str to (Experiment or None)
-        What the library made for this rig so far, by name or kind.
+    made : dict
+        What the library made for this rig so far, by the names that it was asked for.
     """
 
     nominal: Rig
@@ -154,7 +181,7 @@ class _Question:
     blocks: list[Block]
     recordings: list[Prepared]
     problem: Problem
-    made: dict[str, Experiment | None] = field(default_factory=dict)
+    made: dict[tuple[str, ...], Experiment | None] = field(default_factory=dict)
 
     @property
     def noise(self) -> dict[str, float]:
@@ -187,29 +214,28 @@ class _Question:
         """What to do about a block, what it shows, and the experiment where the library makes it
         for this rig.
         """
-        telling = _telling(block, self.nominal)
-        # of several chains the one that drives the block, or else the first
-        chains = [chain for chain in chains_of(self.nominal) if chain.name]
-        own = [c.name for c in chains if block.channel in (c.pressure, *c.moves)]
-        named = [f"{telling.kind}.{name}" for name in (own or [c.name for c in chains])[:1]]
-        made = self._made((*named, telling.kind))
+        telling, rig = _telling(block, self.nominal), self.nominal
+        names = [telling.kind]
+        if telling is _OVER:
+            names = [f"{telling.kind}.{name}" for name in _joining(block, rig)]
+        elif telling.alone and len(chains_of(rig)) > 1:  # no chain but those that drive the block
+            names = [f"{telling.kind}.{chain.name}" for chain in _driving(block, rig)]
+        made = self._made(tuple(names))
         return telling.text if made is None else made.text, telling.shows, made
 
-    def _made(self, names: Sequence[str]) -> Experiment | None:
-        """The first experiment of some names or kinds that the library makes for this rig; None
-        where it makes none of them.
+    def _made(self, names: tuple[str, ...]) -> Experiment | None:
+        """The first experiment of some names that the library makes for this rig; None where it
+        makes none of them.
         """
-        records = [p.recording for p in self.recordings]
-        settings = self.problem.settings.next_experiment
-        for name in names:
-            if name not in self.made:
-                self.made[name] = None
-                with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
-                    found = experiments_of(self.nominal, records, settings, {name})
-                    self.made[name] = next(iter(found), None)
-            if self.made[name] is not None:
-                return self.made[name]
-        return None
+        if names not in self.made:
+            found: list[Experiment] = []
+            records = [p.recording for p in self.recordings]
+            settings = self.problem.settings.next_experiment
+            with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
+                found = experiments_of(self.nominal, records, settings, names)
+            by_name = {experiment.name: experiment for experiment in found}
+            self.made[names] = next((by_name[n] for n in names if n in by_name), None)
+        return self.made[names]
 
 
 def next_experiment(

@@ -2,8 +2,8 @@
 
 Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `apart`, `information`,
 `entropy`, `experiments_of`, `protocol_of`, `spoken` (experiments compared); `Experiment`, `Range`,
-`library`, `Chain`, `chains_of`, `can_shut`, `pressure_range`, `trial_of`, `is_sealed` (what a
-person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before there are data);
+`library`, `Chain`, `chains_of`, `can_shut`, `pressure_range`, `trial_of`, `is_sealed`, `joined`
+(what a person can record); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before there are data);
 `Left`, `Linear`, `checked_channels`, `measurable`, `counted`, `difference`, `linear`, `misfit`,
 `problem_of`, `taken`, `usual_noise`, `noise_of`, `weights_of` (how far two models differ).
 """
@@ -16,6 +16,7 @@ from pamrs.diagnosis.next_experiment._chains import (
     can_shut,
     chains_of,
     is_sealed,
+    joined,
     pressure_range,
     trial_of,
 )
@@ -73,6 +74,7 @@ __all__ = [
     "experiments_of",
     "information",
     "is_sealed",
+    "joined",
     "library",
     "linear",
     "measurable",

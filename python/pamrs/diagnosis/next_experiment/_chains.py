@@ -20,7 +20,7 @@ from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.control import OrificeInverse
 from pamrs.diagnosis.settings import NextExperimentSettings
-from pamrs.errors import DiagnosisError
+from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
 from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
@@ -34,6 +34,7 @@ __all__ = [
     "commands_for",
     "driving",
     "is_sealed",
+    "joined",
     "pressure_range",
     "spans_of",
     "trial_of",
@@ -45,8 +46,6 @@ Mask = NDArray[np.bool_]
 _LEAST_SHARE = 0.14
 """Least flow that a command is found for, as a share of the choked one: near equal pressures the
 valve would open without bound."""
-_RAMP = 15.0
-"""Time in which pressures rise to find where a joint moves [s]."""
 
 
 @dataclass(frozen=True)
@@ -141,7 +140,7 @@ def chains_of(rig: Rig) -> list[Chain]:
     else:
         found = []
         for name in regulators_of(rig):
-            behind = _behind(rig, qualified("supply", name))
+            behind = joined(rig, qualified("supply", name))
             if behind:
                 found.append(Chain(name, (), name, behind[0], _moved(rig, set(behind))))
     if len(found) == 1:
@@ -150,8 +149,8 @@ def chains_of(rig: Rig) -> list[Chain]:
     return found
 
 
-def _behind(rig: Rig, node: str) -> list[str]:
-    """Names of the chambers that lines join to a block, the nearest first."""
+def joined(rig: Rig, node: str) -> list[str]:
+    """Names of the chambers that lines join to a block (``chamber.left``), the nearest first."""
     ends = [(line["from"], line["to"]) for line in rig.ports("line").values()]
     found, reached = [node], []
     for at in found:
@@ -445,13 +444,22 @@ def pressure_range(
     Raises
     ------
     DiagnosisError
-        If nothing says how high the set pressure of a regulator may go.
+        If nothing says how high the set pressure of a regulator may go, the rig has several chains,
+        or its model does not hold while its pressure rises.
     """
     if is_sealed(rig):
         said = _most(rig, None, highest)
-        top = min(7.0e5, *said, math.inf) if highest is None else min(said)
+        top = min(said, default=7.0e5)
+        if highest is None:
+            top = min(7.0e5, top)
         return Range(0.35 * top, top)
-    (chain,) = chains_of(rig)
+    chains = chains_of(rig)
+    if len(chains) != 1:
+        there = f"the chains {', '.join(c.name for c in chains)}" if chains else "no chain"
+        raise DiagnosisError(
+            f"rig {rig.name!r} has {there}; the pressures of a rig of one chain were asked for"
+        )
+    (chain,) = chains
     top = _top(rig, chain, highest)
     if not chain.moves:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
@@ -470,11 +478,17 @@ def _played(
 ) -> Simulation:
     """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
     chains = chains_of(rig)
-    if chains[0].regulator is not None:
-        commands = {chain.commands[0]: references[chain.name] for chain in chains}
-    else:
-        commands = commands_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
-    return simulate(rig, sample_time=0.01, **driving(commands))
+    try:
+        if chains[0].regulator is not None:
+            commands = {chain.commands[0]: references[chain.name] for chain in chains}
+        else:
+            commands = commands_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
+        return simulate(rig, sample_time=0.01, **driving(commands))
+    except SimulationError as error:
+        raise DiagnosisError(
+            f"rig {rig.name!r}: its model does not hold while its pressures rise, by which those "
+            f"of experiments are found: {error}"
+        ) from error
 
 
 def _share(rig: Rig, channel: str, found: Simulation) -> Array:
@@ -522,22 +536,21 @@ def spans_of(
     rig : Rig
         A rig of several chains.
     settings : NextExperimentSettings
-        Bandwidth of the loops that find them.
+        Bandwidth of the loops that find them, and how slowly the pressures rise.
     highest : mapping of str to float, optional
         Gauge pressures by chain that are not to be exceeded [Pa].
 
     Raises
     ------
     DiagnosisError
-        If nothing says how high the set pressure of a regulator may go.
+        If nothing says how high the set pressure of a regulator may go, or the model does not hold
+        while the pressures rise.
     """
-    chains = chains_of(rig)
+    chains, ramp = chains_of(rig), settings.ramp_time
     tops = {chain.name: _top(rig, chain, highest) for chain in chains}
-    time = np.asarray(np.arange(round(_RAMP / 0.01) + 1) * 0.01, dtype=np.float64)
+    time = np.asarray(np.arange(round(ramp / 0.01) + 1) * 0.01, dtype=np.float64)
     # vented muscles may push like struts: nobody goes below a tenth
-    rising: dict[str, Array] = {
-        name: top * (0.1 + 0.9 * time / _RAMP) for name, top in tops.items()
-    }
+    rising: dict[str, Array] = {name: top * (0.1 + 0.9 * time / ramp) for name, top in tops.items()}
     found = _played(rig, rising, settings)
     held = {c.name: _free(rig, c, chains, found, tops[c.name]).at(0.5) for c in chains}
     alone = {}
@@ -546,7 +559,7 @@ def spans_of(
             c.name: _line(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
         }
         moving = _line(
-            time, [0.0, 2.0, _RAMP], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
+            time, [0.0, 2.0, ramp], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
         )
         found = _played(rig, {**still, chain.name: moving}, settings)
         alone[chain.name] = _free(rig, chain, [chain], found, tops[chain.name], first=200)

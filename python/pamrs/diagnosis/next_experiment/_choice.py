@@ -292,7 +292,8 @@ def propose(
         parameters are known, half of the value where it does not). What has no model, ``unlisted``,
         cannot be simulated and is left out by the caller.
     noise : mapping of str to float, optional
-        Sample noise by channel [SI]; typical transducers where it is missing.
+        Sample noise by channel, or by kind of channel [SI]; typical transducers where it is
+        missing.
     recordings : sequence of Recording or Prepared, optional
         What there is already: its channels, its sample time and its highest pressure hold for what
         comes.
@@ -332,7 +333,7 @@ def propose(
     own_settings = settings.next_experiment
     chosen = _checked(hypotheses, own_settings)
     usual = noise_of(nominal, own_settings)
-    sound = {**usual, **(noise or {})}
+    sound = {**noise_of(nominal, own_settings, noise), **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
     uncertainty = entropy([p for _, _, p in chosen])
@@ -543,11 +544,10 @@ def experiments_of(
     """
     if not records:
         return library(rig, settings, only=only)
-    usual, least, most = settings.sample_time, settings.least_sample_time, settings.most_sample_time
+    shortest, longest = settings.least_sample_time, settings.most_sample_time
     if is_sealed(rig):
-        usual = settings.sealed_sample_time
-        least, most = settings.least_sealed_sample_time, settings.most_sealed_sample_time
-    step = min(max(min((r.sample_time for r in records), default=usual), least), most)
+        shortest, longest = settings.least_sealed_sample_time, settings.most_sealed_sample_time
+    step = min(max(min(r.sample_time for r in records), shortest), longest)
     every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
     seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
     limits = {}
@@ -558,11 +558,12 @@ def experiments_of(
             for name in names
             if name in r.channels and np.isfinite(r.channels[name]).any()
         ]
-        if max(peaks, default=0.0) > 2e4:
-            limits[chain] = 1.05 * max(peaks)
-    # what has no gauge is moved no higher than what has one
-    most = max(limits.values(), default=0.0)
-    limits = {chain: limits.get(chain, most) for chain in seen if limits}
+        if peaks:  # of one that nobody filled as well: it is filled no further
+            limits[chain] = max(1.05 * max(peaks), settings.least_highest)
+    if limits:
+        # what has no gauge is moved no higher than what has one
+        highest = max(limits.values())
+        limits = {chain: limits.get(chain, highest) for chain in seen}
     return library(rig, settings, sample_time=step, highest=limits or None, only=only)
 
 

@@ -103,7 +103,6 @@ _BEHIND_LINE = (
     "it is predicted from the command, through the line; what shows here and not at the line's "
     "inlet lies behind the valve"
 )
-_MOST_HALVINGS = 8
 _Place = tuple[Block, str]
 """A block, and the name of an experiment."""
 
@@ -199,7 +198,7 @@ def plan_diagnosis(
     whole = available_blocks(rig, every, settings.prepare)
     pool = {e.name: e for e in library(rig, settings.next_experiment)}
     chosen = _chosen(rig, pool, experiments)
-    starts = _starts(rig, whole)
+    starts = _starts(rig, whole, settings.plan.most_halvings)
     parts: dict[_Place, _Part] = {}
     layers = _layers(rig, own, every, settings)
     together = [block for _, blocks in layers for block in blocks]
@@ -355,7 +354,7 @@ def _chosen(
     return list(dict.fromkeys(found))
 
 
-def _starts(rig: Rig, blocks: list[Block]) -> list[Start]:
+def _starts(rig: Rig, blocks: list[Block], most_halvings: int) -> list[Start]:
     """Every start of every effect that a rig can have; where some blocks tell apart at which place
     it acts, of the effect at each of them.
     """
@@ -366,15 +365,19 @@ def _starts(rig: Rig, blocks: list[Block]) -> list[Start]:
         places = places_of(rig, effect, blocks)
         for term in [term_of(effect, at) for at in places] or [effect]:
             usual = starts_of(term, sealed=rig.model["valve"] is None)
-            found += [s for s in (_possible(rig, start) for start in usual) if s is not None]
+            found += [
+                s
+                for s in (_possible(rig, start, most_halvings) for start in usual)
+                if s is not None
+            ]
     return found
 
 
-def _possible(rig: Rig, start: Start) -> Start | None:
+def _possible(rig: Rig, start: Start, most_halvings: int) -> Start | None:
     """A start of an effect, halved until a rig can have it (a small arm does not carry as much
     payload as an effect takes away); None where it never can.
     """
-    for halvings in range(_MOST_HALVINGS):
+    for halvings in range(most_halvings):
         smaller = start.scaled(0.5**halvings) if halvings else start
         with contextlib.suppress(ParameterError, RigError, SimulationError):
             core_rig(smaller.applied(rig))

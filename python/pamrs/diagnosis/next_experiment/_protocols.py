@@ -22,6 +22,7 @@ from pamrs.diagnosis.next_experiment._chains import (
     can_shut,
     chains_of,
     commands_for,
+    joined,
     pressure_range,
     trial_of,
 )
@@ -33,25 +34,33 @@ from pamrs.diagnosis.next_experiment._experiment import (
     then,
     through,
 )
-from pamrs.diagnosis.next_experiment._several import SHUTTING, several_library
+from pamrs.diagnosis.next_experiment._several import several_library
 from pamrs.diagnosis.settings import NextExperimentSettings
-from pamrs.errors import DiagnosisError, SimulationError
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
 __all__ = ["library"]
 
 Array = NDArray[np.float64]
 
+_SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
+"""Experiments that need a valve which can be shut."""
+
 
 class _Maker:
     """Builds the experiments of one rig."""
 
-    def __init__(self, rig: Rig, sample_time: float, span: Range, bandwidth: float) -> None:
-        self.rig, self.dt, self.span, self.bandwidth = rig, sample_time, span, bandwidth
+    def __init__(
+        self, rig: Rig, sample_time: float, span: Range, settings: NextExperimentSettings
+    ) -> None:
+        self.rig, self.dt, self.span = rig, sample_time, span
+        self.bandwidth, self.frequencies = settings.bandwidth, settings.multisine_frequencies
         (self.chain,) = chains_of(rig)
         self.regulated = self.chain.regulator is not None
         self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
+        self.valves = "the valves" if len(self.chain.valves) > 1 else "the valve"
 
     def driven(
         self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any
@@ -120,7 +129,7 @@ class _Maker:
             "sealed_hold",
             pressures,
             hold,
-            f"fill to {words}, shut the valve at each and hold it for {hold:g} s",
+            f"fill to {words}, shut {self.valves} at each and hold it for {hold:g} s",
         )
 
     def both_sides(self, hold: float = 16.0) -> Experiment | None:
@@ -182,7 +191,7 @@ class _Maker:
         )
 
     def multisine(self) -> Experiment:
-        frequencies = [0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1]
+        frequencies = list(self.frequencies)
         time = np.arange(round(30.0 / self.dt) + 1) * self.dt
         size = 1.0 / np.sqrt(1.0 + (np.array(frequencies) / 0.6) ** 2)
         phase = (
@@ -247,10 +256,11 @@ class _Maker:
         shut = np.zeros(reference.size, dtype=bool)
         for a, b in closed:
             shut |= (time >= a) & (time < b)
+        them = "them" if len(self.chain.valves) > 1 else "it"
         text = (
             f"step from {in_bar(base):g} bar to {in_bar(small):g} bar and back, then to "
-            f"{in_bar(large):g} bar and back (sizes 1:3), with the valve far open, shut it 0.35 s "
-            "after each step and watch for 4 s"
+            f"{in_bar(large):g} bar and back (sizes 1:3), with {self.valves} far open, shut {them} "
+            "0.35 s after each step and watch for 4 s"
         )
         excitation = {"levels_bar": [in_bar(base), in_bar(small), in_bar(large)], "watch_s": 4.0}
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
@@ -310,8 +320,8 @@ class _Maker:
         shown = round(math.degrees(turned - float(rest)), 0)
         initial = {self.chain.pressure: pressure, angle: turned}
         text = (
-            f"at {in_bar(pressure):g} bar with the valve shut, lift the arm by hand by {shown:g} "
-            "deg, let it go and record 8 s from the release"
+            f"at {in_bar(pressure):g} bar with {self.valves} shut, lift the arm by hand by "
+            f"{shown:g} deg, let it go and record 8 s from the release"
         )
         excitation = {"level_bar": in_bar(pressure), "deflection_deg": shown}
         try:
@@ -385,21 +395,23 @@ def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> 
         )
         begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
         out.append(_left_alone(name, text, begin, seconds, settings.sealed_sample_time))
-    for chamber in chambers if len(chambers) > 1 else ():
+    for chamber in chambers:
+        reached = joined(rig, qualified("chamber", chamber))
+        if not reached:
+            continue
         begin = {dotted("muscle_pressure", other): span.low for other in chambers}
         begin[dotted("muscle_pressure", chamber)] = span.high
-        seconds = _equalised(rig, begin, settings)
+        try:
+            seconds = _equalised(rig, begin, [chamber, *reached], settings)
+        except SimulationError:
+            continue  # the model does not hold there: nothing to propose to anyone
         text = (
             f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
             f"bar, open what lies between and record {seconds:.2g} s from that moment"
         )
-        step = max(settings.least_sample_time, seconds / _MOST_ROWS)
+        step = max(settings.least_sample_time, seconds / settings.most_blown_samples)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
-
-
-_MOST_ROWS = 3000
-"""Samples of a pressure that blows over."""
 
 
 def _segments(rig: Rig) -> bool:
@@ -412,12 +424,14 @@ def _outlets(rig: Rig) -> bool:
     return any(ends["to"] == "ambient" for ends in rig.ports("line").values())
 
 
-def _equalised(rig: Rig, begin: dict[str, float], settings: NextExperimentSettings) -> float:
-    """Three times as long as chambers take to come within a hundredth of each other [s], from 1 s
-    to 60 s.
+def _equalised(
+    rig: Rig, begin: dict[str, float], joining: Collection[str], settings: NextExperimentSettings
+) -> float:
+    """Three times as long as chambers that lines join take to come within a hundredth of each other
+    [s], from 1 s to 60 s.
     """
     found = simulate(rig, sample_time=settings.sample_time, duration=20.0, initial=begin)
-    each = np.array([found[channel] for channel in begin])
+    each = np.array([found[dotted("muscle_pressure", name)] for name in joining])
     apart = each.max(axis=0) - each.min(axis=0)
     late = np.flatnonzero(apart > 0.01 * apart[0])
     return float(np.clip(3.0 * found.time[late[-1]], 1.0, 60.0))
@@ -468,7 +482,10 @@ def library(
     Raises
     ------
     DiagnosisError
-        If no experiment is made for such a rig, or nothing says how high a regulator may be set.
+        If no experiment is made for such a rig, nothing says how high a regulator may be set, or
+        the model of the rig does not hold while its pressures rise.
+    ParameterError
+        If ``highest`` has a name that is none of a chain.
     """
     if has_frame(rig):
         raise DiagnosisError(
@@ -481,6 +498,13 @@ def library(
             f"rig {rig.name!r} has no valve that a person could command, and no regulator; "
             "experiments need one, or a sealed chamber"
         )
+    names = [chain.name for chain in chains] or [""]
+    unknown = [n for n in highest if n not in names] if isinstance(highest, Mapping) else []
+    if unknown:
+        raise ParameterError(
+            f"highest has {unknown[0]!r}, which is not allowed: of rig {rig.name!r} one of "
+            f"{', '.join(map(repr, names))}"
+        )
     step = settings.sample_time if sample_time is None else sample_time
     if not chains:
         if sample_time is not None:
@@ -490,7 +514,7 @@ def library(
         return [e for e in sealed if only is None or e.name in only or e.kind in only]
     if len(chains) == 1:
         span = pressure_range(rig, settings, highest=highest)
-        makers = _of_one(_Maker(rig, step, span, settings.bandwidth))
+        makers = _of_one(_Maker(rig, step, span, settings))
     else:
         if not isinstance(highest, Mapping):
             highest = {} if highest is None else {c.name: highest for c in chains}
@@ -501,10 +525,10 @@ def library(
             continue
         try:
             found = maker()
+            if found is not None and not _exceeds(found, rig):
+                out.append(found)
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
-        if found is not None and not _exceeds(found, rig):
-            out.append(found)
     return out
 
 
@@ -529,7 +553,7 @@ def _of_one(make: _Maker) -> dict[str, Callable[[], Experiment | None]]:
         makers = {name: makers[name] for name in (*hold, "fast_triangle")}
         makers |= {"set_steps": make.set_steps, "fine_staircase": make.fine_staircase}
     elif not can_shut(rig, chain):
-        makers = {name: m for name, m in makers.items() if name not in SHUTTING}
+        makers = {name: m for name, m in makers.items() if name not in _SHUTTING}
         makers |= {"set_steps": make.set_steps}
     if not degrees or len(chain.valves) > 1:
         makers = {n: m for n, m in makers.items() if n not in ("null_ramp", "holds_both_sides")}

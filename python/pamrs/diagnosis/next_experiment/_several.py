@@ -9,7 +9,7 @@ that muscles on two sides of a joint are moved against each other as well as tog
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.next_experiment._chains import (
     Chain,
     Range,
+    Spans,
     can_shut,
     commands_for,
     spans_of,
@@ -33,15 +34,9 @@ from pamrs.diagnosis.next_experiment._experiment import (
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.rig import Rig
 
-__all__ = ["SHUTTING", "several_library"]
+__all__ = ["several_library"]
 
 Array = NDArray[np.float64]
-
-SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
-"""Experiments that need a valve which can be shut."""
-_FREQUENCIES = (0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1)
-_BETWEEN = 1.7
-"""Ratio from one of these to the next, which several chains share out."""
 
 
 def several_library(
@@ -99,10 +94,15 @@ class _Several:
         highest: Mapping[str, float],
     ) -> None:
         self.rig, self.chains, self.dt = rig, list(chains), sample_time
-        self.bandwidth = settings.bandwidth
-        self.spans = spans_of(rig, settings, highest=highest)
+        self.bandwidth, self.settings = settings.bandwidth, settings
+        self.highest = highest
         self.regulated = chains[0].regulator is not None
         self.what = "set pressure" if self.regulated else "pressure"
+
+    @cached_property
+    def spans(self) -> Spans:
+        """Between which pressures the chains move; found with the first experiment."""
+        return spans_of(self.rig, self.settings, highest=self.highest)
 
     def driven(
         self,
@@ -219,9 +219,10 @@ class _Several:
 
     def multisine(self) -> Experiment:
         time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        usual, ratio = self.settings.multisine_frequencies, self.settings.frequency_ratio
         references, used = {}, {}
         for k, chain in enumerate(self.chains):
-            frequencies = np.array(_FREQUENCIES) * _BETWEEN ** (k / len(self.chains))
+            frequencies = np.array(usual) * ratio ** (k / len(self.chains))
             count = frequencies.size
             size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
             phase = -np.pi * np.arange(count) * np.arange(1, count + 1) / count + 2.0 * k
@@ -235,21 +236,23 @@ class _Several:
         words, numbers = self.levels()
         text = (
             f"drive every {self.what} as a multisine of its own, with no frequency in common, of "
-            f"{_FREQUENCIES[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, for 30 s"
+            f"{usual[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, for 30 s"
         )
         return self.driven("multisine", text, {"frequencies_hz": used, **numbers}, references)
 
     def sealed(self, hold: float = 16.0) -> Experiment:
-        points, closed = self._ordered((0.05, 0.5, 0.95), (1.0, 1.0), hold)
+        shares = _rests(len(self.chains))
+        points, closed = self._ordered(shares, (1.0, 1.0), hold)
         size = round(points[self.chains[0].name][-1][0] / self.dt) + 1
         time = np.arange(size) * self.dt
         shut = np.zeros(size, dtype=bool)
         for a, b in closed:
             shut |= (time >= a) & (time < b)
-        words, numbers = self._in_order((0.05, 0.5, 0.95))
+        words, numbers = self._in_order(shares)
+        count = "three" if len(shares) == 3 else f"{len(shares)}"
         text = (
-            f"fill all chambers to three pressures each, in another order for each ({words}), shut "
-            f"all valves at each and hold for {hold:g} s"
+            f"fill all chambers to {count} pressures each, in another order for each ({words}), "
+            f"shut all valves at each and hold for {hold:g} s"
         )
         every = {c.name: shut for c in self.chains}
         return self.together("sealed_hold", points, text, {**numbers, "hold_s": hold}, shut=every)
@@ -303,7 +306,8 @@ class _Several:
             points = then(points, (0.02, goal), (0.35, goal))
             closed.append((points[-1][0], points[-1][0] + watch))
             points = then(points, (watch, goal))
-        what = f", shut its valve 0.35 s after each step and watch for {watch:g} s"
+        its = "its valves" if len(chain.valves) > 1 else "its valve"
+        what = f", shut {its} 0.35 s after each step and watch for {watch:g} s"
         text = (
             f"step {self.told(chain)} from {in_bar(base):g} bar to {in_bar(small):g} bar and back, "
             f"then to {in_bar(large):g} bar and back (sizes 1:3)"
@@ -340,7 +344,7 @@ class _Several:
         return self.alone(chain, "nested_triangles", points, text, numbers)
 
     def staircase(self) -> Experiment:
-        shares = (0.05, 0.35, 0.65, 0.95, 0.65, 0.35)
+        shares = _stairs(len(self.chains))
         points, _ = self._ordered(shares, (0.5, 0.5), 4.0)
         words, numbers = self._in_order(shares)
         text = (
@@ -350,7 +354,8 @@ class _Several:
         return self.together("staircase", points, text, {**numbers, "hold_s": 4.5})
 
     def long_hold(self) -> Experiment:
-        shares = (0.95, 0.4) if len(self.chains) == 2 else (0.95, 0.4, 0.7)
+        count = len(self.chains)
+        shares = (0.95, 0.4) if count == 2 else (0.95, 0.4, 0.7) if count <= 6 else _rests(count)
         points, _ = self._ordered(shares, (0.3, 0.7), 24.0)
         words, numbers = self._in_order(shares)
         text = f"step every {self.what} and keep it for 25 s after each step ({words})"
@@ -392,6 +397,25 @@ class _Several:
         return self.together(
             "other_payload", points, text, also, changes={name: other}, extra=90.0, needs=needs
         )
+
+
+def _rests(count: int) -> tuple[float, ...]:
+    """Shares of their ranges at which some chains rest: as many as give each an order of its own,
+    two for each share (:func:`_turned`).
+    """
+    if count <= 6:
+        return (0.05, 0.5, 0.95)
+    return tuple(np.linspace(0.05, 0.95, (count + 1) // 2).tolist())
+
+
+def _stairs(count: int) -> tuple[float, ...]:
+    """Shares up and down again; mirrored stairs are the same begun half way, so that each step
+    gives one order.
+    """
+    if count <= 6:
+        return (0.05, 0.35, 0.65, 0.95, 0.65, 0.35)
+    up = np.linspace(0.05, 0.95, (count + 1) // 2 + 1).tolist()
+    return (*up, *up[-2:0:-1])
 
 
 def _turned(shares: Sequence[float], k: int) -> Sequence[float]:

@@ -144,6 +144,41 @@ class NextExperimentSettings(SettingsGroup):
         reason="bandwidth of the pressure loop by which commands are found on the model",
         origin="judgement",
     )
+    least_highest: float = setting(
+        2e4,
+        unit="Pa",
+        above=0.0,
+        reason="gauge pressure that experiments may reach of what was never recorded above it",
+        origin="judgement: small beside any pressure that moves a muscle, large beside its noise",
+    )
+    ramp_time: float = setting(
+        15.0,
+        unit="s",
+        above=0.0,
+        reason="time in which the pressures of several chains rise, to find where joints move",
+        origin="judgement: slow beside the lag of a muscle and its line",
+    )
+    multisine_frequencies: tuple[float, ...] = setting(
+        (0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1),
+        unit="Hz",
+        above=0.0,
+        reason="of a multisine, the lowest first",
+        origin="judgement: from slow creep to the band of a joint of an arm",
+    )
+    frequency_ratio: float = setting(
+        1.7,
+        unit="1",
+        least=1.0,
+        reason="from one of these to the next, which the multisines of several chains share out",
+        origin="a little less than the mean ratio of multisine_frequencies, 1.77",
+    )
+    most_blown_samples: int = setting(
+        3000,
+        unit="count",
+        least=2,
+        reason="samples of a pressure that blows over, which may take 1 s to 60 s",
+        origin="judgement: 20 ms at most",
+    )
 
 
 @dataclass(frozen=True)
@@ -185,6 +220,13 @@ class PlanSettings(SettingsGroup):
         above=0.0,
         reason="largest size of an effect that is worth telling",
         origin="judgement",
+    )
+    most_halvings: int = setting(
+        8,
+        unit="count",
+        least=1,
+        reason="sizes that are tried, each half of the one before, until a rig can have it",
+        origin="judgement: below a hundredth of its typical size an effect is another one",
     )
 
 
