@@ -14,7 +14,7 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, simulate
 
-__all__ = ["Experiment", "Points", "in_bar", "other_payload", "then", "through"]
+__all__ = ["Experiment", "Points", "in_bar", "nested_triangles", "other_payload", "then", "through"]
 
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
@@ -139,3 +139,32 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
         return None
     other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
     return name, other, "" if others else f"another payload, about {other:.3g} kg"
+
+
+def nested_triangles(low: float, high: float, what: str) -> tuple[Points, str, dict[str, Any]]:
+    """Triangles of three sizes around the middle of a range of pressures [Pa], slow and then fast:
+    corners, words and numbers.
+    """
+    middle, reach = low + 0.5 * (high - low), 0.45 * (high - low)
+    sizes, periods = (1.0, 0.6, 0.3), (12.0, 1.2)
+    points: Points = then([(0.0, 0.0)], (2.0, middle))
+    for period in periods:
+        for share in sizes:
+            points = then(
+                points,
+                (0.25 * period, middle + share * reach),
+                (0.5 * period, middle - share * reach),
+                (0.25 * period, middle),
+            )
+    reaches = [in_bar(share * reach) for share in sizes]
+    text = (
+        f"drive {what} in nested triangles around {in_bar(middle):g} bar, of "
+        f"±{reaches[0]:g}, ±{reaches[1]:g} and ±{reaches[2]:g} bar, "
+        "first with a period of 12 s, then of 1.2 s"
+    )
+    numbers = {
+        "middle_bar": in_bar(middle),
+        "reach_bar": reaches,
+        "periods_s": list(periods),
+    }
+    return points, text, numbers

@@ -30,6 +30,7 @@ from pamrs.diagnosis.next_experiment._experiment import (
     Experiment,
     Points,
     in_bar,
+    nested_triangles,
     other_payload,
     then,
     through,
@@ -266,27 +267,8 @@ class _Maker:
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
 
     def nested(self) -> Experiment:
-        middle, reach = self.span.at(0.5), 0.45 * (self.span.high - self.span.low)
-        points: Points = then([(0.0, 0.0)], (2.0, middle))
-        for period in (12.0, 1.2):
-            for share in (1.0, 0.6, 0.3):
-                points = then(
-                    points,
-                    (0.25 * period, middle + share * reach),
-                    (0.5 * period, middle - share * reach),
-                    (0.25 * period, middle),
-                )
-        text = (
-            f"drive {self.what} in nested triangles around {in_bar(middle):g} bar, of "
-            f"±{in_bar(reach):g}, ±{in_bar(0.6 * reach):g} and ±{in_bar(0.3 * reach):g} bar, "
-            "first with a period of 12 s, then of 1.2 s"
-        )
-        excitation = {
-            "middle_bar": in_bar(middle),
-            "reach_bar": [in_bar(s * reach) for s in (1.0, 0.6, 0.3)],
-            "periods_s": [12.0, 1.2],
-        }
-        return self.driven("nested_triangles", text, excitation, through(points, self.dt))
+        points, text, numbers = nested_triangles(self.span.low, self.span.high, self.what)
+        return self.driven("nested_triangles", text, numbers, through(points, self.dt))
 
     def null_ramp(self) -> Experiment:
         middle = self.span.at(0.5)

@@ -27,6 +27,7 @@ from pamrs.diagnosis.next_experiment._experiment import (
     Experiment,
     Points,
     in_bar,
+    nested_triangles,
     other_payload,
     then,
     through,
@@ -321,26 +322,7 @@ class _Several:
 
     def nested(self, chain: Chain) -> Experiment:
         span = self.spans.alone[chain.name]
-        middle, reach = span.at(0.5), 0.45 * (span.high - span.low)
-        points: Points = then([(0.0, 0.0)], (2.0, middle))
-        for period in (12.0, 1.2):
-            for share in (1.0, 0.6, 0.3):
-                points = then(
-                    points,
-                    (0.25 * period, middle + share * reach),
-                    (0.5 * period, middle - share * reach),
-                    (0.25 * period, middle),
-                )
-        text = (
-            f"drive {self.told(chain)} in nested triangles around {in_bar(middle):g} bar, of "
-            f"±{in_bar(reach):g}, ±{in_bar(0.6 * reach):g} and ±{in_bar(0.3 * reach):g} bar, first "
-            "with a period of 12 s, then of 1.2 s"
-        )
-        numbers = {
-            "middle_bar": in_bar(middle),
-            "reach_bar": [in_bar(s * reach) for s in (1.0, 0.6, 0.3)],
-            "periods_s": [12.0, 1.2],
-        }
+        points, text, numbers = nested_triangles(span.low, span.high, self.told(chain))
         return self.alone(chain, "nested_triangles", points, text, numbers)
 
     def staircase(self) -> Experiment:
