@@ -9,14 +9,15 @@ import pytest
 
 import pamrs
 from pamrs.control.linear import linearise
+from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.settings import SETTINGS
-from pamrs.errors import DiagnosisError
+from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy
 
+SETTINGS = DiagnosisSettings()
 BOTTLE, OUTLET = "supply_pressure.bottle", "supply_pressure.regulator"
 NOISE = {BOTTLE: 400.0, OUTLET: 400.0, "muscle_pressure": 400.0}
 TEXT = """
@@ -74,13 +75,13 @@ def leaking(conductance: float) -> Rig:
 [[effects]]
 id = "supply_leak"
 at = "bottle"
-conductance = {{ value = {conductance!r}, unit = "m3/(s Pa)" }}
+parameters = {{ conductance = {{ value = {conductance!r}, unit = "m3/(s Pa)" }} }}
 """
     return parse_rig(TEXT + entry)
 
 
 def test_a_small_bottle_empties_and_the_outlet_falls_with_it() -> None:
-    rig = parse_rig(TEXT).with_parameters({"supply.bottle.volume": 1e-3})
+    rig = parse_rig(TEXT).with_parameters({"supply.bottle.volume": 5e-4})
     run = pamrs.simulate(
         rig,
         valve_command=np.tile(np.repeat([9.0, 1.0], 100), 10),
@@ -91,7 +92,7 @@ def test_a_small_bottle_empties_and_the_outlet_falls_with_it() -> None:
     assert bottle[-1] < 2e5
     assert outlet[-1] == pytest.approx(bottle[-1], abs=2e3)
     assert outlet[90] == pytest.approx(6e5, rel=1e-3)  # as long as the bottle has more
-    lost = (bottle[0] - bottle) * 1e-3 / (287.05 * 293.15)
+    lost = (bottle[0] - bottle) * 5e-4 / (287.05 * 293.15)
     np.testing.assert_allclose(run["mass_supplied"], lost, rtol=1e-6, atol=1e-12)
     assert abs(run.balance.residual) < 1e-12
 
@@ -126,11 +127,11 @@ def test_a_healthy_bottle_and_regulator_miss_nothing(left_out: tuple[str, ...]) 
 
 
 def test_a_leak_of_the_bottle_is_named() -> None:
-    found = diagnosed(leaking(2e-10))
+    found = diagnosed(leaking(3e-11))
     assert found.verdict == "effects"
     (effect,) = found.effects
-    assert effect["id"] == "supply_leak"
-    assert effect["parameters"]["conductance"]["value"] == pytest.approx(2e-10, rel=0.1)
+    assert (effect["id"], effect["at"]) == ("supply_leak", "bottle")
+    assert effect["parameters"]["conductance"]["value"] == pytest.approx(3e-11, rel=0.15)
 
 
 def test_a_command_above_the_bottle_is_no_error_of_units() -> None:
@@ -176,8 +177,20 @@ diameter = { value = 4.0, unit = "mm", tol = 0.05 }
 
 
 def test_a_linear_model_has_the_bottle_as_a_state() -> None:
-    model = linearise(parse_rig(TEXT), initial={"muscle_pressure": 2e5}, held=())
-    assert BOTTLE in model.states
-    row = model.states.index(OUTLET)
-    assert model.a[row][row] == pytest.approx(-1.0 / 0.08)
-    assert model.a[row][model.states.index(BOTTLE)] == 0.0
+    rig = parse_rig(
+        TEXT.replace("[0.0, 0.05, 1.0]", "[0.0, 0.5, 1.0]").replace("0.0, 0.0", "0, 0.5")
+    )
+    at = {"muscle_pressure": 2e5, OUTLET: 4e5}
+    model = linearise(rig, initial=at, held=(), side="fill")
+    bottle, outlet = model.states.index(BOTTLE), model.states.index(OUTLET)
+    chamber = model.states.index("muscle_pressure")
+    assert model.a[outlet].tolist() == pytest.approx([0.0, -1.0 / 0.08, 0.0])
+    volt, command = (model.inputs.index(n) for n in ("valve_command", "supply_command.regulator"))
+    assert model.b[outlet][command] == pytest.approx(1.0 / 0.08)
+    # a volt of the valve takes from the bottle what it brings the chamber
+    brought = model.b[chamber][volt] * 2e-4 / 1.3
+    assert brought > 0.0
+    assert model.b[bottle][volt] * 5e-3 == pytest.approx(-brought)
+    # below the outlet the bottle is what it follows, and no command
+    with pytest.raises(ParameterError, match=r"supply_command\.regulator moves nothing"):
+        linearise(rig, initial={**at, BOTTLE: 3e5}, held=(), side="fill")
