@@ -491,24 +491,35 @@ impl Plant<'_, f64> {
                 worst = (rate, Some(k));
             }
         }
+        let of_supplies = self.fastest_supply(&mut drawn, moves);
+        if of_supplies > worst.0 {
+            worst = (of_supplies, None);
+        }
+        worst
+    }
+
+    /// Fastest rate of the supplies that move [1/s], of which openings draw so much per pressure
+    /// [kg/(s Pa)].
+    fn fastest_supply(&self, drawn: &mut [f64], moves: impl Fn(Node) -> bool) -> f64 {
+        let (wiring, gas) = (&self.wiring, &self.rig.gas);
+        let rt = gas.gas_constant * gas.temperature;
         for (k, slope) in drawn.iter_mut().enumerate() {
             *slope += self.steepest_flows(Node::Supply(k));
         }
         for (regulator, inlet) in wiring.inlets_of_regulators() {
             drawn[inlet] += drawn[regulator];
         }
-        let supplies = self.supplies.iter().zip(&drawn).enumerate();
+        let answers = |inlet: usize| {
+            moves(Node::Supply(inlet)) && !matches!(self.supplies[inlet], Supply::Constant)
+        };
+        let mut worst = 0.0;
+        let supplies = self.supplies.iter().zip(drawn).enumerate();
         for (k, (supply, slope)) in supplies.filter(|(k, _)| moves(Node::Supply(*k))) {
             let mut rate = supply.fastest(*slope, rt);
-            let answers = |inlet: usize| {
-                moves(Node::Supply(inlet)) && !matches!(self.supplies[inlet], Supply::Constant)
-            };
             if wiring.supplies[k].inlet().is_some_and(answers) {
                 rate += supply.fastest(0.0, rt); // what it is brought to answers
             }
-            if rate > worst.0 {
-                worst = (rate, None);
-            }
+            worst = f64::max(worst, rate);
         }
         worst
     }
