@@ -327,7 +327,7 @@ class _Map:
         return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
 
     def supply(self, name: str) -> Block | None:
-        """The block of one supply."""
+        """The block of one supply; none of an inlet whose regulator feeds a line."""
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
         unread = [one for one in behind if self._unread(qualified("supply", one), "regulator")]
@@ -344,6 +344,8 @@ class _Map:
         drives = tuple(dict.fromkeys(drives))
         if not any(self.around(node) for node in nodes):
             return None
+        if any(not way.command for node in nodes[1:] for way in self.around(node)):
+            return None  # noise of two gauges at a line goes both ways, and is drawn one way
         if not {self.pressure(full), *drives, *self.angles} <= self.has:
             return None
         names = {
