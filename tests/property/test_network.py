@@ -128,6 +128,52 @@ def test_networks(drawn: tuple[Blocks, Run]) -> None:
     )
 
 
+def bottled(front: dict[str, Any], dead_band: float, *, line: bool) -> pamrs.Rig:
+    """A chamber that a regulator behind another supply feeds, by a line or by a valve."""
+    blocks: Blocks = {
+        "gas": dict(GAS),
+        "supply.bottle": front,
+        "supply.regulator": {
+            "kind": "regulator",
+            "inlet": "bottle",
+            "initial_pressure": 3e5,
+            "time_constant": 0.05,
+            "droop": 3e6,
+            "dead_time": 0.013,
+            "rise_limit": 8e6,
+            "fall_limit": 9e6,
+            "dead_band": dead_band,
+        },
+        "chamber": {"dead_volume": 5e-4, "alpha_in": 1.3, "alpha_out": 1.1, "alpha": 1.2},
+    }
+    if line:
+        blocks["line"] = {"kind": "orifice", "discharge_area": 2e-6}
+    else:
+        blocks["valve"] = valve(3e-6)
+    return rig_of(blocks)
+
+
+@pytest.mark.parametrize("line", [True, False], ids=["line", "valve"])
+@pytest.mark.parametrize("dead_band", [0.0, 2e4])
+@pytest.mark.parametrize("kind", ["tank", "constant"])
+def test_a_regulator_behind_another_supply(kind: str, dead_band: float, line: bool) -> None:
+    """It is set above and below what its inlet has, is drawn from and takes back."""
+    own = {"tank": {"volume": 2e-3}, "constant": {}}[kind]
+    rig = bottled({"kind": kind, "initial_pressure": 5e5, **own}, dead_band, line=line)
+    rows = 201
+    set_to = np.repeat([3e5, 8e5, 2e5, 6e5, 1e5], 41)[:rows]
+    commands = {"supply_command.regulator": set_to}
+    if not line:
+        commands["valve_command"] = 5.0 + 4.0 * np.sin(0.2 + 0.15 * np.arange(rows))
+    run = Run(rig, 0.01, rows, {"muscle_pressure": 1e5}, commands)
+    got = run.core(2e-5)
+    front, outlet = got["supply_pressure.bottle"], got["supply_pressure.regulator"]
+    assert (outlet < front + 2e3).all()
+    assert (set_to > front + 1e5).any()
+    assert np.abs(outlet - front).min() < 2e4
+    assert not beyond(misses(got, run.reference(1e-10)), SMOOTH)
+
+
 @pytest.mark.parametrize("inlet", [0.0, 1e-7, 1e-5])
 def test_a_small_volume_before_a_tube(inlet: float) -> None:
     """The shoulder's valve at the end of a tube: stiff, so that the reference is implicit."""

@@ -336,6 +336,8 @@ class Node:
     fall_limit: float = math.inf
     #: Error of its outlet that a regulator does not answer (Pa).
     dead_band: float = 0.0
+    #: Port of the supply in front of a regulator, empty where nothing limits it.
+    inlet: str = ""
     #: Heat transfer coefficient (W/(m^2 K)) of a chamber with an energy balance.
     heat_transfer: float | None = None
 
@@ -473,6 +475,7 @@ class Network:
                     "rise_limit",
                     "fall_limit",
                     "dead_band",
+                    "inlet",
                 )
                 if supply.get(key) is not None
             }
@@ -748,10 +751,13 @@ class Network:
         heats = [0.0, 0.0, 0.0]
         pressure_rate = []
         for i, node in enumerate(self.nodes[:-1]):
+            if node.inlet:  # a reducing valve holds no air: what goes out comes from its inlet
+                outflow[self.index[node.inlet]] += max(outflow[i] - inflow[i], 0.0)
+        for i, node in enumerate(self.nodes[:-1]):
             net_out = outflow[i] - inflow[i]
             if node.kind == "regulator" and net_out < 0.0:
                 relieved -= net_out  # to the ambient
-            elif node.kind in SUPPLIES:
+            elif node.kind in SUPPLIES and not node.inlet:
                 supplied += net_out
                 exergy += self.rt * math.log(pressure[i] / gas.ambient_pressure) * net_out
             if node.kind == "constant":
@@ -759,6 +765,8 @@ class Network:
             elif node.kind == "regulator":
                 error = set_pressure[i] - pressure[i]
                 answer = math.copysign(max(abs(error) - node.dead_band, 0.0), error)
+                if node.inlet:  # wide open it passes on what its inlet has
+                    answer = min(answer, pressure[self.index[node.inlet]] - pressure[i])
                 wanted = (answer - node.droop * net_out) / node.time_constant
                 pressure_rate.append(min(max(wanted, -node.fall_limit), node.rise_limit))
             elif node.heat_transfer is not None:

@@ -5,6 +5,7 @@ cannot be.
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -532,3 +533,65 @@ def test_groups_by_name_and_by_ports_are_the_same_rig(
         name: f"{after}.{name}" for name in names
     }
     assert set(shuffled.parameters) == set(first.parameters)
+
+
+# -------------------------------------------------------------------- inlets of regulators
+
+BOTTLED = """
+[supply.bottle]
+kind = "tank"
+volume = { value = 5, unit = "l" }
+initial_pressure = { value = 9, unit = "bar" }
+[supply.regulator]
+kind = "regulator"
+inlet = "bottle"
+initial_pressure = { value = 4, unit = "bar" }
+[line]
+kind = "orifice"
+discharge_area = { value = 1, unit = "mm2" }
+[chamber]
+dead_volume = { value = 1, unit = "l" }
+alpha_in = { value = 1, unit = "1" }
+alpha_out = { value = 1, unit = "1" }
+alpha = { value = 1, unit = "1" }
+"""
+TOP = 'schema = "pamrs.rig/1"\nname = "bottled"\n[gas]\n'
+
+
+def test_an_inlet_is_read_written_told_and_passed_on(tmp_path: Path) -> None:
+    rig = parse_rig(TOP + BOTTLED)
+    assert rig.ports("supply") == {"bottle": {}, "regulator": {"inlet": "supply.bottle"}}
+    assert rig.ports("line")[""]["from"] == "supply.regulator"  # the bottle is its inlet
+    assert rig.wiring == ["air: supply.bottle -> supply.regulator -> line -> chamber"]
+    rig.to_toml(tmp_path / "bottled.toml")
+    written = (tmp_path / "bottled.toml").read_text()
+    assert same(parse_rig(written), rig)
+    assert 'inlet = "bottle"' in written
+    in_full = parse_rig(TOP + BOTTLED.replace('"bottle"', '"supply.bottle"'))
+    assert in_full.ports("supply") == rig.ports("supply")
+    supplies = {supply["name"]: supply for supply in json.loads(rig.to_json())["supplies"]}
+    assert supplies["regulator"]["inlet"] == "supply.bottle"
+    assert "inlet" not in supplies["bottle"]
+    fed = rig.with_parameters({"supply.bottle.volume": 1e-3})
+    assert fed.ports("supply") == rig.ports("supply")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('inlet = "bottle"', 'inlet = "botle"', r"did you mean '(supply\.)?bottle'"),
+        ('inlet = "bottle"', 'inlet = "regulator"', "it is the regulator itself"),
+        ('inlet = "bottle"', 'inlet = "chamber"', "inlet = 'chamber' is not allowed"),
+        ('inlet = "bottle"', "inlet = 3", "the name of a block is needed"),
+        ('kind = "tank"', 'kind = "tank"\ninlet = "regulator"', "only with regulator"),
+        (
+            'kind = "tank"\nvolume = { value = 5, unit = "l" }',
+            'kind = "regulator"',
+            "it is a regulator; a tank or a constant supply is needed",
+        ),
+    ],
+)
+def test_an_inlet_that_cannot_be_is_refused(old: str, new: str, message: str) -> None:
+    assert old in BOTTLED
+    with pytest.raises(RigError, match=message):
+        parse_rig(TOP + BOTTLED.replace(old, new))

@@ -246,6 +246,7 @@ fn regulator(droop: f64) -> SupplySpec {
         rise_limit: FASTEST,
         fall_limit: FASTEST,
         dead_band: 0.0,
+        inlet: String::new(),
     }
 }
 
@@ -263,6 +264,154 @@ fn a_regulator_settles_and_its_droop_follows_the_flow() {
     let out = run(&rig, 500, &[("supply_command", &set)], 0.02, 1e-3);
     assert!((last(&rig, &out, "muscle_pressure") - 1e5).abs() < 5.0, "it takes air back");
     assert!(imbalance(&rig, &out) < 1e-12);
+}
+
+/// A regulator of no lag to speak of behind another supply.
+fn behind(kind: &str, volume: f64, pressure: f64) -> Vec<SupplySpec> {
+    let front = SupplySpec {
+        name: "bottle".into(),
+        kind: kind.into(),
+        volume,
+        initial_pressure: pressure,
+        ..regulator(0.0)
+    };
+    let own =
+        SupplySpec { name: "regulator".into(), inlet: "supply.bottle".into(), ..regulator(4e6) };
+    vec![front, own]
+}
+
+/// A chamber that a regulator behind a small tank fills through an orifice.
+fn small_bottle() -> RigSpec {
+    let mut spec = gas(&[("", 1e-3, 0.0)], vec![orifice("supply.regulator", "chamber", 5e-6)]);
+    spec.supplies = behind("tank", 1e-3, 7e5);
+    spec
+}
+
+#[test]
+fn what_a_regulator_lets_through_is_drawn_from_its_inlet() {
+    let rig = Rig::new(small_bottle()).unwrap();
+    let set = vec![6e5; 600];
+    let out = run(&rig, 600, &[("supply_command.regulator", &set)], 0.01, 1e-3);
+    let of = |name: &str| out.get(&rig, name).unwrap();
+    let (bottle, outlet, chamber) =
+        (of("supply_pressure.bottle"), of("supply_pressure.regulator"), of("muscle_pressure"));
+    // a litre of each at one temperature: pressures are masses, with what the outlet, which falls
+    // later than the bottle, has taken back and vented
+    for (k, vented) in of("mass_vented").iter().enumerate() {
+        let all = bottle[k] + chamber[k] + vented * RT / 1e-3;
+        assert!((all - 7e5).abs() < 1e-9 * 7e5, "{k}: {all}");
+    }
+    let end = bottle.len() - 1;
+    assert!((outlet[end] - bottle[end]).abs() < 5.0, "{} {}", outlet[end], bottle[end]);
+    assert!((bottle[end] - 3.5e5).abs() < 1e3, "{}", bottle[end]);
+    assert!(outlet.iter().all(|p| *p < 6e5 + 1.0) && outlet[100] < 4.2e5);
+    assert!(imbalance(&rig, &out) < 1e-12);
+    let given = (7e5 - bottle[end]) * 1e-3 / RT;
+    assert!((last(&rig, &out, "mass_supplied") / given - 1.0).abs() < 1e-9, "counted once");
+    assert!(last(&rig, &out, "mass_vented") < 1e-3 * given);
+    // taking air back it vents it, and the bottle keeps what it has
+    let set: Vec<f64> = (0..1200).map(|k| if k < 600 { 3e5 } else { 1e5 }).collect();
+    let out = run(&rig, 1200, &[("supply_command.regulator", &set)], 0.01, 1e-3);
+    let bottle = out.get(&rig, "supply_pressure.bottle").unwrap();
+    assert!((bottle[600] - 4e5).abs() < 100.0 && (bottle[1199] - bottle[600]).abs() < 100.0);
+    assert!((last(&rig, &out, "muscle_pressure") - 1e5).abs() < 50.0);
+    assert!(imbalance(&rig, &out) < 1e-12);
+}
+
+#[test]
+fn an_inlet_far_above_every_command_changes_nothing() {
+    let line = || vec![orifice("supply.regulator", "chamber", 5e-6)];
+    let mut free = gas(&[("", 1e-3, 0.0)], line());
+    let mut fed = free.clone();
+    fed.supplies = behind("constant", 0.0, 5e6);
+    free.supplies = vec![SupplySpec { name: "regulator".into(), ..regulator(4e6) }];
+    let set: Vec<f64> = (0..400).map(|k| [4e5, 1e5, 6e5, 2e5][k / 100]).collect();
+    for dead_band in [0.0, 3e4] {
+        fed.supplies[1].dead_band = dead_band;
+        free.supplies[0].dead_band = dead_band;
+        let (with, without) = (Rig::new(fed.clone()).unwrap(), Rig::new(free.clone()).unwrap());
+        let runs = [&with, &without]
+            .map(|rig| run(rig, 400, &[("supply_command.regulator", &set)], 0.01, 1e-3));
+        for name in ["supply_pressure.regulator", "muscle_pressure", "air_mass"] {
+            assert_eq!(runs[0].get(&with, name), runs[1].get(&without, name), "{name}");
+        }
+        let vented =
+            [last(&with, &runs[0], "mass_vented"), last(&without, &runs[1], "mass_vented")];
+        assert_eq!(vented[0], vented[1]);
+        let supplied =
+            [last(&with, &runs[0], "mass_supplied"), last(&without, &runs[1], "mass_supplied")];
+        assert_eq!(supplied[0], supplied[1]);
+    }
+}
+
+#[test]
+fn an_inlet_that_cannot_be_is_refused() {
+    let refused = |change: &dyn Fn(&mut Vec<SupplySpec>), word: &str| {
+        let mut spec = small_bottle();
+        change(&mut spec.supplies);
+        let text = Rig::new(spec).unwrap_err().to_string();
+        assert!(text.contains("inlet = ") && text.contains(word), "{text}");
+    };
+    refused(&|supplies| supplies[1].inlet = "supply.botle".into(), "no such block");
+    refused(&|supplies| supplies[1].inlet = "chamber".into(), "a supply is needed");
+    refused(&|supplies| supplies[1].inlet = "ambient".into(), "a supply is needed");
+    refused(&|supplies| supplies[1].inlet = "supply.regulator".into(), "the regulator itself");
+    refused(&|supplies| supplies[0].kind = "regulator".into(), "it is a regulator");
+    refused(&|supplies| supplies[0].inlet = "supply.regulator".into(), "only a regulator");
+}
+
+#[test]
+fn the_block_of_a_bottle_is_drawn_from_by_its_regulator() {
+    let rig = Rig::new(small_bottle()).unwrap();
+    let (rows, dt) = (400, 0.005);
+    let set: Vec<f64> = (0..rows).map(|k| if k < 100 { 3e5 } else { 6e5 }).collect();
+    let command: &[(&str, &[f64])] = &[("supply_command.regulator", &set)];
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let truth = simulate(&rig, rows, command, timing, &Initial::rest(&rig)).unwrap();
+    let names = ["supply_pressure.bottle", "supply_pressure.regulator", "muscle_pressure"];
+    let slopes: Vec<_> = names.iter().map(|name| slopes(&truth, &rig, name, dt)).collect();
+    let every: Vec<_> = (names.iter().zip(&slopes))
+        .map(|(name, slope)| (*name, Signal { value: truth.get(&rig, name).unwrap(), slope }))
+        .collect();
+    let predicted = |rig: &Rig, block: &str, left_out: &str, parameter: &str| {
+        let own: Vec<_> = every.iter().filter(|(name, _)| *name != left_out).copied().collect();
+        let begins = [("supply.regulator", 4e5)];
+        let measured = Measured::new(rig, rows, command, &own)?.beginning(rig, &begins)?;
+        let block = Block::from_name(rig, block)?;
+        let timing = timing.at_most(block.longest_step(rig, &measured)?);
+        let asked: Vec<_> = rig.parameters().find(parameter).into_iter().collect();
+        predict(rig, block, &measured, timing, &[0], &asked)
+    };
+    let off = |rig: &Rig, block: &str, left_out: &str, channel: &str| {
+        let found = predicted(rig, block, left_out, "").unwrap().value;
+        let read = truth.get(rig, channel).unwrap();
+        found.iter().zip(read).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    };
+    let bottle = "supply_pressure.bottle";
+    let outlet = "supply_pressure.regulator";
+    assert!(off(&rig, "supply.bottle", "", bottle) < 2e3);
+    assert!(off(&rig, "supply.bottle", outlet, bottle) < 2e3, "by its command");
+    assert!(off(&rig, "supply.regulator", "", outlet) < 4e3);
+    assert!(off(&rig, "chamber", outlet, "muscle_pressure") < 2e3);
+    // where the inlet is not measured it stays as it begins: here it falls, and that is missed
+    assert!(off(&rig, "supply.regulator", bottle, outlet) > 5e4);
+    let error = predicted(&rig, "supply.bottle", "muscle_pressure", "").unwrap_err();
+    assert!(error.to_string().contains("muscle_pressure"), "{error}");
+    // the slope by the bottle's volume is that of two bottles
+    let name = "supply.bottle.volume";
+    let found = predicted(&rig, "supply.bottle", outlet, name).unwrap();
+    let with = |factor: f64| {
+        let mut spec = small_bottle();
+        spec.supplies[0].volume *= factor;
+        predicted(&Rig::new(spec).unwrap(), "supply.bottle", outlet, "").unwrap().value
+    };
+    let (more, less) = (with(1.0 + 1e-6), with(1.0 - 1e-6));
+    assert_eq!(found.columns, found.jacobian.len() / rows);
+    for k in (50..rows).step_by(50) {
+        let slope = (more[k] - less[k]) / 2e-9;
+        let exact = found.jacobian[k * found.columns];
+        assert!((exact / slope - 1.0).abs() < 1e-3, "{k}: {exact} {slope}");
+    }
 }
 
 fn fed_through_a_tube(inlet_volume: f64, length: f64) -> RigSpec {
@@ -465,6 +614,7 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
         rise_limit: FASTEST,
         fall_limit: FASTEST,
         dead_band: 0.0,
+        inlet: String::new(),
     }];
     let mut through_line = spec.clone();
     through_line.lines = vec![orifice("supply", "chamber", 8.4e-6)];

@@ -139,6 +139,8 @@ def _parts(rig: Rig) -> dict[str, _Part]:
             (dotted(kind, name), ports.get("to", "")),
         )
     ]
+    for name, ports in rig.ports("supply").items():
+        links.append((ports.get("inlet", ""), dotted("supply", name)))
     for name, ports in rig.ports("muscle").items():
         links.append((ports.get("chamber", ""), dotted("muscle", name)))
         links.append((dotted("muscle", name), ports.get("joint", "")))

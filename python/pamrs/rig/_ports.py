@@ -42,6 +42,7 @@ def connect(model: Mapping[str, Any]) -> tuple[Ports, list[str]]:
     """
     connector = _Connector(model)
     connector.whole_blocks()
+    connector.inlets()
     connector.valves()
     connector.lines()
     connector.muscles()
@@ -104,6 +105,7 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
     person.
     """
     lines, used = [], set()
+    fronts = {qualified("supply", n): e["inlet"] for n, e in ports["supply"].items() if e}
     inner = {qualified("line", name): ends for name, ends in ports["line"].items()}
     for name, ends in ports["valve"].items():
         way = [ends["from"], qualified("valve", name), ends["to"]]
@@ -113,6 +115,7 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
             way if way[-1] == "ambient" else [*way, "ambient"]
         )  # a valve also vents what it fills
     lines += [[ends["from"], name, ends["to"]] for name, ends in inner.items() if ends["from"]]
+    lines = [[fronts[way[0]], *way] if way[0] in fronts else way for way in lines]
     for way in lines:
         used.update(way)
     stores = [
@@ -249,6 +252,38 @@ class _Connector:
 
     # ------------------------------------------------------------------------- air
 
+    def inlets(self) -> None:
+        """What stands in front of regulators: a tank or a constant supply."""
+        for name, table in self.tables["supply"].items():
+            label = qualified("supply", name)
+            if "inlet" not in self.given.get(label, {}):
+                continue
+            if (kind := kind_of("supply", table)) != "regulator":
+                self.problems.append(
+                    f"{label}.inlet is not allowed with {kind!r}: only with regulator"
+                )
+                continue
+            front = self.settle("supply", name, "inlet", ())
+            if front is None:
+                continue
+            other = self.tables["supply"][bare("supply", front)]
+            if front == label:
+                self.problems.append(
+                    f"{label}.inlet = {front!r} is not allowed: it is the regulator itself; "
+                    "another supply is needed"
+                )
+            elif kind_of("supply", other) == "regulator":
+                self.problems.append(
+                    f"{label}.inlet = {front!r} is not allowed: it is a regulator; a tank or a "
+                    "constant supply is needed"
+                )
+
+    def source(self) -> str:
+        """The only supply that stands in front of no regulator, ``""`` if there are more."""
+        fronts = [ends.get("inlet") for ends in self.ports["supply"].values()]
+        names = [n for n in self.tables["supply"] if qualified("supply", n) not in fronts]
+        return self.only("supply", names)
+
     def valves(self) -> None:
         """Both ends of every valve."""
         own = {
@@ -258,7 +293,7 @@ class _Connector:
         inlets = [name for name, start in own.items() if start is None]
         for name in self.tables["valve"]:
             start = self.settle(
-                "valve", name, "from", (self.same("supply", name), self.only("supply")), ("supply",)
+                "valve", name, "from", (self.same("supply", name), self.source()), ("supply",)
             )
             line = qualified("line", name) if name in inlets else ""
             defaults = (
@@ -297,7 +332,7 @@ class _Connector:
                     continue
                 if None in ends and not self.same("supply", name):
                     continue  # the valve of which it is not known where it leads may feed this line
-            alone = "" if self.tables["valve"] else self.only("supply")
+            alone = "" if self.tables["valve"] else self.source()
             start = self.settle("line", name, "from", (self.same("supply", name), alone))
             self.two_ends("line", name, start, end)
             if start is not None and table.get("inlet_volume"):

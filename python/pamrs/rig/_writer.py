@@ -173,7 +173,10 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
     document = {
         "name": model["name"],
         "gas": model["gas"],
-        "supplies": [{"name": name, **table} for name, table in tables_of(model, "supply").items()],
+        "supplies": [
+            {"name": name, **ports["supply"][name], **table}
+            for name, table in tables_of(model, "supply").items()
+        ],
         "valves": [
             {"name": name, **ports["valve"][name], **_valve(table)}
             for name, table in tables_of(model, "valve").items()

@@ -523,11 +523,20 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
 
 #: block -> its ports. What they default to stands here in words; :mod:`pamrs.rig._ports` does it.
 PORTS: Final[dict[str, tuple[Port, ...]]] = {
+    "supply": (
+        Port(
+            "inlet",
+            ("supply",),
+            default="none: a regulator then gives what it is set to",
+        ),
+    ),
     "valve": (
         Port(
             "from",
             ("supply", "chamber"),
-            default="the supply of the same name, else the only supply",
+            default=(
+                "the supply of the same name, else the only one that is no inlet of a regulator"
+            ),
         ),
         Port(
             "to",
@@ -544,7 +553,7 @@ PORTS: Final[dict[str, tuple[Port, ...]]] = {
             ("supply", "chamber"),
             default=(
                 "the valves that lead to it, else the supply of the same name, else, without "
-                "valves, the only supply"
+                "valves, the only supply that is no inlet of a regulator"
             ),
         ),
         Port(

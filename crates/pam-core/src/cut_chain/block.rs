@@ -2,7 +2,7 @@
 
 use super::boundary::Measured;
 use crate::description::dotted;
-use crate::plant::{Acting, Layout, Place, Rig, Simulated};
+use crate::plant::{Acting, Layout, Node, Place, Rig, Simulated};
 use crate::{Error, Result};
 use std::ops::Range;
 
@@ -119,10 +119,6 @@ impl Block {
             Self::Chamber(k) => {
                 places.push(layout.mass(k));
                 places.extend(effect_states(rig, Place::Gas(k)));
-                for supply in unread(rig, self, measured) {
-                    places.push(layout.supply(supply));
-                    places.extend(effect_states(rig, Place::Supply(supply)));
-                }
             }
             Self::Supply(k) => places.extend(effect_states(rig, Place::Supply(k))),
             Self::Pull(_) => {
@@ -130,6 +126,10 @@ impl Block {
                 places.extend(groups.flat_map(|k| effect_states(rig, Place::Group(k))));
                 return Simulated::only(rig, &places).pulling();
             }
+        }
+        for supply in unread(rig, self, measured) {
+            places.push(layout.supply(supply));
+            places.extend(effect_states(rig, Place::Supply(supply)));
         }
         if !matches!(self, Self::Arm(_)) {
             places.extend(hidden(layout, measured));
@@ -157,15 +157,31 @@ pub(super) fn hidden(layout: &Layout, measured: &Measured<'_>) -> Vec<usize> {
     inlets.filter(|place| measured.signal(*place).is_none()).collect()
 }
 
-/// Regulators next to a chamber whose outlet nobody measured: their command says what it is.
+/// Regulators next to a chamber, or behind a supply, whose outlet nobody measured: their command
+/// says what it is.
 pub(super) fn unread(rig: &Rig, block: Block, measured: &Measured<'_>) -> Vec<usize> {
-    if !matches!(block, Block::Chamber(_)) {
+    if block.mechanical() {
         return Vec::new();
     }
     let spec = &rig.spec().supplies;
+    let output = block.output(rig.layout());
     let near = neighbours(rig, block).into_iter().filter(|place| *place < spec.len());
-    let unread = near.filter(|place| measured.signal(*place).is_none());
+    let unread = near.filter(|place| Some(*place) != output && measured.signal(*place).is_none());
     unread.filter(|place| spec[*place].kind == "regulator").collect()
+}
+
+/// Gases that a supply feeds through a valve or a line, by their places.
+pub(super) fn fed_by(rig: &Rig, supply: usize) -> Vec<usize> {
+    let (layout, wiring) = (rig.layout(), &rig.wiring);
+    let valves = wiring.valves.iter().map(|valve| (valve.from, Node::Gas(valve.to)));
+    let ways = valves.chain(wiring.lines.iter().map(|line| (line.from, line.to)));
+    let own = Node::Supply(supply);
+    let other = |(from, to): (Node, Node)| match (from == own, to == own) {
+        (true, _) => to.place(layout),
+        (_, true) => from.place(layout),
+        _ => None,
+    };
+    ways.filter_map(other).collect()
 }
 
 pub(super) fn check(
@@ -221,6 +237,12 @@ fn neighbours(rig: &Rig, block: Block) -> Vec<usize> {
     if block.mechanical() {
         places.extend(wiring.groups.iter().map(|g| layout.pressure(g.chamber)));
         return places;
+    }
+    // What regulators behind a supply let through is drawn from it.
+    let behind = wiring.inlets_of_regulators().filter(|(_, inlet)| block == Block::Supply(*inlet));
+    for (regulator, _) in behind {
+        places.push(layout.supply(regulator));
+        places.extend(fed_by(rig, regulator));
     }
     let valves = wiring.valves.iter().map(|v| (v.from.place(layout), Some(layout.pressure(v.to))));
     let lines = wiring.lines.iter().map(|l| (l.from.place(layout), l.to.place(layout)));

@@ -1,7 +1,7 @@
 //! The windows of a prediction: each starts from the measurement, and measured neighbours drive the
 //! block through it.
 
-use super::block::{unread, Block};
+use super::block::{fed_by, unread, Block};
 use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
 use super::clock::Clocks;
 use crate::effects::Number;
@@ -201,11 +201,17 @@ impl<'a, S: Number> Cut<'a, S> {
             }
         }
         // at rest what nobody measures of a regulator's outlet is what it feeds
-        if let Some(fed) = self.block.output(layout) {
+        if let Some(output) = self.block.output(layout) {
             for supply in unread(rig, self.block, self.measured) {
                 let place = layout.supply(supply);
                 let told = self.measured.outlets.iter().find(|(outlet, _)| *outlet == place);
-                state[place] = told.map_or(state[fed], |(_, pressure)| constant(*pressure));
+                let near = fed_by(rig, supply);
+                let fed = if near.contains(&output) { Some(&output) } else { near.first() };
+                state[place] = match (told, fed) {
+                    (Some((_, pressure)), _) => constant(*pressure),
+                    (None, Some(fed)) => state[*fed],
+                    (None, None) => state[place],
+                };
             }
         }
         for gas in 0..layout.gases {

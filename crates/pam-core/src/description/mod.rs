@@ -48,6 +48,9 @@ pub struct SupplySpec {
     pub fall_limit: f64,
     #[serde(default)]
     pub dead_band: f64,
+    /// The supply in front of a regulator, empty where nothing limits it.
+    #[serde(default)]
+    pub inlet: Port,
 }
 
 fn no_limit() -> f64 {

@@ -58,7 +58,9 @@ impl Plan {
                 .all(|g| !g.direction && !g.muscle.buckles() && !g.muscle.mapped());
         let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
         let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
-        if !(body && plain && one_joint && areas) || wiring.heated() || !wiring.waves.is_empty() {
+        let fed = wiring.inlets_of_regulators().next().is_some();
+        let states = wiring.heated() || !wiring.waves.is_empty();
+        if !(body && plain && one_joint && areas) || states || fed {
             return None;
         }
         let curves = wiring.groups.iter().map(|group| curves(rig, group));

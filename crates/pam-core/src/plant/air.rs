@@ -7,7 +7,7 @@ use crate::blocks::chamber::{
     cube_area, cylinder_area, energy_rate, gas_temperature, pressure_rate, wall_heat, wall_rate,
     ChamberState,
 };
-use crate::blocks::supply::SetPressure;
+use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::valve::Opening;
 use crate::effects::Extremes;
 use crate::scalar::{constant, Scalar};
@@ -112,6 +112,30 @@ impl<S: Scalar> Plant<'_, S> {
         if self.altered.flows {
             self.effect_flows(state, controls, here);
         }
+        if self.altered.inlets {
+            self.inlet_flows(here);
+        }
+    }
+
+    /// What goes out of regulators is drawn from the supplies in front of them; what these take back
+    /// goes to the ambient.
+    #[inline(never)]
+    fn inlet_flows(&self, here: &mut Scratch<S>) {
+        for (regulator, inlet) in self.wiring.inlets_of_regulators() {
+            let flow = here.drawn[regulator];
+            if flow.re() > 0.0 || (flow.re() == 0.0 && !here.backwards) {
+                here.drawn[inlet] += flow;
+            }
+        }
+    }
+
+    /// Absolute pressure in front of a regulator [Pa], where a supply stands there.
+    #[inline(always)]
+    fn inlet_pressure(&self, supply: usize, state: &[S]) -> Option<S> {
+        if !self.altered.inlets {
+            return None;
+        }
+        self.wiring.supplies[supply].inlet().map(|inlet| state[self.layout.supply(inlet)])
     }
 
     /// What flows through the segments of tubes, written to the scratch.
@@ -238,7 +262,8 @@ impl<S: Scalar> Plant<'_, S> {
         };
         let (drawn, now) = altered(set.now);
         let before = if set.changes() { altered(set.before).1 } else { now };
-        self.supplies[k].pressure_rate(pressure, drawn, rt, &SetPressure { now, before, ..*set })
+        let (set, inlet) = (SetPressure { now, before, ..*set }, self.inlet_pressure(k, state));
+        self.supplies[k].pressure_rate(pressure, drawn, rt, &set, inlet)
     }
 
     #[inline(always)]
@@ -259,7 +284,8 @@ impl<S: Scalar> Plant<'_, S> {
             out[layout.supply(k)] = if self.altered.supplies {
                 self.altered_supply(k, state, here.drawn[k], rt, set)
             } else {
-                supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set)
+                let inlet = self.inlet_pressure(k, state);
+                supply.pressure_rate(state[layout.supply(k)], here.drawn[k], rt, set, inlet)
             };
         }
         for k in 0..layout.gases {
@@ -465,12 +491,35 @@ impl Plant<'_, f64> {
                 worst = (rate, Some(k));
             }
         }
-        let supplies = self.supplies.iter().zip(&drawn).enumerate();
+        let of_supplies = self.fastest_supply(&mut drawn, moves);
+        if of_supplies > worst.0 {
+            worst = (of_supplies, None);
+        }
+        worst
+    }
+
+    /// Fastest rate of the supplies that move [1/s], of which openings draw so much per pressure
+    /// [kg/(s Pa)].
+    fn fastest_supply(&self, drawn: &mut [f64], moves: impl Fn(Node) -> bool) -> f64 {
+        let (wiring, gas) = (&self.wiring, &self.rig.gas);
+        let rt = gas.gas_constant * gas.temperature;
+        for (k, slope) in drawn.iter_mut().enumerate() {
+            *slope += self.steepest_flows(Node::Supply(k));
+        }
+        for (regulator, inlet) in wiring.inlets_of_regulators() {
+            drawn[inlet] += drawn[regulator];
+        }
+        let answers = |inlet: usize| {
+            moves(Node::Supply(inlet)) && !matches!(self.supplies[inlet], Supply::Constant)
+        };
+        let mut worst = 0.0;
+        let supplies = self.supplies.iter().zip(drawn).enumerate();
         for (k, (supply, slope)) in supplies.filter(|(k, _)| moves(Node::Supply(*k))) {
-            let rate = supply.fastest(*slope + self.steepest_flows(Node::Supply(k)), rt);
-            if rate > worst.0 {
-                worst = (rate, None);
+            let mut rate = supply.fastest(*slope, rt);
+            if wiring.supplies[k].inlet().is_some_and(answers) {
+                rate += supply.fastest(0.0, rt); // what it is brought to answers
             }
+            worst = f64::max(worst, rate);
         }
         worst
     }

@@ -160,6 +160,8 @@ pub struct Plant<'a, S> {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Altered {
     pub supplies: bool,
+    /// Some regulator has a supply in front of it.
+    pub inlets: bool,
     pub areas: bool,
     pub passages: bool,
     pub flows: bool,
@@ -180,6 +182,7 @@ impl Altered {
             heats: wiring.heated(),
             waves: !wiring.waves.is_empty(),
             supplies: ports.on_supplies(),
+            inlets: wiring.inlets_of_regulators().next().is_some(),
             areas: ports.area.iter().any(Option::is_some),
             passages: ports.passage.iter().any(Option::is_some),
             flows: !ports.flows.is_empty(),
@@ -246,6 +249,7 @@ fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
             fall_limit,
             dead_time,
             dead_band,
+            ..
         } => Supply::Regulator {
             time_constant: values[*time_constant],
             droop: values[*droop],
@@ -601,6 +605,9 @@ impl<'a, S: Scalar> Plant<'a, S> {
             if flow.re() < 0.0 && matches!(self.supplies[k], Supply::Regulator { .. }) {
                 vented -= *flow; // a regulator relieves to the ambient what it takes back
                 continue;
+            }
+            if self.wiring.supplies[k].inlet().is_some() {
+                continue; // the supply in front of it gives that, and counts it
             }
             drawn += *flow;
             exergy += (state[layout.supply(k)] / gas.ambient_pressure).ln() * *flow * rt;

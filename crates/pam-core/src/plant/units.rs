@@ -44,6 +44,8 @@ pub(crate) enum SupplyUnit {
         fall_limit: ParameterId,
         dead_time: ParameterId,
         dead_band: ParameterId,
+        /// The supply in front of it.
+        inlet: Option<usize>,
     },
 }
 
@@ -240,7 +242,24 @@ impl GasUnit {
     }
 }
 
+impl SupplyUnit {
+    /// The supply in front of a regulator.
+    #[inline]
+    pub fn inlet(&self) -> Option<usize> {
+        match self {
+            Self::Regulator { inlet, .. } => *inlet,
+            _ => None,
+        }
+    }
+}
+
 impl Wiring {
+    /// Regulators with a supply in front of them, each with that supply.
+    pub fn inlets_of_regulators(&self) -> impl Iterator<Item = (usize, usize)> + '_ {
+        let with = |(k, unit): (usize, &SupplyUnit)| unit.inlet().map(|inlet| (k, inlet));
+        self.supplies.iter().enumerate().filter_map(with)
+    }
+
     /// Whether some gas has an energy balance.
     pub fn heated(&self) -> bool {
         self.gases.iter().any(GasUnit::has_energy)

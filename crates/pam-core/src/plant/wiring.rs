@@ -87,7 +87,7 @@ impl Wiring {
         no_twins(spec)?;
         let ports = Ports::new(spec);
         let mut table = Parameters::default();
-        let supplies = supplies(spec, &mut table)?;
+        let supplies = supplies(spec, &ports, &mut table)?;
         let valves = valves(spec, &ports, &mut table)?;
         let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
         let waves = waves(spec, &lines, inlets.len(), &mut table)?;
@@ -155,9 +155,34 @@ fn no_twins(spec: &RigSpec) -> Result<()> {
     twins("sensors", spec.sensors.iter().map(|b| &b.name))
 }
 
-fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
+/// The supply in front of a regulator, if any.
+fn inlet(spec: &RigSpec, ports: &Ports<'_>, supply: &SupplySpec) -> Result<Option<usize>> {
+    if supply.inlet.is_empty() {
+        return Ok(None);
+    }
+    let block = dotted("supply", &supply.name);
+    let refused =
+        |why: String| model(format!("{block}.inlet = \"{}\" is not allowed: {why}", supply.inlet));
+    if supply.kind != "regulator" {
+        return refused(format!("only a regulator has an inlet, {block} is a {}", supply.kind));
+    }
+    let Node::Supply(k) = ports.node(&format!("{block}.inlet"), &supply.inlet)? else {
+        return refused("a supply is needed, a tank or a constant one".into());
+    };
+    let front = &spec.supplies[k];
+    if front.name == supply.name {
+        return refused("it is the regulator itself; another supply is needed".into());
+    }
+    if front.kind == "regulator" {
+        return refused("it is a regulator; a tank or a constant supply is needed".into());
+    }
+    Ok(Some(k))
+}
+
+fn supplies(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
     let mut unit = |supply: &SupplySpec| {
         let name = |key: &str| format!("{}.{key}", dotted("supply", &supply.name));
+        let inlet = inlet(spec, ports, supply)?;
         Ok(match supply.kind.as_str() {
             "tank" => {
                 SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?)
@@ -181,6 +206,7 @@ fn supplies(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
                 )?,
                 dead_time: table.add(name("dead_time"), supply.dead_time, (0.0, 10.0, "s"))?,
                 dead_band: table.add(name("dead_band"), supply.dead_band, (0.0, 1e7, "Pa"))?,
+                inlet,
             },
             _ => SupplyUnit::Constant,
         })

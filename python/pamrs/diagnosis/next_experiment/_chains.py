@@ -386,12 +386,22 @@ def _source(rig: Rig, chain: Chain) -> float:
         inlets = [qualified("line", n) for n, e in rig.ports("line").items() if e["to"] == at]
         found += [inlet for inlet in inlets if inlet not in found]
     tables = rig.tables("supply")
+    names = [node.partition(".")[2] for node in found if node.partition(".")[0] == "supply"]
+    fronts = _inlets(rig)
     pressures = [
-        float(tables[node.partition(".")[2]]["initial_pressure"])
-        for node in found
-        if node.partition(".")[0] == "supply"
+        min(float(tables[name]["initial_pressure"]), fronts.get(name, math.inf)) for name in names
     ]
     return max(pressures, default=chain.before(rig))
+
+
+def _inlets(rig: Rig) -> dict[str, float]:
+    """Pressure in front of each regulator that has a supply there as it begins [Pa, gauge]."""
+    tables = rig.tables("supply")
+    return {
+        name: float(tables[ports["inlet"].partition(".")[2]]["initial_pressure"])
+        for name, ports in rig.ports("supply").items()
+        if "inlet" in ports
+    }
 
 
 def _most(
@@ -414,7 +424,8 @@ def _top(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) ->
             f"rig {rig.name!r} is fed by a regulator, and nothing says how high its pressure may "
             "go: [limits] max_pressure of the rig file, or a recording of the pressure, is needed"
         )
-    return min(said)
+    inlet = _inlets(rig).get(chain.regulator, math.inf)
+    return min(*said, 0.8 * inlet)  # a tank falls while it is drawn from
 
 
 def pressure_range(

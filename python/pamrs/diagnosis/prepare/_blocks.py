@@ -258,6 +258,19 @@ class _Map:
         ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
         return [end.partition(".")[2] for end in ends if self._unread(end, "regulator")]
 
+    def behind(self, supply: str) -> list[str]:
+        """Names of the regulators whose inlet a supply is: what they let through is drawn from
+        it.
+        """
+        ends = self.rig.ports("supply").items()
+        return [name for name, ports in ends if ports.get("inlet") == supply]
+
+    def in_front(self, regulator: str) -> tuple[str, ...]:
+        """Channel of the pressure in front of a regulator, where it was measured."""
+        inlet = self.rig.ports("supply")[regulator].get("inlet", "")
+        channel = self.pressure(inlet) if inlet else ""
+        return (channel,) if channel in self.has else ()
+
     def commands(self, block: str) -> tuple[str, ...]:
         """Commands of the valves at a block."""
         return tuple(
@@ -314,23 +327,37 @@ class _Map:
         return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
 
     def supply(self, name: str) -> Block | None:
-        """The block of one supply."""
+        """The block of one supply; none of an inlet whose regulator feeds a line."""
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
-        commands = (
-            *self.commands(full),
-            *((dotted("supply_command", name),) if table["kind"] == "regulator" else ()),
+        behind = self.behind(full)
+        unread = [one for one in behind if self._unread(qualified("supply", one), "regulator")]
+        own = [name] if table["kind"] == "regulator" else []
+        nodes = (full, *(qualified("supply", one) for one in behind))
+        read = [self.pressure(node) for node in nodes[1:]]
+        drives = (
+            *(channel for node in nodes for channel in self.neighbours(node)),
+            *(channel for channel in read if channel in self.has),
+            *(channel for one in own for channel in self.in_front(one)),
+            *(command for node in nodes for command in self.commands(node)),
+            *(dotted("supply_command", one) for one in (*own, *unread)),
         )
-        drives = (*self.neighbours(full), *commands)
-        if not self.around(full) or not {self.pressure(full), *drives, *self.angles} <= self.has:
+        drives = tuple(dict.fromkeys(drives))
+        if not any(self.around(node) for node in nodes):
             return None
-        names = (
-            self.of_ways(full)
-            | {f"{full}.{key}" for key in _SUPPLY}
-            | self.zeros(self.chambers_at(full), ())
-        )
+        if any(not way.command for node in nodes[1:] for way in self.around(node)):
+            return None  # noise of two gauges at a line goes both ways, and is drawn one way
+        if not {self.pressure(full), *drives, *self.angles} <= self.has:
+            return None
+        names = {
+            f"{node}.{key}" for node in (full, *(nodes[1:] if unread else ())) for key in _SUPPLY
+        }
+        for node in nodes:
+            names |= self.of_ways(node) | self.zeros(self.chambers_at(node), ())
         covers = "regulator" if table["kind"] == "regulator" else "supply"
         covers += (
-            " and valve"
+            " and regulator"
+            if behind
+            else " and valve"
             if self.commands(full)
             else (" and line" if table["kind"] != "regulator" else "")
         )
@@ -343,6 +370,7 @@ class _Map:
             frozenset(names),
             step,
             covers + _called(name),
+            ("supply",) if unread else (),
             tubes=self.tubes_at(full),
         )
 
@@ -364,6 +392,7 @@ class _Map:
             *self.neighbours(full),
             *self.commands(full),
             *(dotted("supply_command", supply) for supply in unread),
+            *(channel for supply in unread for channel in self.in_front(supply)),
             *(a for a in self.angles if a.partition(".")[2] in joints),
         )
         if not {self.pressure(full), *drives, *self.angles} <= self.has:
@@ -404,6 +433,7 @@ class _Map:
             *self.neighbours(full),
             *self.commands(full),
             *(dotted("supply_command", supply) for supply in unread),
+            *(channel for supply in unread for channel in self.in_front(supply)),
         )
         if not {*drives, *self.angles} <= self.has:
             return None

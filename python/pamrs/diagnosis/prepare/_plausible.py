@@ -251,11 +251,29 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
         elif name in rated:
             size, command = rated[name]
             source = f"the largest {command} is" if command else "the rig file has"
-            if size > 0.0 and not least <= high / size <= most:
+            low_end = least * min(size, _in_front(recording, rig, name.partition(".")[2]))
+            if size > 0.0 and not low_end <= high <= most * size:
                 yield (
                     f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
-                    f"{least * size:.3g} to {most * size:.3g} Pa is allowed: right column and unit?"
+                    f"{low_end:.3g} to {most * size:.3g} Pa is allowed: right column and unit?"
                 )
+
+
+def _inlet_of(rig: Rig, supply: str) -> str:
+    """Name of the supply in front of a regulator, empty where there is none."""
+    return rig.ports("supply")[supply].get("inlet", "").partition(".")[2]
+
+
+def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
+    """Lowest that the pressure in front of a regulator is known to be [Pa gauge]: it may be set to
+    more, and gives no more; infinite where nothing stands there.
+    """
+    inlet = _inlet_of(rig, supply)
+    if not inlet:
+        return math.inf
+    known = _values(recording, dotted("supply_pressure", inlet))
+    told = float(rig.tables("supply")[inlet]["initial_pressure"])
+    return max(0.0, float(known.min())) if known.size else told
 
 
 def _set_to(
@@ -282,7 +300,8 @@ def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings
         name = dotted("supply_pressure", supply)
         values, drawn = (
             _values(recording, name),
-            any(ends["from"] == dotted("supply", supply) for ends in valves.values()),
+            any(ends["from"] == dotted("supply", supply) for ends in valves.values())
+            or any(_inlet_of(rig, other) == supply for other in rig.tables("supply") if supply),
         )
         if table["kind"] != "tank" or not drawn or values.size < 16 or np.ptp(values) > 0.0:
             continue
@@ -314,9 +333,13 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
 
 
 def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
-    """A muscle is not at a higher pressure than what feeds it."""
-    for chamber, supplies in fed_by(rig).items():
-        name = dotted("muscle_pressure", chamber)
+    """A muscle is not at a higher pressure than what feeds it, nor a regulator than its inlet."""
+    fed = {dotted("muscle_pressure", chamber): found for chamber, found in fed_by(rig).items()}
+    for regulator in rig.tables("supply"):
+        inlet = _inlet_of(rig, regulator)
+        if inlet and dotted("supply_pressure", inlet) in recording.channels:
+            fed[dotted("supply_pressure", regulator)] = [inlet]
+    for name, supplies in fed.items():
         for supply in supplies:
             if name not in recording.channels:
                 continue
