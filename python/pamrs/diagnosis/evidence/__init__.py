@@ -3,8 +3,9 @@
 Public: `Candidate`, `Group`, `Attempts`, `significant`, `doubted`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
 `log_weight`, `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`,
-`room_beside`, `stands`, `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`, `case_verdict`,
-`calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
+`room_beside`, `stands`, `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`,
+`case_verdict`, `calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of`
+(verdicts).
 """
 
 from __future__ import annotations
