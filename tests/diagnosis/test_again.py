@@ -57,6 +57,7 @@ def test_what_is_missing_beside_a_held_effect_is_named(recordings) -> None:
     jsonschema.validate(json.loads(found.to_json()), schema())
 
 
+@pytest.mark.slow
 def test_another_block_is_named_beside_friction_that_is_held(recordings) -> None:
     # half of what the friction is: the others are fitted beside a value that has to move
     half = {"friction_constant": 3.5, "friction_pressure": 4e-5}

@@ -59,6 +59,7 @@ def test_a_wrong_value_that_is_asked_for_is_named() -> None:
     assert [wrong.name for wrong in found.wrong_parameters] == ["chamber.dead_volume"]
 
 
+@pytest.mark.slow
 def test_what_cannot_be_fitted_together_is_said() -> None:
     """Two effects that happen at times of their own, and one beside a wrong value."""
     given = again.case(RIG.with_effect("payload_change", {"mass_change": 2.0, "time": 4.0}), RIG)

@@ -95,6 +95,7 @@ def test_a_payload_that_is_poured_is_told_as_a_ramp() -> None:
     assert [e["form"] for e in found.rig.effects] == ["ramp"]
 
 
+@pytest.mark.slow
 def test_a_vibration_is_found_with_another_phase_in_each_recording() -> None:
     phases = {"lift": 0.3, "lower": 2.0, "again": 4.4}
     shaken = {

@@ -43,7 +43,7 @@ def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:
     ("name", "true"),
     [
         ("", 0.0),
-        ("joint.stiffness", 35.0),
+        pytest.param("joint.stiffness", 35.0, marks=pytest.mark.slow),
         ("arm.base_angle", math.radians(-20.0)),
     ],
 )

@@ -59,6 +59,7 @@ def test_a_payload_that_is_told_is_no_missing_physics() -> None:
     assert f"heavy with {NAME} = 13" in found.summary().replace("\n ", "")
 
 
+@pytest.mark.slow
 def test_an_effect_is_named_beside_it() -> None:
     true = SHOULDER.with_effect("muscle_hysteresis", {"friction_pressure": 1e-4})
     case = pamrs.Case("loads", SHOULDER, recordings(true, told=True), Path())

@@ -138,6 +138,7 @@ def turned(true: pamrs.Rig) -> pamrs.Case:
     return pamrs.Case("torque", pamrs.rigs.shoulder(), found, Path())
 
 
+@pytest.mark.slow
 def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
     true = pamrs.rigs.shoulder().with_effect(
         "joint_coulomb_stribeck", {"stiction": 3.0, "stribeck_speed": 0.08}

@@ -58,6 +58,7 @@ def test_healthy_pulsed_valves_miss_nothing() -> None:
     assert diagnosed(PAIR).verdict == "none"
 
 
+@pytest.mark.slow
 def test_a_valve_that_closes_late_is_named() -> None:
     found = diagnosed(PAIR, valve__fill__closing_delay=4e-3)
     assert found.verdict == "parameters"

@@ -94,6 +94,7 @@ def test_what_one_piece_alone_shows_does_not_become_certain() -> None:
     assert all(np.isfinite(s) and s >= found.std[n] for n, s in spread.items())
 
 
+@pytest.mark.slow
 def test_the_factor_for_equations_widens_what_is_stated_and_changes_no_value() -> None:
     """Model file and result have the same standard deviation."""
     rig = pamrs.rigs.shoulder()

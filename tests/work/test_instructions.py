@@ -68,6 +68,7 @@ def _instructions(work: str, calls: int) -> int:
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="valgrind is not installed")
 @pytest.mark.skipif(not _has_four_lanes(), reason="lanes are narrower on this processor")
+@pytest.mark.slow
 def test_instructions_of_hot_paths(
     record_property: Callable[[str, object], None],
 ) -> None:
