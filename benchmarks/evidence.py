@@ -22,16 +22,13 @@ from typing import Any
 from unittest import mock
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import weigh
 from pamrs.effects import id_of
 from pamrs.errors import PamrsError
+from trial.second.inserted import truth_of
 
 SCHEMES = {"what is left": 0.0, "prediction": 1.0, "both": 0.5}
 """Share of prediction in each scheme."""
-MARKED_UNLISTED = "unlisted"
-UNSPLIT = 4
-"""Further arguments where all blocks of a group are weighed together."""
 LEAST = 1e-3
 SURE = 0.9
 
@@ -63,33 +60,38 @@ class Score:
             self.sure.append(right)
 
 
-def truth_of(key: Mapping[str, Any]) -> set[str]:
-    """Names that a case has."""
-    listed = {str(e["id"]) for e in key["effects"] if e["mark"] != MARKED_UNLISTED}
-    return listed | set(key["wrong_parameters"])
-
-
 def weighed(case: Path) -> Iterator[dict[str, dict[str, float]]]:
     """Of each group of blocks that keeps a mismatch: its probabilities by every scheme."""
     last: dict[tuple[str, ...], tuple[Any, ...]] = {}
 
-    def kept(candidates: Any, suspects: Any, *more: Any) -> dict[str, float]:
-        if len(more) == UNSPLIT:  # and not one block of a group by itself
-            last[tuple(b.name for b in suspects)] = (candidates, suspects, *more)
-        return weigh(candidates, suspects, *more)
+    def kept(
+        candidates: Any,
+        suspects: Any,
+        most: float,
+        seconds: float,
+        settings: Any,
+        ranging: Any,
+        own: Any = None,
+    ) -> dict[str, float]:
+        if own is None:  # and not one block of a group by itself
+            last[tuple(b.name for b in suspects)] = (
+                (candidates, suspects, most, seconds),
+                settings,
+                ranging,
+            )
+        return weigh(candidates, suspects, most, seconds, settings, ranging, own)
 
     with mock.patch("pamrs.diagnosis.search._hypotheses.weigh", kept):
         pamrs.diagnose(case)
-    for call in last.values():
-        given = [a for a in call if not isinstance(a, DiagnosisSettings)]
-        at = next(i for i, a in enumerate(call) if isinstance(a, DiagnosisSettings))
-        found = {}
-        for scheme, share in SCHEMES.items():
-            settings = replace(
-                call[at], evidence=replace(call[at].evidence, predictive_share=share)
+    for given, settings, ranging in last.values():
+        yield {
+            scheme: weigh(
+                *given,
+                replace(settings, evidence=replace(settings.evidence, predictive_share=share)),
+                ranging,
             )
-            found[scheme] = weigh(*given[:at], settings, *given[at:])
-        yield found
+            for scheme, share in SCHEMES.items()
+        }
 
 
 def main(folders: list[str]) -> int:
@@ -98,7 +100,7 @@ def main(folders: list[str]) -> int:
     for folder in map(Path, folders):
         for file in sorted((folder / "keys").glob("*.json")):
             key = json.loads(file.read_text(encoding="utf-8"))
-            truth = truth_of(key)
+            truth = {name for name in truth_of(key).split("+") if name}
             if not truth:
                 continue
             print(f"{folder}: {key['case']}", file=sys.stderr)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,7 +15,17 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, simulate
 
-__all__ = ["Experiment", "Points", "in_bar", "nested_triangles", "other_payload", "then", "through"]
+__all__ = [
+    "Experiment",
+    "Points",
+    "in_bar",
+    "nested_triangles",
+    "of_commands",
+    "other_payload",
+    "then",
+    "through",
+    "within",
+]
 
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
@@ -168,3 +179,42 @@ def nested_triangles(low: float, high: float, what: str) -> tuple[Points, str, d
         "periods_s": list(periods),
     }
     return points, text, numbers
+
+
+def of_commands(
+    name: str,
+    text: str,
+    excitation: dict[str, Any],
+    sent: Mapping[str, Array],
+    sample_time: float,
+    *,
+    initial: dict[str, float] | None = None,
+    changes: dict[str, float] | None = None,
+    extra: float = 0.0,
+    needs: str = "",
+) -> Experiment:
+    """The experiment that plays commands (n,), by channel, and takes ``extra`` seconds more."""
+    (channel, command), *also = sent.items()
+    seconds = (command.size - 1) * sample_time
+    return Experiment(
+        name,
+        text,
+        {"kind": name, **excitation, "duration_s": round(seconds, 1)},
+        command,
+        command.size,
+        sample_time,
+        initial or {},
+        changes or {},
+        seconds + extra,
+        channel,
+        needs,
+        dict(also),
+    )
+
+
+def within(rows: int, sample_time: float, spans: list[tuple[float, float]]) -> NDArray[np.bool_]:
+    """Which of so many samples lie in one of some spans of time [s], the ends of spans left out."""
+    time, inside = np.arange(rows) * sample_time, np.zeros(rows, dtype=bool)
+    for begin, end in spans:
+        inside |= (time >= begin) & (time < end)
+    return inside

@@ -31,9 +31,11 @@ from pamrs.diagnosis.next_experiment._experiment import (
     Points,
     in_bar,
     nested_triangles,
+    of_commands,
     other_payload,
     then,
     through,
+    within,
 )
 from pamrs.diagnosis.next_experiment._several import several_library
 from pamrs.diagnosis.settings import NextExperimentSettings
@@ -83,22 +85,16 @@ class _Maker:
                 initial=initial,
                 **options,
             )
-        seconds = (reference.size - 1) * self.dt
-        done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
-        (channel, command), *also = sent.items()
-        return Experiment(
+        return of_commands(
             name,
             text,
-            done,
-            command,
-            reference.size,
+            excitation,
+            sent,
             self.dt,
-            initial,
-            changes,
-            seconds + extra,
-            channel,
-            needs,
-            dict(also),
+            initial=initial,
+            changes=changes,
+            extra=extra,
+            needs=needs,
         )
 
     def levels(self, *shares: float) -> tuple[list[float], str]:
@@ -182,10 +178,7 @@ class _Maker:
             closed.append((points[-1][0], points[-1][0] + hold))
             points = then(points, (hold, pressure))
         reference = through(points, self.dt)
-        time = np.arange(reference.size) * self.dt
-        shut = np.zeros(reference.size, dtype=bool)
-        for a, b in closed:
-            shut |= (time >= a) & (time < b)
+        shut = within(reference.size, self.dt, closed)
         excitation = {"levels_bar": [in_bar(p) for p in pressures], "hold_s": hold, **(also or {})}
         return self.driven(
             name, text, excitation, reference, shut=shut, initial=initial or {}, extra=extra
@@ -253,10 +246,7 @@ class _Maker:
             closed.append((points[-1][0], points[-1][0] + 4.0))
             points = then(points, (4.0, goal))
         reference = through(points, self.dt)
-        time = np.arange(reference.size) * self.dt
-        shut = np.zeros(reference.size, dtype=bool)
-        for a, b in closed:
-            shut |= (time >= a) & (time < b)
+        shut = within(reference.size, self.dt, closed)
         them = "them" if len(self.chain.valves) > 1 else "it"
         text = (
             f"step from {in_bar(base):g} bar to {in_bar(small):g} bar and back, then to "

@@ -28,9 +28,11 @@ from pamrs.diagnosis.next_experiment._experiment import (
     Points,
     in_bar,
     nested_triangles,
+    of_commands,
     other_payload,
     then,
     through,
+    within,
 )
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.rig import Rig
@@ -130,23 +132,8 @@ class _Several:
                 bandwidth=self.bandwidth if bandwidth is None else bandwidth,
                 shut=shut,
             )
-        rows = next(iter(references.values())).size
-        seconds = (rows - 1) * self.dt
-        done = {"kind": name, **excitation, "duration_s": round(seconds, 1)}
-        (channel, command), *also = sent.items()
-        return Experiment(
-            name,
-            text,
-            done,
-            command,
-            rows,
-            self.dt,
-            {},
-            changes or {},
-            seconds + extra,
-            channel,
-            needs,
-            dict(also),
+        return of_commands(
+            name, text, excitation, sent, self.dt, changes=changes, extra=extra, needs=needs
         )
 
     def alone(
@@ -167,10 +154,10 @@ class _Several:
         } | {chain.name: reference}
         closed = options.pop("closed", None)
         if closed is not None:
-            shut = {c.name: np.zeros(reference.size, dtype=bool) for c in self.chains}
-            for a, b in closed:
-                shut[chain.name] |= (time >= a) & (time < b)
-            options["shut"] = shut
+            options["shut"] = {
+                c.name: within(reference.size, self.dt, closed if c is chain else [])
+                for c in self.chains
+            }
         others = [c for c in self.chains if c is not chain]
         levels = [f"{in_bar(self.spans.held[c.name]):g} bar" for c in others]
         held = _listed(levels if len(set(levels)) > 1 else levels[:1])
@@ -245,10 +232,7 @@ class _Several:
         shares = _rests(len(self.chains))
         points, closed = self._ordered(shares, (1.0, 1.0), hold)
         size = round(points[self.chains[0].name][-1][0] / self.dt) + 1
-        time = np.arange(size) * self.dt
-        shut = np.zeros(size, dtype=bool)
-        for a, b in closed:
-            shut |= (time >= a) & (time < b)
+        shut = within(size, self.dt, closed)
         words, numbers = self._in_order(shares)
         count = "three" if len(shares) == 3 else f"{len(shares)}"
         text = (
