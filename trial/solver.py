@@ -7,6 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 State = list[float]
+#: relative error of a step with which cases are written
+TOLERANCE = 1.0e-8
 
 
 class Solver:
@@ -25,7 +27,7 @@ class Solver:
     _rhs: Callable[[State, Any], State]
 
     def advance(
-        self, y: State, opening: Any, span: float, step: float, rtol: float = 1.0e-8
+        self, y: State, opening: Any, span: float, step: float, rtol: float = TOLERANCE
     ) -> tuple[State, float]:
         """Integrate over `span` [s] at a constant opening of the valve (of each of several).
 
