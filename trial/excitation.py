@@ -217,9 +217,73 @@ def build(name: str, duration: float, sample_time: float, rng: np.random.Generat
     )
 
 
-class Controller:
-    """PID on the angle with feedforward from the nominal model over an inner pressure loop, 12-bit
-    output.
+class Loop:
+    """PID on a measured angle and loops of the pressures behind it, on a 12-bit output.
+
+    Parameters
+    ----------
+    period : float
+        Time between two commands [s].
+    pid : (3,) array
+        Gains on the error, its integral and the rate, before each is drawn within 15 %.
+    flows : (2,) array
+        Gains from a gap of pressure to filling and to venting [V/Pa]; drawn the same way.
+    limit : float
+        Of the integral, either side.
+    rng : numpy.random.Generator
+        Draws the gains.
+    calm : float
+        Less than 1 where slow sampling leaves less room for the rate and for the valve.
+    """
+
+    def __init__(
+        self,
+        period: float,
+        pid: Array,
+        flows: Array,
+        limit: float,
+        rng: np.random.Generator,
+        calm: float = 1.0,
+    ) -> None:
+        gains = pid * rng.uniform(0.85, 1.15, 3) * np.array([calm, 1.0, calm])
+        self.kp, self.ki, self.kd = (float(v) for v in gains)
+        self.fill, self.vent = (float(v) for v in calm * flows * rng.uniform(0.85, 1.15, 2))
+        self.period, self.limit = period, limit
+        self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * period)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forget the past."""
+        self.sum, self.rate = 0.0, 0.0
+        self.last: float | None = None
+
+    @staticmethod
+    def quantise(command: float) -> float:
+        """Nearest level [V, or bar of a regulator] of the output within 0 to 10."""
+        return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
+
+    def see(self, angle: float) -> None:
+        """Take in a measured angle: its rate is filtered at 12 Hz."""
+        if self.last is not None:
+            self.rate += self.smooth * ((angle - self.last) / self.period - self.rate)
+        self.last = angle
+
+    def gather(self, error: float) -> None:
+        """Add an error to the integral."""
+        self.sum = min(max(self.sum + error * self.period, -self.limit), self.limit)
+
+    def feedback(self, error: float) -> float:
+        """What the angle asks for beside the feedforward [Pa]."""
+        return self.kp * error + self.ki * self.sum - self.kd * self.rate
+
+    def opened(self, gap: float, null: float, dither: float) -> float:
+        """Command [V] of a valve for a gap of pressure [Pa]."""
+        command = null + (self.fill if gap > 0.0 else self.vent) * gap + dither
+        return self.quantise(min(max(command, null - 2.5), null + 1.5))
+
+
+class Controller(Loop):
+    """PID on the angle with feedforward from the nominal model over an inner pressure loop.
 
     Parameters
     ----------
@@ -232,26 +296,12 @@ class Controller:
     """
 
     def __init__(self, nominal: Plant, sample_time: float, rng: np.random.Generator) -> None:
-        gains = np.array([6.0e4, 8.0e4, 5.0e4, 1.6e-5, 5.0e-5]) * rng.uniform(0.85, 1.15, 5)
-        self.kp, self.ki, self.kd, self.fill, self.vent = (float(v) for v in gains)
+        pid, flows = np.array([6.0e4, 8.0e4, 5.0e4]), np.array([1.6e-5, 5.0e-5])
+        super().__init__(sample_time, pid, flows, 1.0, rng)
         self.null = nominal.par.null_voltage
         grid = np.radians(np.linspace(14.0, 112.0, 99))
         self.first, self.width = float(grid[0]), float(grid[1] - grid[0])
         self.hold = [nominal.holding_pressure(float(a)) for a in grid]
-        self.step = sample_time
-        self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * sample_time)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the past."""
-        self.sum = 0.0
-        self.rate = 0.0
-        self.last: float | None = None
-
-    @staticmethod
-    def quantise(command: float) -> float:
-        """Nearest DAC level [V] within 0 to 10 V."""
-        return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
 
     def __call__(
         self, reference: float, angle: float, pressure: float, dither: float, sealed: bool
@@ -259,17 +309,13 @@ class Controller:
         """Command [V] from the reference and measured angle [rad] and the measured gauge pressure
         [Pa].
         """
-        if self.last is not None:
-            self.rate += self.smooth * ((angle - self.last) / self.step - self.rate)
-        self.last = angle
+        self.see(angle)
         if sealed:
             return self.quantise(self.null)
         s = min(max((reference - self.first) / self.width, 0.0), 97.999)
         i = int(s)
         ahead = self.hold[i] + (s - i) * (self.hold[i + 1] - self.hold[i])
         error = reference - angle
-        self.sum = min(max(self.sum + error * self.step, -1.0), 1.0)
-        wanted = max(ahead + self.kp * error + self.ki * self.sum - self.kd * self.rate, 0.0)
-        gap = wanted - pressure
-        command = self.null + (self.fill if gap > 0.0 else self.vent) * gap + dither
-        return self.quantise(min(max(command, self.null - 2.5), self.null + 1.5))
+        self.gather(error)
+        wanted = max(ahead + self.feedback(error), 0.0)
+        return self.opened(wanted - pressure, self.null, dither)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import DAC_STEP, Excitation
+from ..excitation import Excitation, Loop
 from ..second.drive import FREE, course, range_of
 from ..second.rigs import RigKind
 from .places import SIDES
@@ -110,7 +109,7 @@ def _one_side(sealed: NDArray[np.bool_], rng: np.random.Generator) -> None:
             sealed[first:stop, int(rng.integers(len(SIDES)))] = False
 
 
-class PairDriver:
+class PairDriver(Loop):
     """Controller that knows the nominal pair: pressures that hold the reference at a mean pressure,
     a PID on the angle that shifts their difference, and a loop of each pressure behind it.
 
@@ -129,7 +128,7 @@ class PairDriver:
     def __init__(
         self, nominal: PairPlant, rig: RigKind, period: float, rng: np.random.Generator
     ) -> None:
-        self.period, self.most = period, rig.most
+        self.most = rig.most
         self.null = (nominal.par.flexor.null_voltage, nominal.par.extensor.null_voltage)
         low, top = range_of(rig)
         self.grid = np.linspace(low, top, 61)
@@ -141,46 +140,27 @@ class PairDriver:
         self.base, self.slope = ends[0], (ends[1] - ends[0]) / 1.0e5
         middle = self.base + self.slope * 0.5 * (LOW + HIGH)
         stiff = max(float(middle[-1] - middle[0]) / (top - low), 2.0e4)
-        gains = np.array([0.3, 0.4, 0.1]) * stiff * rng.uniform(0.85, 1.15, 3)
-        calm = min(1.0, 0.01 / period)
-        self.kp, self.ki, self.kd = (float(v) for v in gains * np.array([calm, 1.0, calm]))
-        self.fill, self.vent = (
-            float(v) for v in calm * np.array([3.0e-5, 6.0e-5]) * rng.uniform(0.85, 1.15, 2)
-        )
-        self.span = top - low
-        self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * period)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the past."""
-        self.sum, self.rate = 0.0, 0.0
-        self.last: float | None = None
+        pid, flows = np.array([0.3, 0.4, 0.1]) * stiff, np.array([3.0e-5, 6.0e-5])
+        super().__init__(period, pid, flows, 0.3 * (top - low), rng, min(1.0, 0.01 / period))
 
     def on(
         self, course: PairCourse, index: int, measured: tuple[float, ...]
     ) -> tuple[float, float]:
         """Commands [V] on a 12-bit output at a sample of a course, from what is measured."""
         reference, level = float(course.reference[index]), float(course.level[index])
-        angle = measured[3]
-        if self.last is not None:
-            self.rate += self.smooth * ((angle - self.last) / self.period - self.rate)
-        self.last = angle
-        error = reference - angle
-        limit = 0.3 * self.span
+        self.see(measured[3])
+        error = reference - measured[3]
         if not course.sealed[index].any():
-            self.sum = min(max(self.sum + error * self.period, -limit), limit)
+            self.gather(error)
         half = float(np.interp(reference, self.grid, self.base + self.slope * level))
-        half += self.kp * error + self.ki * self.sum - self.kd * self.rate
+        half += self.feedback(error)
         sent = []
         for j, wanted in enumerate((level + half, level - half)):
-            command = self.null[j]
-            if not course.sealed[index, j]:
-                gap = min(max(wanted, LEAST), self.most) - measured[j]
-                move = (self.fill if gap > 0.0 else self.vent) * gap + float(
-                    course.dither[index, j]
-                )
-                command = min(max(command + move, self.null[j] - 2.5), self.null[j] + 1.5)
-            sent.append(round(command / DAC_STEP) * DAC_STEP)
+            if course.sealed[index, j]:
+                sent.append(self.quantise(self.null[j]))
+                continue
+            gap = min(max(wanted, LEAST), self.most) - measured[j]
+            sent.append(self.opened(gap, self.null[j], float(course.dither[index, j])))
         return sent[0], sent[1]
 
 

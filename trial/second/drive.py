@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import DAC_STEP, Excitation, build
+from ..excitation import Excitation, Loop, build
 from ..plant import Plant
 from .rigs import PAIR, RigKind
 
@@ -60,7 +60,7 @@ def range_of(rig: RigKind) -> tuple[float, float]:
     return (math.radians(rig.low), math.radians(rig.top)) if turns else (rig.low, rig.top)
 
 
-class Driver:
+class Driver(Loop):
     """Controller that knows the nominal plant: feedforward and PID on the reference, and a loop of
     the pressure behind it; a regulator takes the pressure itself, a rigid volume has no more than
     the pressure.
@@ -80,7 +80,7 @@ class Driver:
     def __init__(
         self, nominal: Plant, rig: RigKind, period: float, rng: np.random.Generator
     ) -> None:
-        self.null, self.period = nominal.par.null_voltage, period
+        self.null = nominal.par.null_voltage
         self.regulated, self.most = nominal.par.feed == "regulator", rig.most
         low, top = range_of(rig)
         self.grid = np.linspace(low, top, 61)
@@ -88,26 +88,8 @@ class Driver:
         hold = rig.most * self.grid if rigid else [nominal.holding_pressure(a) for a in self.grid]
         self.hold = np.clip(np.asarray(hold), 0.0, rig.most)
         slope = 0.0 if rigid else float(self.hold[-1] - self.hold[0]) / (top - low)
-        gains = np.array([0.3, 0.4, 0.2]) * slope * rng.uniform(0.85, 1.15, 3)
-        # slow sampling leaves less room for the derivative and for the valve
-        calm = min(1.0, 0.01 / period)
-        self.kp, self.ki, self.kd = (float(v) for v in gains * np.array([calm, 1.0, calm]))
-        self.fill, self.vent = (
-            float(v) for v in calm * np.array([1.6e-5, 5.0e-5]) * rng.uniform(0.85, 1.15, 2)
-        )
-        self.span = top - low
-        self.smooth = 1.0 - math.exp(-2.0 * math.pi * 12.0 * period)
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the past."""
-        self.sum, self.rate = 0.0, 0.0
-        self.last: float | None = None
-
-    @staticmethod
-    def quantise(command: float) -> float:
-        """Nearest level [V, or bar of a regulator] of a 12-bit output within 0 to 10."""
-        return round(min(max(command, 0.0), 10.0) / DAC_STEP) * DAC_STEP
+        pid, flows = np.array([0.3, 0.4, 0.2]) * slope, np.array([1.6e-5, 5.0e-5])
+        super().__init__(period, pid, flows, 0.3 * (top - low), rng, min(1.0, 0.01 / period))
 
     def __call__(
         self, reference: float, angle: float, pressure: float, dither: float, sealed: bool
@@ -115,22 +97,16 @@ class Driver:
         """Command from the reference and the measured angle [rad] (or shortening [m], without its
         sign where the log has a length) and gauge pressure [Pa].
         """
-        if self.last is not None:
-            self.rate += self.smooth * ((angle - self.last) / self.period - self.rate)
-        self.last = angle
+        self.see(angle)
         if sealed and not self.regulated:
             return self.quantise(self.null)
         error = reference - angle
-        limit = 0.3 * self.span
-        self.sum = min(max(self.sum + error * self.period, -limit), limit)
-        wanted = float(np.interp(reference, self.grid, self.hold))
-        wanted += self.kp * error + self.ki * self.sum - self.kd * self.rate
+        self.gather(error)
+        wanted = float(np.interp(reference, self.grid, self.hold)) + self.feedback(error)
         wanted = min(max(wanted, 0.0), self.most)
         if self.regulated:
             return self.quantise(wanted * 1.0e-5 + dither)
-        gap = wanted - pressure
-        command = self.null + (self.fill if gap > 0.0 else self.vent) * gap + dither
-        return self.quantise(min(max(command, self.null - 2.5), self.null + 1.5))
+        return self.opened(wanted - pressure, self.null, dither)
 
 
 __all__ = ["FREE", "Driver", "course", "free_log", "range_of"]
