@@ -442,13 +442,22 @@ def _hypotheses(
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
         singles = _one_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
-        lasting = [c for c in singles if c.fit.events is None]
-        best = min(lasting, key=left_everywhere, default=None)
-        sets = [] if best is None else beside_wrong(trial, best, tell)
+        lasting = sorted((c for c in singles if c.fit.events is None), key=left_everywhere)
+        sets = [s for c in _alike(lasting, alone, trial) for s in beside_wrong(trial, c, tell)]
     else:
         sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
     asked = considered(trial, screened, start, weight, tell)
     return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
+
+
+def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Candidate]:
+    """Of lasting effects, those that leave least first, the first one and what weighs nearly as
+    much as the heaviest: a value that is wrong beside one of them may be so beside all.
+    """
+    settings = trial.settings.search
+    top = max(map(weight, lasting), default=0.0)
+    near = [c for c in lasting[1:] if math.exp(weight(c) - top) > settings.polish_from]
+    return [*lasting[:1], *near[: max(settings.most_paired - 1, 0)]]
 
 
 def _weighed(
