@@ -12,6 +12,7 @@ from scipy.stats import chi2
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
+from pamrs.effects import info_of
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -385,7 +386,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     _check_commands(recording, rig, core.inputs)
     signals, raw, noise, lengths = {}, {}, {}, {}
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
-    for name in (*drives, *pulls_of(rig).values()):
+    for name in (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values()):
         if name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
@@ -416,6 +417,18 @@ def pulls_of(rig: Rig) -> dict[str, str]:
     if rig.model["load"]:
         return {"": "force"}
     return {name: dotted("joint_torque", name) for name in rig.tables("joint")}
+
+
+def thermometers_of(rig: Rig) -> dict[str, str]:
+    """Channels of the temperatures that the gases of a rig have of their own, by the names of their
+    chambers: those with an energy balance, and those on which an effect acts that gives them one.
+    """
+    warming = [entry.get("at", "") for entry in rig.effects if info_of(entry["id"]).frees_mass]
+    return {
+        name: dotted("temperature", name)
+        for name, table in rig.tables("chamber").items()
+        if table["gas"] == "energy_balance" or "" in warming or name in warming
+    }
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
