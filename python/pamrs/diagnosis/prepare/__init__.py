@@ -5,7 +5,7 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
-recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed` (signals),
+recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`, `thermometers_of` (signals),
 `Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and
 their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
 """
@@ -31,7 +31,14 @@ from pamrs.diagnosis.prepare._plausible import (
     implausible,
     without_impossible,
 )
-from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
+from pamrs.diagnosis.prepare._signals import (
+    Prepared,
+    binned,
+    noise_level,
+    prepare,
+    smoothed,
+    thermometers_of,
+)
 from pamrs.diagnosis.prepare._units import suspected_units
 
 __all__ = [
@@ -59,6 +66,7 @@ __all__ = [
     "said_of_beginnings",
     "smoothed",
     "suspected_units",
+    "thermometers_of",
     "without_copies",
     "without_impossible",
 ]

@@ -18,7 +18,16 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["COMMANDS", "Prepared", "binned", "held", "noise_level", "prepare", "smoothed"]
+__all__ = [
+    "COMMANDS",
+    "Prepared",
+    "binned",
+    "held",
+    "noise_level",
+    "prepare",
+    "smoothed",
+    "thermometers_of",
+]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
