@@ -120,7 +120,7 @@ fn sensitivities_are_those_of_differences() {
     let log = Log::of(&of(0.3, 50.0), 24);
     let known = [0, 1, 2, 3];
     let exact = log.predicted(&of(0.3, 50.0), "temperature", &known, &names);
-    assert_eq!(exact.columns, 4); // where the gas begins, and what the thermometer is off by
+    assert_eq!(exact.columns, 5); // gas, what the thermometer is off by, where it stands
     for (column, (by, step)) in [((0.0, 1.0), 0.01), ((1.0, 0.0), 1e-4)].into_iter().enumerate() {
         let moved = |sign: f64| {
             let (tau, wall) = (0.3 + sign * step * by.0, 50.0 + sign * step * by.1);
@@ -136,8 +136,12 @@ fn sensitivities_are_those_of_differences() {
         }
     }
     // a thermometer that is off by a kelvin: the gas began a kelvin colder, and all reads one more
-    let off = (0..ROWS).map(|k| exact.jacobian[k * 4 + 3]);
+    let off = (0..ROWS).map(|k| exact.jacobian[k * 5 + 3]);
     assert!((off.last().unwrap() - 1.0).abs() < 0.05);
+    // where a late one stands is forgotten in its time constant
+    let stands = |k: usize| exact.jacobian[k * 5 + 4];
+    assert!((stands(0) - 1.0).abs() < 1e-12);
+    assert!((stands(30) - (-1.0_f64).exp()).abs() < 1e-3);
 }
 
 #[test]

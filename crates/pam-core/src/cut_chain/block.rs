@@ -117,11 +117,12 @@ impl Block {
 
     /// Number of initial states per window; what a load cell or a torque sensor reads at rest is
     /// one. Of a gas with a thermometer the temperature comes last in the block of its pressure;
-    /// in that of its temperature it is the first, and what the thermometer is off by the second.
+    /// in that of its temperature it is the first, what the thermometer is off by the second, and
+    /// where a late one stands the third.
     pub fn initial_count(self, rig: &Rig, measured: &Measured<'_>) -> usize {
         match self {
             Self::Pull(_) => 1,
-            Self::Temperature(_) => 2,
+            Self::Temperature(_) => 3,
             Self::Chamber(k) if measured.thermometer(k).is_some() => 2,
             _ => self.initial_states(rig.layout()).len(),
         }

@@ -225,7 +225,8 @@ impl<'a, S: Number> Cut<'a, S> {
         let mass = plant.rig().layout().mass(gas);
         state[mass] = plant.rest_mass(gas, state) * rest / (read + ahead + bump);
         if let Some((reading, _)) = thermometer {
-            state[reading] = read;
+            let late = if of_temperature { self.bumps[2] } else { constant(0.0) };
+            state[reading] = read + late;
         }
     }
 

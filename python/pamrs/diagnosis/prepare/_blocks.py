@@ -746,11 +746,15 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
 
 def _shown(block: Block, start: Array, noise: float, settings: PrepareSettings) -> Array:
     """What the start of a window can do, (n, k): of a pressure without the temperature at which its
-    gas began, once that is forgotten.
+    gas began, once that is forgotten; of a temperature without where a thermometer stood that is
+    not late.
     """
-    if not block.thermometer or block.kind == "temperature":
+    if not block.thermometer:
         return start
-    told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
+    if block.kind == "temperature":
+        return start[:, start.any(axis=0)]
+    with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
+        told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
     return start if told else start[:, :-1]
 
 
