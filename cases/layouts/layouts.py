@@ -149,8 +149,10 @@ LAYOUTS = {
         Layout(
             "tank_three_nozzles",
             "chamber.heat_transfer_coefficient",
-            lambda rig: rig.with_parameters(
-                {"chamber.heat_transfer_coefficient": 50.0, "thermometer_lag.time_constant": 0.4}
+            lambda rig: (
+                rig.without_effect("thermometer_lag")
+                .with_effect("thermometer_lag", {"time_constant": 0.4})
+                .with_parameters({"chamber.heat_transfer_coefficient": 50.0})
             ),
             _nozzles,
         ),
