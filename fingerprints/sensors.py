@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from fingerprints.air import LOCKED
 from fingerprints.sheet import (
     BAR,
     WITH,
@@ -69,7 +70,7 @@ def slow_thermometer(sheet: Sheet) -> None:
     command = hold(
         time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (5.0, 0.0), (5.25, 5.0), (9.0, 8.0), (9.6, 5.0)
     )
-    runs = sheet.run({"arm.viscous": 1e4}, valve_command=command)
+    runs = sheet.run(LOCKED, valve_command=command)
     axes = sheet.axes("tt;px", width_ratios=[1.2, 1])
     sheet.both(axes["t"], runs, temperature)
     label(

@@ -40,8 +40,9 @@ discharge_area = { value = 2.0, unit = "mm2", tol = 0.04 }
 [sensors]
 pressure_zero = { value = 0.0, unit = "Pa", tol = 500.0 }
 """
+_BALANCE = TANK[TANK.index('gas = "') : TANK.index("[line]")]
 COEFFICIENTS = TANK.replace(
-    'gas = "energy_balance"\nheat_transfer_coefficient = { value = 20, unit = "W/(m2 K)", tol = 4 }',
+    _BALANCE,
     "".join(f'{k} = {{ value = 1.35, unit = "1" }}\n' for k in ("alpha_in", "alpha_out", "alpha")),
 )
 

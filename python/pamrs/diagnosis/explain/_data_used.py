@@ -28,7 +28,7 @@ _BELONGS = {
 
 
 _WITHOUT_ENERGY = (
-    "the gas of {chamber} has no temperature of its own: write gas = \"energy_balance\" and "
+    'the gas of {chamber} has no temperature of its own: write gas = "energy_balance" and '
     "heat_transfer_coefficient into [{chamber}] to have it judged. That of the room is "
     "ambient_temperature"
 )

@@ -5,9 +5,9 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
-recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`, `thermometers_of` (signals),
-`Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and
-their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
+recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
+`thermometers_of` (signals), `Block`, `Residual`, `available_blocks`, `begun`, `change`,
+`predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
 """
 
 from __future__ import annotations

@@ -556,9 +556,10 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; so is a valve
     where a gauge stands between it and the line behind it, beside the chamber, which is driven from
-    the valve on where that can be; and so are muscles whose force (or torque at a joint) is
-    measured; and so is a gas that has a temperature of its own and a thermometer. A rig with joints or a load and without valves and supplies is driven by the pressures
-    of its muscles: these are given, and only what they move is judged.
+    the valve on where that can be; so are muscles whose force (or torque at a joint) is measured,
+    and a gas that has a temperature of its own and a thermometer. A rig with joints or a load and
+    without valves and supplies is driven by the pressures of its muscles: these are given, and only
+    what they move is judged.
 
     Parameters
     ----------
@@ -802,7 +803,10 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
     )
-    rows, noise = prepared.usable(block.channel, block.drives, starts), prepared.noise[block.channel]
+    rows, noise = (
+        prepared.usable(block.channel, block.drives, starts),
+        prepared.noise[block.channel],
+    )
     value = np.where(rows, measured - prediction, 0.0)
     jacobian[~rows] = 0.0
     shifted = prediction.copy()
