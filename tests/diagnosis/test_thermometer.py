@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.diagnosis.next_experiment import checked_channels, measurable
 from pamrs.diagnosis.prepare import available_blocks, thermometers_of
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.recordings import Recording
+from pamrs.recordings import Recording, propose
+from pamrs.report.chain import chain_svg
 from pamrs.rig import parse_rig
 from tests.diagnosis.noisy import noisy
 from tests.diagnosis.test_gas_law import TEXT, WALL
@@ -176,6 +178,54 @@ def test_a_gas_without_a_temperature_says_what_to_write() -> None:
     again = found_in(held, recordings)
     assert "temperature" in again.data[0].used
     assert [b.blocks for b in again.blocks] == [["chamber", "temperature"]]
+
+
+def test_a_plan_knows_which_gas_may_have_a_thermometer() -> None:
+    assert measurable(parse_rig(TANK), "temperature") == ("temperature",)
+    assert measurable(parse_rig(COEFFICIENTS), "temperature") == ()
+    with pytest.raises(pamrs.errors.ParameterError, match="'temperature', which is not allowed"):
+        checked_channels(parse_rig(COEFFICIENTS), ("muscle_pressure", "temperature"))
+
+
+@pytest.mark.slow
+def test_a_plan_says_what_a_thermometer_would_tell() -> None:
+    rig, channels = parse_rig(TEXT), ["valve_command", "supply_pressure", "muscle_pressure"]
+    plan = pamrs.plan_diagnosis(rig, channels, experiments=["step_and_shut"])
+    assert plan.sight("thermometer_lag").verdict == "not seen"
+    (more,) = [a for a in plan.additions if a.name == "temperature"]
+    assert "thermometer_lag" in more.seen
+    then = pamrs.plan_diagnosis(rig, [*channels, "temperature"], experiments=["step_and_shut"])
+    assert then.sight("thermometer_lag").verdict == "seen"
+    (own,) = [b for b in then.blocks if b["name"] == "temperature"]
+    assert own["covers"] == "gas"
+    (chamber,) = [b for b in then.blocks if b["name"] == "chamber"]
+    assert "temperature" not in chamber["why"]
+
+
+def test_the_drawing_has_the_thermometer_in_the_chamber() -> None:
+    rig = parse_rig(TANK)
+    found = found_in(rig, blown(rig, lag=0.5))
+    drawn = chain_svg(found)
+    assert drawn is not None
+    assert "temperature" in drawn
+    assert "missing:" in drawn
+    assert "thermometer lag" in drawn
+    text = found.summary()
+    assert "temperature" in text
+    assert "budget of the temperature" in text.lower()
+
+
+def test_a_log_tells_the_temperature_of_the_gas_from_others(tmp_path: Path) -> None:
+    wave = np.sin(0.1 * np.arange(100))
+    columns = {"time [s]": 0.1 * np.arange(100), "p chamber [bar]": 4.0 + wave}
+    columns |= {"chamber temp [degC]": 20.0 + wave, "motor temp [degC]": 40.0 + wave}
+    log = tmp_path / "log.csv"
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(log, rows, delimiter=",", header=",".join(columns), comments="")
+    for text, more in ((TANK, {"temperature": "chamber temp"}), (COEFFICIENTS, {})):
+        found = propose([log], parse_rig(text))
+        told = {m.channel: m.series.name for m in found.logs[0].matches}
+        assert told == {"muscle_pressure": "p chamber", **more}
 
 
 def test_a_thermometer_adds_its_block_and_changes_no_other() -> None:
