@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs.channels import channel_of
 from pamrs.cli._shared import (
     check_writable,
     exact,
@@ -16,7 +17,6 @@ from pamrs.cli._shared import (
     tell,
     write,
 )
-from pamrs.channels import channel_of
 from pamrs.errors import check_packages
 
 if TYPE_CHECKING:

@@ -7,7 +7,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
 recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
 `thermometers_of` (signals), `Block`, `Residual`, `available_blocks`, `begun`, `change`,
-`predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
+`predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
+(beginnings that nobody measured).
 """
 
 from __future__ import annotations
