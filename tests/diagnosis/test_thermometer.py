@@ -180,6 +180,26 @@ def test_a_gas_without_a_temperature_says_what_to_write() -> None:
     assert [b.blocks for b in again.blocks] == [["chamber", "temperature"]]
 
 
+def test_of_two_gases_that_are_joined_neither_is_judged() -> None:
+    """The second gets the cold air of the first, which drives no block."""
+    first = TANK.replace("[chamber]", "[chamber.a]").replace('"chamber"', '"chamber.a"')
+    first = first.replace('"ambient"', '"chamber.b"')
+    other = TANK[TANK.index("[chamber]") : TANK.index("[line]")].replace("6.0", "0.0")
+    rig = parse_rig(first + other.replace("[chamber]", "[chamber.b]"))
+    assert thermometers_of(rig) == {}
+    channels = [f"{kind}.{name}" for name in "ab" for kind in ("muscle_pressure", "temperature")]
+    recordings = []
+    for k, role in enumerate(ROLES):
+        begin = {"muscle_pressure.a": (4.0 + k) * 1e5}
+        run = pamrs.simulate(rig, duration=10.0, sample_time=0.02, initial=begin)
+        noise = {name: NOISE[name.partition(".")[0]] for name in channels}
+        own = {name: run[name] for name in channels}
+        recordings.append(noisy(f"r{k}", role, 0.02, own, noise, [7, k]))
+    found = found_in(rig, recordings)
+    assert {block for group in found.blocks for block in group.blocks} == {"chamber.a", "chamber.b"}
+    assert "comes from another chamber" in found.data[0].unused["temperature.b"]
+
+
 def test_a_plan_knows_which_gas_may_have_a_thermometer() -> None:
     assert measurable(parse_rig(TANK), "temperature") == ("temperature",)
     assert measurable(parse_rig(COEFFICIENTS), "temperature") == ()

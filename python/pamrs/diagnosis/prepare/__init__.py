@@ -6,8 +6,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
 recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
-`thermometers_of` (signals), `Block`, `Residual`, `available_blocks`, `begun`, `change`,
-`predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
+`thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`, `available_blocks`, `begun`,
+`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
 (beginnings that nobody measured).
 """
 
@@ -39,6 +39,7 @@ from pamrs.diagnosis.prepare._signals import (
     prepare,
     smoothed,
     thermometers_of,
+    warm_chambers,
 )
 from pamrs.diagnosis.prepare._units import suspected_units
 
@@ -68,6 +69,7 @@ __all__ = [
     "smoothed",
     "suspected_units",
     "thermometers_of",
+    "warm_chambers",
     "without_copies",
     "without_impossible",
 ]

@@ -16,6 +16,7 @@ from pamrs.effects import info_of
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "prepare",
     "smoothed",
     "thermometers_of",
+    "warm_chambers",
 ]
 
 Array = NDArray[np.float64]
@@ -428,16 +430,30 @@ def pulls_of(rig: Rig) -> dict[str, str]:
     return {name: dotted("joint_torque", name) for name in rig.tables("joint")}
 
 
-def thermometers_of(rig: Rig) -> dict[str, str]:
-    """Channels of the temperatures that the gases of a rig have of their own, by the names of their
-    chambers: those with an energy balance, and those on which an effect acts that gives them one.
+def warm_chambers(rig: Rig) -> list[str]:
+    """Names of the chambers whose gas has a temperature of its own: those with an energy balance,
+    and those on which an effect acts that gives them one.
     """
     warming = [entry.get("at", "") for entry in rig.effects if info_of(entry["id"]).frees_mass]
-    return {
-        name: dotted("temperature", name)
+    return [
+        name
         for name, table in rig.tables("chamber").items()
         if table["gas"] == "energy_balance" or "" in warming or name in warming
-    }
+    ]
+
+
+def thermometers_of(rig: Rig) -> dict[str, str]:
+    """Channels of the temperatures of a rig's gases that can be judged, by the names of their
+    chambers: those that no valve or line joins to another gas with a temperature of its own, which
+    comes along with what flows and drives no block.
+    """
+    warm = {qualified("chamber", name): name for name in warm_chambers(rig)}
+    lines = rig.ports("line")
+    behind = {qualified("line", name): ends["to"] for name, ends in lines.items()}
+    ways = [(e["from"], behind.get(e["to"], e["to"])) for e in rig.ports("valve").values()]
+    ways += [(ends["from"], ends["to"]) for ends in lines.values()]
+    joined = {end for way in ways if all(end in warm for end in way) for end in way}
+    return {name: dotted("temperature", name) for full, name in warm.items() if full not in joined}
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
