@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from fingerprints.air import LOCKED
 from fingerprints.sheet import (
     BAR,
     WITH,
@@ -15,11 +16,12 @@ from fingerprints.sheet import (
     hold,
     label,
     pressure,
+    temperature,
     through,
 )
 from pamrs import Simulation
 
-__all__ = ["erring_encoder", "late_angle", "late_clock", "late_pressure"]
+__all__ = ["erring_encoder", "late_angle", "late_clock", "late_pressure", "slow_thermometer"]
 
 NAMES = ("without", "with the effect")
 
@@ -59,6 +61,28 @@ def late_pressure(sheet: Sheet) -> None:
         legend="upper right",
     )
     _loop(sheet, axes["x"], runs)
+
+
+def slow_thermometer(sheet: Sheet) -> None:
+    """Fast fills and vents of a muscle that is held, whose gas has a temperature of its own."""
+    sheet.rigs = tuple(rig.with_effect("heat_transfer") for rig in sheet.rigs)
+    time = clock(12.0)
+    command = hold(
+        time, (0.0, 5.0), (1.0, 10.0), (1.15, 5.0), (5.0, 0.0), (5.25, 5.0), (9.0, 8.0), (9.6, 5.0)
+    )
+    runs = sheet.run(LOCKED, valve_command=command)
+    axes = sheet.axes("tt;px", width_ratios=[1.2, 1])
+    sheet.both(axes["t"], runs, temperature)
+    label(
+        axes["t"],
+        "what the thermometer reads: late, and less deep where the gas is quick",
+        y="gas [degC]",
+        legend="lower right",
+    )
+    sheet.both(axes["p"], runs, pressure)
+    label(axes["p"], "the pressure is the same", y="muscle [bar]")
+    sheet.both(axes["x"], runs, temperature, pressure, part=slice(100, 520))
+    label(axes["x"], "temperature against pressure", "muscle [bar]", "gas [degC]")
 
 
 def erring_encoder(sheet: Sheet) -> None:

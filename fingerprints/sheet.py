@@ -33,6 +33,7 @@ __all__ = [
     "picture",
     "pressure",
     "supply",
+    "temperature",
     "through",
 ]
 
@@ -87,6 +88,11 @@ def supply(run: pamrs.Simulation) -> Array:
 def angle(run: pamrs.Simulation) -> Array:
     """Angle of the joint [deg]."""
     return np.degrees(run["joint_angle"])
+
+
+def temperature(run: pamrs.Simulation) -> Array:
+    """What the thermometer in the gas reads [degC]."""
+    return run["temperature"] - 273.15
 
 
 def flow(run: pamrs.Simulation) -> Array:

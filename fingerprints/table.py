@@ -239,6 +239,17 @@ EXPERIMENTS: Final[dict[str, Experiment]] = {
             {"time_constant": 0.02},
         ),
         Experiment(
+            "thermometer_lag",
+            "shoulder",
+            (
+                "fast fills and vents, the valve shut after each (the arm held; the gas with "
+                "`heat_transfer`)"
+            ),
+            "the recorded temperature comes late and less deep, and no pressure knows of it",
+            sensors.slow_thermometer,
+            {"time_constant": 0.5},
+        ),
+        Experiment(
             "sensor_lag",
             "shoulder",
             "a short fill, then the arm swings on the air that is shut in",

@@ -74,18 +74,14 @@ def _regulator(rig: Rig) -> list[Run]:
 
 
 def _nozzles(rig: Rig) -> list[Run]:
-    """The tank blown down through three nozzles, with its pressure and the wall's thermometer."""
+    """The tank blown down through three nozzles, with its pressure and a thermometer in the gas."""
     found = []
     nozzles = ((1.0e-6, "fit"), (0.6e-6, "fit"), (1.8e-6, "held_out"))
     truth = rig.parameter("line.discharge_area").value / nozzles[0][0]
     for area, role in nozzles:
         own = rig.with_parameters({"line.discharge_area": truth * area})
         run = pamrs.simulate(own, duration=30.0, sample_time=0.02)
-        size = run.time.size
-        channels = {
-            "muscle_pressure": run["muscle_pressure"],
-            "temperature": np.full(size, 293.15),
-        }
+        channels = {name: run[name] for name in ("muscle_pressure", "temperature")}
         value = f'{{ value = {area * 1e6:g}, unit = "mm2", error = "proportional" }}'
         told = f'"line.discharge_area" = {value}'
         found.append(Run(channels, 0.02, role, own="" if area == 1.0e-6 else told))
@@ -152,8 +148,12 @@ LAYOUTS = {
         ),
         Layout(
             "tank_three_nozzles",
-            "heat_transfer",
-            lambda rig: rig.with_effect("heat_transfer"),
+            "chamber.heat_transfer_coefficient",
+            lambda rig: (
+                rig.without_effect("thermometer_lag")
+                .with_effect("thermometer_lag", {"time_constant": 0.4})
+                .with_parameters({"chamber.heat_transfer_coefficient": 50.0})
+            ),
             _nozzles,
         ),
         Layout(

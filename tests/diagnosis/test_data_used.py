@@ -121,7 +121,7 @@ def test_channels_without_use_are_told_everywhere() -> None:
     assert own["used"] == ["muscle_pressure"]
     assert list(own["unused"]) == ["line_pressure", "temperature"]
     assert own["unused"]["line_pressure"] == "the rig has no block [line]"
-    assert own["unused"]["temperature"].startswith("it is that of the gas, and a block predicts")
+    assert own["unused"]["temperature"].startswith("the gas of chamber has no temperature of its")
     assert (own["averaged"], own["samples"]) == (5, 599)
     told = " ".join(found.summary().split())
     assert "at 10 Hz (means of 5 samples recorded at 50 Hz); used: muscle_pressure" in told

@@ -134,7 +134,15 @@ def test_each_block_is_driven_by_what_stands_next_to_it() -> None:
 
 @pytest.mark.parametrize("left_out", [(), (OUTLET,)], ids=["three_gauges", "no_outlet"])
 def test_a_healthy_bottle_and_regulator_miss_nothing(left_out: tuple[str, ...]) -> None:
-    assert diagnosed(parse_rig(TEXT), *left_out).verdict == "none"
+    found = diagnosed(parse_rig(TEXT), *left_out)
+    assert found.verdict == "none"
+    assert not any("in front of it" in text for text in found.warnings)
+
+
+def test_a_bottle_without_a_gauge_is_said_to_stay_as_it_was() -> None:
+    found = diagnosed(parse_rig(TEXT), BOTTLE)
+    (said,) = [text for text in found.warnings if "in front of it" in text]
+    assert said.startswith(f"{BOTTLE} was not recorded: supply.regulator is taken to have")
 
 
 def test_a_line_at_the_regulator_does_not_tell_what_is_drawn() -> None:

@@ -340,12 +340,13 @@ def test_no_room_is_guessed(tmp_path: Path, names: list[str], rig: pamrs.Rig | N
     ["ambient_temperature", "Room temperature [degC]", "T_Umgebung [degC]", "tamb", "Temp Raum"],
 )
 def test_a_room_that_is_named_is_proposed(tmp_path: Path, name: str, rig: pamrs.Rig | None) -> None:
-    found, told = proposed(tmp_path, ["temp_oil [degC]", name], rig)
+    found, told = proposed(tmp_path, ["temp_gas [degC]", "temp_oil [degC]", name], rig)
     assert found[split_heading(name)[0]] == "ambient_temperature"
+    assert "temp_oil" not in found
     if rig is None:
-        assert found["temp_oil"] == "temperature"
-    else:
-        assert "temp_oil" not in found
+        assert found["temp_gas"] == "temperature"
+    else:  # its gas has no temperature of its own
+        assert "temp_gas" not in found
         assert "not found in this log: valve_command" in told
 
 

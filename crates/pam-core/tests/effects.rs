@@ -11,8 +11,8 @@ use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{
-    antagonists, effect, effect_at, every, lone_tank, regulated, shoulder, two_joints, Typical,
-    FORMS, TYPICAL,
+    antagonists, effect, effect_at, every, lone_tank, regulated, shoulder, two_joints, warm,
+    Typical, FORMS, TYPICAL,
 };
 
 const DT: f64 = 0.01;
@@ -23,7 +23,16 @@ fn spec_for(id: &str) -> RigSpec {
     if id == "supply_regulator_deadband" {
         regulated()
     } else {
-        shoulder()
+        fitting(id, shoulder())
+    }
+}
+
+/// A rig whose gases have what an effect acts on: a temperature.
+fn fitting(id: &str, spec: RigSpec) -> RigSpec {
+    if id == "thermometer_lag" {
+        warm(spec)
+    } else {
+        spec
     }
 }
 
@@ -95,6 +104,7 @@ fn every_effect_is_tested() {
 fn switched_off_it_changes_nothing_bit_for_bit() {
     for typical in every() {
         for spec in [spec_for(typical.id), antagonists(), two_joints()] {
+            let spec = fitting(typical.id, spec);
             if lacks_supply(typical.id, &spec) {
                 continue;
             }
@@ -116,6 +126,7 @@ fn switched_on_it_moves_its_channel() {
         let (a, b) = (run(&plain, ROWS), run(&on, ROWS));
         let name = match EFFECTS.iter().find(|e| e.id == typical.id).map(|e| e.block) {
             _ if ["encoder_error", "sensor_lag"].contains(&typical.id) => "joint_angle",
+            _ if typical.id == "thermometer_lag" => "temperature",
             Some("supply") => "supply_pressure",
             Some("valve" | "line" | "chamber" | "sensors") => "muscle_pressure",
             _ => "joint_angle",
@@ -134,6 +145,7 @@ fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
         for (spec, names) in
             [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])]
         {
+            let spec = fitting(typical.id, spec);
             let two = match info.at {
                 "joint" => spec.joints.len() == 2,
                 at => ["valve", "chamber", "muscle"].contains(&at),
@@ -308,6 +320,7 @@ fn sensitivities_are_those_of_differences() {
         let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
         let block = match info.block {
             "supply" => "supply",
+            _ if typical.id == "thermometer_lag" => "temperature",
             "valve" | "line" | "chamber" | "sensors" => "chamber",
             _ => "arm",
         };

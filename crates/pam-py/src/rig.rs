@@ -64,6 +64,7 @@ impl Rig {
         measured: &BTreeMap<String, Pair<'_>>,
         samples: usize,
         outlets: &BTreeMap<String, f64>,
+        anchors: &[usize],
         work: impl FnOnce(Block, &Measured<'_>, Timing) -> pam_core::Result<T> + Send,
     ) -> PyResult<T> {
         let commands = owned(commands);
@@ -78,7 +79,8 @@ impl Rig {
                 .collect();
             let outlets: Vec<_> = outlets.iter().map(|(name, p)| (name.as_str(), *p)).collect();
             let measured = Measured::new(inner, samples, &borrowed(&commands), &signals)?
-                .beginning(inner, &outlets)?;
+                .beginning(inner, &outlets)?
+                .anchored(anchors)?;
             let block = Block::from_name(inner, block)?;
             let longest = block.longest_step(inner, &measured)?;
             let timing = Timing::new(sample_time, step)?.at_most(longest);
@@ -240,9 +242,10 @@ impl Rig {
     }
 
     /// Predict a block's output from its measured neighbours, with the jacobian (None without
-    /// parameters). Regulators that nobody measured begin at `outlets` [Pa, gauge] where given.
+    /// parameters). Regulators that nobody measured begin at `outlets` [Pa, gauge] where given; a
+    /// block of a temperature takes its pressures anew at the samples `anchors` as well.
     #[allow(clippy::too_many_arguments, clippy::type_complexity)]
-    #[pyo3(signature = (block, commands, sample_time, step, starts, parameters, measured, samples, outlets=None))]
+    #[pyo3(signature = (block, commands, sample_time, step, starts, parameters, measured, samples, outlets=None, anchors=Vec::new()))]
     fn predict<'py>(
         &self,
         py: Python<'py>,
@@ -255,6 +258,7 @@ impl Rig {
         measured: BTreeMap<String, Pair<'py>>,
         samples: usize,
         outlets: Option<BTreeMap<String, f64>>,
+        anchors: Vec<usize>,
     ) -> PyResult<(Bound<'py, numpy::PyArray1<f64>>, Option<Bound<'py, PyArray2<f64>>>)> {
         let p = self.cut(
             py,
@@ -265,6 +269,7 @@ impl Rig {
             &measured,
             samples,
             &outlets.unwrap_or_default(),
+            &anchors,
             |block, measured, timing| {
                 let ids = (parameters.iter())
                     .map(|name| self.inner.parameters().find(name))
@@ -304,6 +309,7 @@ impl Rig {
             &measured,
             samples,
             &BTreeMap::new(),
+            &[],
             |block, measured, timing| closure_terms(&self.inner, block, measured, timing, &starts),
         )?;
         array(py, terms).reshape([samples, columns])

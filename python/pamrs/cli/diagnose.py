@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs.channels import channel_of
 from pamrs.cli._shared import (
     check_writable,
     exact,
@@ -84,7 +85,9 @@ def diagnose_command(
     ] = None,
     channels: Annotated[
         str | None,
-        typer.Option(help="With --plan: channels at hand, joined by commas; all by default."),
+        typer.Option(
+            help="With --plan: channels at hand, joined by commas; all but temperatures by default."
+        ),
     ] = None,
     pressure_noise: Annotated[
         str | None, typer.Option(help="With --plan: sample noise of the pressures, like '200 Pa'.")
@@ -197,7 +200,7 @@ def _plan(
     if angle_noise is not None:
         noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
     given = (
-        measurable(loaded)
+        [name for name in measurable(loaded) if channel_of(name) != "temperature"]
         if channels is None
         else [name.strip() for name in channels.split(",") if name.strip()]
     )

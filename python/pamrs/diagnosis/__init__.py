@@ -49,6 +49,7 @@ from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError, meant
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig, load_rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
@@ -279,7 +280,24 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     fit, and what that is, in words.
     """
     rig, said = at_ambient(case.rig, case.recordings, settings.plausibility)
-    return case.with_rig(without_passing(rig)), [*said, *_said_of_held(rig)]
+    told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
+    return case.with_rig(without_passing(rig)), told
+
+
+def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
+    """Tanks in front of regulators that nobody measured, in words."""
+    said = []
+    for name, ports in rig.ports("supply").items():
+        inlet = ports.get("inlet", "").partition(".")[2]
+        table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
+        gauge = dotted("supply_pressure", inlet)
+        if table is not None and table["kind"] == "tank" and gauge not in channels:
+            said.append(
+                f"{gauge} was not recorded: {qualified('supply', name)} is taken to have "
+                f"{table['initial_pressure'] / 1e5:.3g} bar in front of it throughout; record it "
+                "where the tank may come near to what the regulator is set to"
+            )
+    return said
 
 
 def _said_of_held(rig: Rig) -> list[str]:

@@ -39,7 +39,11 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
         ("length", "length laenge länge stroke displacement weg lvdt disp", "x position pos laser"),
         ("force", "force kraft loadcell", "load cell f fz"),
         ("joint_torque", "torque moment drehmoment", "m mz joint"),
-        ("temperature", "temperature temp temperatur", "thermo tc air"),
+        (
+            "temperature",
+            "temperature temp temperatur thermo tc tgas tair ttank tchamber",
+            "gas air luft chamber kammer tank muscle muskel tgas tair ttank tchamber",
+        ),
         (
             "ambient_temperature",
             "ambient umgebung room raum umgebungstemperatur raumtemperatur tamb troom",
@@ -48,8 +52,9 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
         ("reference", "reference ref desired target sollwert", "soll wanted"),
     )
 }
-#: Channels that a diagnosis sets the rig by: no weak word, and no unit, names them alone.
-_ONLY_NAMED: Final = frozenset({"ambient_temperature"})
+#: Channels that a diagnosis sets the rig by, or that stand in a gas: no weak word, and no unit,
+#: names them alone.
+_ONLY_NAMED: Final = frozenset({"ambient_temperature", "temperature"})
 _NOT: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error")
@@ -131,7 +136,8 @@ def channels_of(rig: Rig | None) -> list[str]:
     for name, table in rig.tables("supply").items():
         if table["kind"] == "regulator":
             found.append(dotted("supply_command", name))
-    return [*found, *sorted(_ONLY_NAMED)]
+    warm = [name for name, t in rig.tables("chamber").items() if t["gas"] == "energy_balance"]
+    return [*found, *(dotted("temperature", name) for name in warm), "ambient_temperature"]
 
 
 def matched(
@@ -195,9 +201,11 @@ def _score(series: Series, name: str, several: bool, remarks: list[str]) -> floa
         strong, weak = _WORDS[channel]
         score = 3.0 * len(strong & set(words)) + 1.0 * len(weak & set(words))
         if channel in _ONLY_NAMED:
-            if not strong & set(words) or not (weak & set(words) or understood_unit(series.unit)):
+            # where it is says more than that it is a temperature
+            place, what = (weak, strong) if channel == "temperature" else (strong, weak)
+            if not place & set(words) or not (what & set(words) or understood_unit(series.unit)):
                 return 0.0
-            score += 2.0  # where it is says more than that it is a temperature
+            score += 2.0 if strong & set(words) else 0.0
         score += 2.0 if channel in "_".join(words) else 0.0
     if block and set(words_of(block)) <= set(words):
         score += 2.0

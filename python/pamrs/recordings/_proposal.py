@@ -289,13 +289,14 @@ _SENSORS: Final = {
     "supply_pressure": "pressure in the tank or behind the regulator",
     "line_pressure": "pressure between valve and hose",
     "muscle_pressure": "pressure in the muscle or its chamber",
+    "temperature": "temperature of the gas in the muscle or its chamber",
     "joint_angle": "angle of the joint",
     "length": "length of the muscle",
     "force": "pull of the muscles, by a load cell",
     "joint_torque": "torque of the muscles at the joint, by a torque sensor",
 }
 """What is measured on each channel that a rig can have."""
-_EXTRA: Final = ("line_pressure", "force", "joint_torque")
+_EXTRA: Final = ("line_pressure", "temperature", "force", "joint_torque")
 """Channels that few stands have, and that only tell one block from the next; but for a frame."""
 
 

@@ -29,7 +29,7 @@ CHANNELS = {
     "supply": ("supply_command", "supply_pressure"),
     "valve": ("valve_command",),
     "line": ("line_pressure",),
-    "chamber": ("muscle_pressure",),
+    "chamber": ("muscle_pressure", "temperature"),
     "muscle": ("muscle_force",),
     "joint": ("joint_angle", "joint_torque"),
     "load": ("length", "force"),
@@ -39,11 +39,15 @@ CHANNELS = {
 ALWAYS = ("supply_pressure", "valve_command", "muscle_pressure", "joint_angle", "length")
 """Channels that are shown where nothing measured them, too."""
 
-MOVED = {"arm": "joint", "torque": "joint", "force": "load"}
-"""Box at which the muscles of a block of the diagnosis end, where it has not the block's name."""
+MOVED = {"arm": "joint", "torque": "joint", "force": "load", "temperature": "chamber"}
+"""Box at which a block of the diagnosis ends, where that has not its name."""
 
 PULLS = ("force", "torque")
-"""Blocks of the diagnosis that are what muscles pull; their residual stands under their boxes."""
+"""Blocks of the diagnosis that are what muscles pull."""
+
+UNDER = (*PULLS, "temperature")
+"""Blocks of the diagnosis whose boxes stand in another block too; their residual stands under
+them."""
 
 ELSEWHERE = {
     "line": ("valve", "supply", "chamber"),
@@ -235,7 +239,7 @@ class _Drawing:
         body += [self._box(p, lines[p.full], *place[p.full], height[p.full]) for p in parts]
         width = max(x for x, _ in place.values()) + BOX + PAD + 5.0
         tall = max(y + height[full] for full, (_, y) in place.items()) + PAD + 6.0
-        tall += 20.0 if any(n.partition(".")[0] in PULLS for n, *_ in self._judged()) else 0.0
+        tall += 20.0 if any(n.partition(".")[0] in UNDER for n, *_ in self._judged()) else 0.0
         return (
             f'<svg class="chain" viewBox="0 0 {width:.0f} {tall:.0f}" role="img" '
             f'style="min-width:{0.75 * width:.0f}px;max-width:{1.15 * width:.0f}px" '
@@ -276,7 +280,7 @@ class _Drawing:
 
     def _inside(self, kind: str, name: str) -> Iterable[str]:
         """Boxes of a block of the diagnosis: a chamber with what feeds it, a joint or a load with
-        its muscles; of a force or torque the muscles alone.
+        its muscles; of a force or torque the muscles alone, of a temperature the chamber.
         """
         target = dotted(MOVED.get(kind, kind), name)
         if target not in self.parts:
@@ -287,7 +291,7 @@ class _Drawing:
             led = {a for p in self.parts.values() for a in p.after}
             outlets = (p for p in self.parts.values() if p.kind == "line" and target in p.after)
             yield from (p.full for p in outlets if p.full not in led)
-        feeding = {"chamber": ("valve", "line")}.get(kind, ("muscle",))
+        feeding = {"chamber": ("valve", "line"), "temperature": ()}.get(kind, ("muscle",))
         waiting = [target]
         while waiting:
             for before in self.parts[waiting.pop()].after:
@@ -303,7 +307,7 @@ class _Drawing:
     ) -> str:
         """Frame around what is judged together, with its residual."""
         name, inside, mismatch = judged
-        under = name.partition(".")[0] in PULLS
+        under = name.partition(".")[0] in UNDER
         pad = 0.5 * PAD if under else PAD
         x = min(place[n][0] for n in inside) - pad
         y = min(place[n][1] for n in inside) - pad - (0.0 if under else 20.0)

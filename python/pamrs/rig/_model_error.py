@@ -28,6 +28,7 @@ ERROR_BLOCKS: Final = (
 ERROR_CHANNELS: Final = {
     "supply_pressure": "supply",
     "muscle_pressure": "chamber",
+    "temperature": "chamber",
     "joint_angle": "joint",
     "length": "load",
 }

@@ -14,6 +14,8 @@ pub enum Block {
     /// Commands, neighbouring pressures and the angles of its muscles to the pressure of a gas: a
     /// chamber or, behind those, the inlet of a line.
     Chamber(usize),
+    /// The same, and the pressure of the chamber itself, to what its thermometer reads.
+    Temperature(usize),
     /// Chamber pressures to the angle of a joint (muscles, joints and arm), or to the length of the
     /// muscle on a linear load.
     Arm(usize),
@@ -25,7 +27,8 @@ pub enum Block {
 impl Block {
     /// The block of a name: `supply`, `chamber`, `line` (its inlet) or `arm` (`load` of a linear
     /// load), with the name of the supply, chamber, line or joint behind it where it has one
-    /// (`chamber.flexor`); `torque` of a joint in the same way, `force` of a linear load.
+    /// (`chamber.flexor`); `temperature` of a chamber and `torque` of a joint in the same way, `force`
+    /// of a linear load.
     ///
     /// # Errors
     /// [`Error::Model`] for another name.
@@ -46,6 +49,12 @@ impl Block {
                 .iter()
                 .enumerate()
                 .map(|(k, c)| (dotted("chamber", &c.name), Self::Chamber(k))),
+        )
+        .chain(
+            spec.chambers
+                .iter()
+                .enumerate()
+                .map(|(k, c)| (dotted("temperature", &c.name), Self::Temperature(k))),
         )
         .chain(rig.wiring.inlets.iter().enumerate().map(|(k, (line, _))| {
             (dotted("line", &spec.lines[*line].name), Self::Chamber(spec.chambers.len() + k))
@@ -76,11 +85,20 @@ impl Block {
         matches!(self, Self::Arm(_) | Self::Pull(_))
     }
 
-    /// Place of the predicted state; none for what muscles pull, which is no state.
+    /// The gas whose pressure or temperature it predicts.
+    pub(super) fn gas(self) -> Option<usize> {
+        match self {
+            Self::Chamber(k) | Self::Temperature(k) => Some(k),
+            _ => None,
+        }
+    }
+
+    /// Place of the predicted state, of a temperature that of the gas's pressure; none for what
+    /// muscles pull, which is no state.
     pub(super) fn output(self, layout: &Layout) -> Option<usize> {
         match self {
             Self::Supply(k) => Some(layout.supply(k)),
-            Self::Chamber(k) => Some(layout.pressure(k)),
+            Self::Chamber(k) | Self::Temperature(k) => Some(layout.pressure(k)),
             Self::Arm(k) => Some(layout.angle(k)),
             Self::Pull(_) => None,
         }
@@ -89,17 +107,23 @@ impl Block {
     /// States of the block that a window starts from, in the order of their sensitivities.
     pub(super) fn initial_states(self, layout: &Layout) -> Vec<usize> {
         match self {
-            Self::Supply(_) | Self::Chamber(_) => self.output(layout).into_iter().collect(),
+            Self::Supply(_) | Self::Chamber(_) | Self::Temperature(_) => {
+                self.output(layout).into_iter().collect()
+            }
             Self::Arm(_) => (layout.angle(0)..layout.effect(0)).collect(),
             Self::Pull(_) => Vec::new(),
         }
     }
 
     /// Number of initial states per window; what a load cell or a torque sensor reads at rest is
-    /// one.
-    pub fn initial_count(self, rig: &Rig) -> usize {
+    /// one. Of a gas with a thermometer the temperature comes last in the block of its pressure;
+    /// in that of its temperature it is the first, what the thermometer is off by the second, and
+    /// where a late one stands the third.
+    pub fn initial_count(self, rig: &Rig, measured: &Measured<'_>) -> usize {
         match self {
             Self::Pull(_) => 1,
+            Self::Temperature(_) => 3,
+            Self::Chamber(k) if measured.thermometer(k).is_some() => 2,
             _ => self.initial_states(rig.layout()).len(),
         }
     }
@@ -116,7 +140,7 @@ impl Block {
                 });
                 places.extend(acting.flat_map(|(_, acting)| own_states(layout, acting)));
             }
-            Self::Chamber(k) => {
+            Self::Chamber(k) | Self::Temperature(k) => {
                 places.push(layout.mass(k));
                 places.extend(effect_states(rig, Place::Gas(k)));
             }

@@ -88,14 +88,19 @@ pub struct Measured<'a> {
     pub(crate) held: usize,
     /// Place of the state and its signal.
     pub(crate) signals: Vec<(usize, Signal<'a>)>,
+    /// Gases with a thermometer, and what it reads [K].
+    pub(crate) thermometers: Vec<(usize, Signal<'a>)>,
     /// Places of states that nobody measured, and where they begin.
     pub(crate) outlets: Vec<(usize, f64)>,
+    /// Samples inside the windows of a temperature at which the pressures are taken anew.
+    pub(crate) anchors: Vec<usize>,
 }
 
 impl<'a> Measured<'a> {
     /// Commands (one for each input of the rig, held over each sample) and measured channels by
     /// name: `supply_pressure`, `muscle_pressure`, `line_pressure`, `joint_angle`, `length` of the
-    /// muscle on a linear load, each with the name of its block behind it where it has one.
+    /// muscle on a linear load, each with the name of its block behind it where it has one. A
+    /// `temperature` of a chamber's gas drives nothing: it says where that of its gas begins.
     ///
     /// Where samples are means of several of a log, all commands may have so many values for each
     /// sample: a valve lets through what its openings do one after the other, not what their mean
@@ -130,16 +135,25 @@ impl<'a> Measured<'a> {
             own.push(*values);
         }
         let layout = rig.layout();
-        let mut places = Vec::new();
+        let (mut places, mut thermometers) = (Vec::new(), Vec::new());
         for (name, signal) in signals {
-            let place =
-                rig.names().channels.iter().find(|(n, _)| n == name).and_then(|(_, c)| match *c {
-                    Channel::Supply(k) => Some(layout.supply(k)),
-                    Channel::Pressure(k) => Some(layout.pressure(k)),
-                    Channel::Angle(k) => Some(layout.angle(k)),
-                    Channel::Length => Some(layout.angle(0)),
-                    _ => None,
-                });
+            let channel = rig.names().channels.iter().find(|(n, _)| n == name);
+            if let Some((_, Channel::Temperature(k))) = channel {
+                signal.check(name, samples)?;
+                if let Some((j, t)) = signal.value.iter().enumerate().find(|(_, t)| **t <= 0.0) {
+                    let allowed = "above absolute zero";
+                    return Err(Error::parameter(format!("{name}.value[{j}]"), *t, allowed));
+                }
+                thermometers.push((*k, *signal));
+                continue;
+            }
+            let place = channel.and_then(|(_, c)| match *c {
+                Channel::Supply(k) => Some(layout.supply(k)),
+                Channel::Pressure(k) => Some(layout.pressure(k)),
+                Channel::Angle(k) => Some(layout.angle(k)),
+                Channel::Length => Some(layout.angle(0)),
+                _ => None,
+            });
             let Some(place) = place else {
                 return Err(Error::Model(format!(
                     "{name} is not a channel at which this rig can be cut"
@@ -148,7 +162,15 @@ impl<'a> Measured<'a> {
             signal.check(name, samples)?;
             places.push((place, *signal));
         }
-        Ok(Self { samples, commands: own, held, signals: places, outlets: Vec::new() })
+        Ok(Self {
+            samples,
+            commands: own,
+            held,
+            signals: places,
+            thermometers,
+            outlets: Vec::new(),
+            anchors: Vec::new(),
+        })
     }
 
     /// The same, with regulators whose outlet nobody measured beginning at these pressures [Pa,
@@ -171,6 +193,26 @@ impl<'a> Measured<'a> {
             self.outlets.push((rig.layout().supply(k), absolute));
         }
         Ok(self)
+    }
+
+    /// The same, with the pressures of a block that predicts a temperature taken anew at these
+    /// samples (rising) too, where no window of it begins: its temperature stays.
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for samples that do not rise or that are not there.
+    pub fn anchored(mut self, anchors: &[usize]) -> Result<Self> {
+        let (rising, n) = (anchors.windows(2).all(|w| w[0] < w[1]), self.samples);
+        if let Some(last) = anchors.last().filter(|last| !rising || **last >= n) {
+            let allowed = format!("sample indices that rise, below {n}");
+            return Err(Error::parameter("anchors", *last as f64, allowed));
+        }
+        self.anchors = anchors.to_vec();
+        Ok(self)
+    }
+
+    /// What the thermometer of a gas reads [K], where it has one.
+    pub(crate) fn thermometer(&self, gas: usize) -> Option<&Signal<'a>> {
+        self.thermometers.iter().find(|(k, _)| *k == gas).map(|(_, signal)| signal)
     }
 
     #[inline]

@@ -41,7 +41,7 @@ pub fn predict(
 ) -> Result<Prediction> {
     let n = measured.samples;
     check(rig, block, measured, starts)?;
-    let initial = block.initial_count(rig);
+    let initial = block.initial_count(rig, measured);
     let mut out = Prediction { value: vec![0.0; n], jacobian: Vec::new(), columns: 0 };
     if parameters.is_empty() {
         let plant = Plant::new(rig, rig.parameters().lift(), false)?;
@@ -86,7 +86,7 @@ impl Task<'_> {
     {
         let Self { rig, block, measured, timing, starts, parameters } = *self;
         let mut values = rig.parameters().lift::<Dual<N>>();
-        let mut bumps = vec![constant::<Dual<N>>(0.0); block.initial_count(rig)];
+        let mut bumps = vec![constant::<Dual<N>>(0.0); block.initial_count(rig, measured)];
         for (lane, column) in columns.iter().enumerate() {
             match parameters.get(*column) {
                 Some(id) => values.seed(*id, lane),
@@ -119,12 +119,12 @@ pub fn closure_terms(
     check(rig, block, measured, starts)?;
     let at = match block {
         Block::Supply(k) => Place::Supply(k),
-        Block::Chamber(k) => Place::Gas(k),
+        Block::Chamber(k) | Block::Temperature(k) => Place::Gas(k),
         Block::Arm(k) | Block::Pull(k) => Place::Joint(k),
     };
     let plant = Plant::new(rig, rig.parameters().lift(), false)?;
     let (mut found, mut count) = (Vec::new(), 0);
-    let bumps = vec![0.0; block.initial_count(rig)];
+    let bumps = vec![0.0; block.initial_count(rig, measured)];
     Cut::new(plant, block, measured, timing, bumps).run(
         starts,
         |_, _, stepper, state, controls| {

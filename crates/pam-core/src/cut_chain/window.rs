@@ -36,6 +36,8 @@ enum Output<S> {
     State(Reading<S>),
     /// What the muscles at a joint or load pull, beside what the sensor reads at rest.
     Pull(usize, S),
+    /// What the thermometer of a gas reads, and what it is off by [K].
+    Temperature(usize, S),
 }
 
 /// How it is read off the state.
@@ -77,7 +79,7 @@ impl<'a, S: Number> Cut<'a, S> {
         let mut stepper = Stepper::new(plant);
         // a block that neither moves nor has muscles around it does not see the angles
         let unseen = if simulated.sees_angles() { usize::MAX } else { rig.layout().angle(0) };
-        stepper.reads = matches!(block, Block::Chamber(_));
+        stepper.reads = block.gas().is_some();
         Self {
             stepper,
             block,
@@ -112,9 +114,14 @@ impl<'a, S: Number> Cut<'a, S> {
         let (n, dt) = (self.measured.samples, self.timing.sample_time);
         let mut course = self.at_rest();
         let mut starts = starts.iter().peekable();
+        let mut anchors = self.measured.anchors.iter().peekable();
         let mut controls = self.stepper.plant.controls(|_| 0.0);
         for k in 0..n {
+            let anchored = anchors.next_if(|s| **s == k).is_some();
             if starts.next_if(|s| **s == k).is_some() {
+                self.start_window(k, &mut course);
+                self.start_temperature(k, &mut course);
+            } else if anchored {
                 self.start_window(k, &mut course);
             }
             check_state(&self.stepper.plant, &course.state, k as f64 * dt)?;
@@ -136,6 +143,10 @@ impl<'a, S: Number> Cut<'a, S> {
         match &self.output {
             Output::State(reading) => reading.read(plant, &course.state),
             Output::Pull(k, rest) => plant.pull(*k, &course.state, &course.memory, scratch) + *rest,
+            Output::Temperature(k, off) => match plant.thermometer(*k) {
+                Some((reading, _)) => course.state[reading] + *off,
+                None => plant.temperature(*k, &course.state) + *off,
+            },
         }
     }
 
@@ -172,8 +183,10 @@ impl<'a, S: Number> Cut<'a, S> {
             let place = layout.pressure(*gas);
             state[place] = plant.behind_tube(*gas, state[place], state, course.last.spool[*valve]);
         }
-        for (place, bump) in self.own.iter().zip(&self.bumps) {
-            state[*place] += *bump;
+        if !matches!(self.block, Block::Temperature(_)) {
+            for (place, bump) in self.own.iter().zip(&self.bumps) {
+                state[*place] += *bump;
+            }
         }
         if k == 0 {
             self.start_recording(state);
@@ -187,6 +200,33 @@ impl<'a, S: Number> Cut<'a, S> {
             (&self.output, signal)
         {
             state[*reading] = self.bumps[0] - *offset + signal.value[k];
+        }
+    }
+
+    /// Begin the gas at the temperature that its thermometer tells: at the first window of its
+    /// pressure, which no other beginning changes, and at each window of its temperature.
+    fn start_temperature(&self, k: usize, course: &mut Course<S>) {
+        let (plant, state) = (&self.stepper.plant, &mut course.state);
+        let (of_temperature, rest) =
+            (matches!(self.block, Block::Temperature(_)), plant.rig().gas.temperature);
+        let Some(gas) = self.block.gas().filter(|gas| plant.warms(*gas)) else { return };
+        let Some(signal) = self.measured.thermometer(gas) else { return };
+        if k > 0 && !of_temperature {
+            return;
+        }
+        let off = if of_temperature { self.bumps[1] } else { constant(0.0) };
+        let read = -off + signal.value[k];
+        let thermometer = plant.thermometer(gas);
+        // what the slope of a slow thermometer says may be no temperature of any gas
+        let ahead = thermometer.map_or(constant(0.0), |(_, lag)| lag * signal.slope[k]);
+        let possible = (0.5..2.0).contains(&((read + ahead).re() / rest));
+        let ahead = if possible { ahead } else { constant(0.0) };
+        let bump = if of_temperature { self.bumps[0] } else { self.bumps[1] };
+        let mass = plant.rig().layout().mass(gas);
+        state[mass] = plant.rest_mass(gas, state) * rest / (read + ahead + bump);
+        if let Some((reading, _)) = thermometer {
+            let late = if of_temperature { self.bumps[2] } else { constant(0.0) };
+            state[reading] = read + late;
         }
     }
 
@@ -314,7 +354,14 @@ impl<'a, S: Number> Cut<'a, S> {
 impl<S: Scalar> Output<S> {
     fn new(plant: &Plant<'_, S>, block: Block, bumps: &[S]) -> Self {
         let rig = plant.rig();
-        let (Block::Supply(k) | Block::Chamber(k) | Block::Arm(k) | Block::Pull(k)) = block;
+        let (Block::Supply(k)
+        | Block::Chamber(k)
+        | Block::Temperature(k)
+        | Block::Arm(k)
+        | Block::Pull(k)) = block;
+        if matches!(block, Block::Temperature(_)) {
+            return Self::Temperature(k, bumps[1]);
+        }
         let Some(place) = block.output(rig.layout()) else {
             return Self::Pull(k, bumps[0]);
         };

@@ -56,6 +56,7 @@ catalogue! {
     external_torque,
     base_flexibility,
     pressure_lag,
+    thermometer_lag,
     sensor_lag,
     encoder_error,
     clock_skew,

@@ -51,6 +51,8 @@ pub enum Port {
     Mounting,
     /// Chamber: what its pressure sensor reads. One effect at most, with one state: the reading.
     Reading,
+    /// Chamber: what its thermometer reads. One effect at most, with one state: the reading.
+    Thermometer,
     /// Joint: what the sensor of its angle reads. One effect at most.
     Encoder,
     /// The clock of what is recorded.
@@ -66,7 +68,7 @@ impl Port {
     #[must_use]
     pub const fn states(self) -> Option<usize> {
         match self {
-            Self::Passage | Self::Reading => Some(1),
+            Self::Passage | Self::Reading | Self::Thermometer => Some(1),
             Self::Hanging | Self::Mounting => Some(2),
             _ => None,
         }
@@ -382,12 +384,13 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         constant(0.0)
     }
 
-    /// [`Port::Reading`]: what the sensor reads after a step [s] from one pressure to another.
+    /// [`Port::Reading`], [`Port::Thermometer`]: what the sensor reads after a step [s] from one
+    /// pressure, or temperature, to another.
     fn read(&self, _reading: S, _from: S, to: S, _step: f64) -> S {
         to
     }
 
-    /// [`Port::Reading`]: how far the sensor lags [s].
+    /// [`Port::Reading`], [`Port::Thermometer`]: how far the sensor lags [s].
     fn lag(&self) -> S {
         constant(0.0)
     }

@@ -33,9 +33,9 @@ pub const INFO: EffectInfo = EffectInfo {
 };
 
 /// A lag that no sample shows [s].
-const SHORTEST: f64 = 2e-5;
+pub const SHORTEST: f64 = 2e-5;
 
-/// Reading after a step [s] in which the pressure went from one value to another.
+/// Reading after a step [s] in which what is read went from one value to another.
 #[inline]
 pub fn read<S: Scalar>(reading: S, from: S, to: S, time_constant: S, step: f64) -> S {
     let behind = time_constant * (to - from) / step;

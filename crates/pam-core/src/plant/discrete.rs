@@ -219,5 +219,11 @@ impl<S: Scalar> Plant<'_, S> {
                 (self.at_sensor(k, before, ends[0]), self.at_sensor(k, state, ends[1]));
             state[place] = self.effect(acting).read(before[place], from, to, step);
         }
+        for (k, thermometer) in wiring.ports.thermometer.iter().enumerate() {
+            let Some(acting) = thermometer else { continue };
+            let place = layout.effect(acting.first);
+            let (from, to) = (self.temperature(k, before), self.temperature(k, state));
+            state[place] = self.effect(acting).read(before[place], from, to, step);
+        }
     }
 }

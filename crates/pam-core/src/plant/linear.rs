@@ -371,6 +371,9 @@ impl<S: Scalar> Plant<'_, S> {
         for (gas, acting) in wiring.ports.reading.iter().enumerate() {
             closed.extend(acting.as_ref().map(|acting| (acting, state[layout.pressure(gas)])));
         }
+        for (gas, acting) in wiring.ports.thermometer.iter().enumerate() {
+            closed.extend(acting.as_ref().map(|acting| (acting, self.temperature(gas, state))));
+        }
         let mut rates = vec![constant(0.0); layout.states()];
         let mut here = self.scratch();
         here.backwards = beside.backwards;

@@ -76,6 +76,7 @@ pub(crate) struct Ports {
     /// Of each gas.
     pub balance: Vec<Option<Acting>>,
     pub reading: Vec<Option<Acting>>,
+    pub thermometer: Vec<Option<Acting>>,
     /// Of each gas the first valve with something between it and the gas.
     pub tap: Vec<Option<(usize, Acting)>>,
     /// Of each group of muscles.
@@ -138,8 +139,8 @@ impl Ports {
     /// Something happens between steps.
     pub fn updates(&self) -> bool {
         let switches = self.feed.iter().any(|acting| moves(acting));
-        let reads =
-            self.reading.iter().any(Option::is_some) || self.tap.iter().any(Option::is_some);
+        let mut lagging = self.reading.iter().chain(&self.thermometer);
+        let reads = lagging.any(Option::is_some) || self.tap.iter().any(Option::is_some);
         self.moves_valves() || switches || reads
     }
 
@@ -212,6 +213,7 @@ pub(super) fn switch_on(
         feed: vec![Vec::new(); wiring.supplies.len()],
         balance: vec![None; wiring.gases.len()],
         reading: vec![None; wiring.gases.len()],
+        thermometer: vec![None; wiring.gases.len()],
         tap: vec![None; wiring.gases.len()],
         muscles: vec![MusclePorts::default(); wiring.groups.len()],
         torque: vec![Vec::new(); wiring.coordinates.len()],
@@ -485,6 +487,7 @@ impl Ports {
             (Port::Feed, Place::Supply(k)) => push(&mut self.feed[k], acting),
             (Port::Balance, Place::Gas(k)) => self.balance[k].replace(acting),
             (Port::Reading, Place::Gas(k)) => self.reading[k].replace(acting),
+            (Port::Thermometer, Place::Gas(k)) => self.thermometer[k].replace(acting),
             (Port::Gauge | Port::Bladder | Port::Force, Place::Group(k)) => {
                 self.muscles[k].some = true;
                 let at = &mut self.muscles[k];

@@ -505,16 +505,35 @@ impl<'a, S: Scalar> Plant<'a, S> {
         }
     }
 
-    /// Mass of a gas [kg] at rest temperature for a state.
-    pub fn rest_mass(&self, gas: usize, state: &[S]) -> S {
+    /// Volume of a gas [m3] for a state.
+    fn volume(&self, gas: usize, state: &[S]) -> S {
         let mut volume = self.fixed_volume[gas];
         for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);
             volume +=
                 group.muscle.table.eval(point.shortening / group.rest_length).volume * group.count;
         }
-        state[self.layout.pressure(gas)] * volume
+        volume
+    }
+
+    /// Mass of a gas [kg] at rest temperature for a state.
+    pub fn rest_mass(&self, gas: usize, state: &[S]) -> S {
+        state[self.layout.pressure(gas)] * self.volume(gas, state)
             / (self.rig.gas.gas_constant * self.rig.gas.temperature)
+    }
+
+    /// Whether a gas has a temperature of its own, by an energy balance or an effect.
+    pub fn warms(&self, gas: usize) -> bool {
+        self.wiring.ports.balance[gas].is_some() || self.walls[gas].is_some()
+    }
+
+    /// Temperature of a gas [K] for a state; that of the room where it has none of its own.
+    pub fn temperature(&self, gas: usize, state: &[S]) -> S {
+        if !self.warms(gas) {
+            return constant(self.rig.gas.temperature);
+        }
+        let (pressure, mass) = (self.layout.pressure(gas), self.layout.mass(gas));
+        gas_temperature(&self.rig.gas, state[pressure], self.volume(gas, state), state[mass])
     }
 
     /// Mass of a gas [kg] at the start of a recording: at rest temperature plus the initial rise.
@@ -672,16 +691,15 @@ impl Plant<'_, f64> {
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
                 Channel::Flow(k) => state[layout.flow(k)],
-                Channel::Temperature(k)
-                    if wiring.ports.balance[k].is_some() || self.walls[k].is_some() =>
-                {
-                    gas_temperature(
-                        &self.rig.gas,
-                        state[layout.pressure(k)],
-                        here.volume[k],
-                        state[layout.mass(k)],
-                    )
+                Channel::Temperature(k) if wiring.ports.thermometer[k].is_some() => {
+                    state[self.thermometer(k).map_or(0, |(place, _)| place)]
                 }
+                Channel::Temperature(k) if self.warms(k) => gas_temperature(
+                    &self.rig.gas,
+                    state[layout.pressure(k)],
+                    here.volume[k],
+                    state[layout.mass(k)],
+                ),
                 Channel::Temperature(_) => self.rig.gas.temperature,
                 Channel::Balance(k) => state.get(layout.balance(k)).copied().unwrap_or(f64::NAN),
             });

@@ -33,6 +33,13 @@ impl<S: Scalar> Plant<'_, S> {
         Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 
+    /// Place of the reading of a thermometer that lags, and how far it does [s]; None for one that
+    /// does not.
+    pub fn thermometer(&self, gas: usize) -> Option<(usize, S)> {
+        let acting = self.wiring.ports.thermometer[gas].as_ref()?;
+        Some((self.layout.effect(acting.first), self.effect(acting).lag()))
+    }
+
     /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its
     /// commands held.
     pub fn read_taps(&self, state: &mut [S], controls: &Controls<S>) {

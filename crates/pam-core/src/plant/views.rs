@@ -129,6 +129,11 @@ impl<S: Scalar> Plant<'_, S> {
             let at = self.at(*place, acting, state, &shut, &here);
             self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
         }
+        for gas in 0..self.layout.gases {
+            if let Some((reading, _)) = self.thermometer(gas) {
+                state[reading] = self.temperature(gas, state);
+            }
+        }
     }
 
     /// Terms of the first sum of terms that acts on a block, at an instant; empty where there is

@@ -11,6 +11,15 @@ pub fn shoulder() -> RigSpec {
     RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()
 }
 
+/// The same rig, its gases with an energy balance.
+pub fn warm(mut spec: RigSpec) -> RigSpec {
+    for chamber in &mut spec.chambers {
+        chamber.gas = "energy_balance".into();
+        chamber.heat_transfer_coefficient = 50.0;
+    }
+    spec
+}
+
 /// Flexor and extensor on one pulley, a valve each.
 pub fn antagonists() -> RigSpec {
     let mut spec = shoulder();
@@ -226,6 +235,7 @@ pub const TYPICAL: &[Typical] = &[
     typical("sensor_lag", &[("delay", 0.0123)], &[("delay", 0.0)]),
     typical("parameter_drift", &[("change", -0.3), ("time_constant", 0.4)], &[("change", 0.0)]),
     typical("pressure_lag", &[("time_constant", 0.01)], &[("time_constant", 0.0)]),
+    typical("thermometer_lag", &[("time_constant", 0.1)], &[("time_constant", 0.0)]),
     typical(
         "encoder_error",
         &[("sine", 0.01), ("cosine", -0.02), ("set_angle", 0.3)],

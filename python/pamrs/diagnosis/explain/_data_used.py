@@ -8,10 +8,11 @@ import numpy as np
 
 from pamrs import _core
 from pamrs.channels import channel_of
-from pamrs.diagnosis.prepare import AMBIENT, Block
+from pamrs.diagnosis.prepare import AMBIENT, Block, thermometers_of, warm_chambers
 from pamrs.findings import RecordingUsed
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 
 __all__ = ["data_used"]
 
@@ -26,13 +27,16 @@ _BELONGS = {
 """Block of a rig that a channel is of."""
 
 
-_SHOWN = {
-    "temperature": (
-        "it is that of the gas, and a block predicts pressure, motion or force; pamrs replay "
-        "compares it with the simulated one. That of the room is ambient_temperature"
-    ),
-}
-"""Channels that a simulation has and no block predicts, in words."""
+_WITHOUT_ENERGY = (
+    'the gas of {chamber} has no temperature of its own: write gas = "energy_balance" and '
+    "heat_transfer_coefficient into [{chamber}] to have it judged. That of the room is "
+    "ambient_temperature"
+)
+_WITH_ANOTHER = (
+    "the gas of {chamber} comes from another chamber, or goes there, with a temperature that no "
+    "block is driven by"
+)
+"""Why the temperature of a gas is not judged."""
 
 
 def data_used(
@@ -98,8 +102,9 @@ def data_used(
 def _why(name: str, rig: Rig, core: _core.Rig, thinned: bool) -> str:
     """Why a channel is not used."""
     kind, _, block = name.partition(".")
-    if kind in _SHOWN:
-        return _SHOWN[kind]
+    if kind == "temperature" and name in core.channels and block not in thermometers_of(rig):
+        why = _WITH_ANOTHER if block in warm_chambers(rig) else _WITHOUT_ENERGY
+        return why.format(chamber=qualified("chamber", block))
     table = _BELONGS.get(channel_of(name), "")
     if name in core.channels or name in core.inputs:
         after = " or its block was left out" if thinned else ""

@@ -30,7 +30,7 @@ has no place; with one (``leak_muscle@flexor``), on that block alone.
 _CHANNELS = {
     "supply": ("supply_pressure", "supply_command"),
     "valve": ("valve_command",),
-    "chamber": ("muscle_pressure",),
+    "chamber": ("muscle_pressure", "temperature"),
     "joint": ("joint_angle",),
 }
 """Channels that belong to a block of the rig."""

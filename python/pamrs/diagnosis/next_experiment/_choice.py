@@ -518,13 +518,16 @@ def _channels(
 
 def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> list[str]:
     """Channels that the rig could have and that are not measured; a gauge between valve and line,
-    for which the line has to be cut, is offered by a plan alone.
+    for which the line has to be cut, and a thermometer, for which the chamber has to be opened, are
+    offered by a plan alone.
     """
     has = core_rig(rig).channels
     return [
         name
         for name in sensors
-        if name in has and name not in own and channel_of(name) != "line_pressure"
+        if name in has
+        and name not in own
+        and channel_of(name) not in ("line_pressure", "temperature")
     ]
 
 

@@ -28,6 +28,7 @@ from pamrs.diagnosis.prepare import (
     begun_alike,
     binned,
     prepare,
+    thermometers_of,
 )
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -58,14 +59,18 @@ Array = NDArray[np.float64]
 COMMANDS = ("valve_command", "supply_command")
 """Channels that a person sends."""
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
-_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length")
+_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "temperature")
 """Channels that the cut chain uses."""
 
 
 def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
     """Sample noise of usual transducers by channel [SI]."""
     pressures = dict.fromkeys(_PRESSURES, settings.pressure_noise)
-    return pressures | {"joint_angle": settings.angle_noise, "length": settings.length_noise}
+    return pressures | {
+        "joint_angle": settings.angle_noise,
+        "length": settings.length_noise,
+        "temperature": settings.temperature_noise,
+    }
 
 
 def noise_of(
@@ -81,10 +86,12 @@ def noise_of(
 
 def measurable(rig: Rig, kind: str = "") -> tuple[str, ...]:
     """Channels of a rig that the cut chain uses, of one kind or of all: ``valve_command.flexor``,
-    ``muscle_pressure.flexor``, ``joint_angle.elbow``.
+    ``muscle_pressure.flexor``, ``joint_angle.elbow``; the temperature of a gas that has one of its
+    own.
     """
-    core = core_rig(rig)
-    has = dict.fromkeys((*core.inputs, *core.channels))
+    core, warm = core_rig(rig), thermometers_of(rig).values()
+    every = dict.fromkeys((*core.inputs, *core.channels))
+    has = [name for name in every if channel_of(name) != "temperature" or name in warm]
     kinds = (kind,) if kind else _MEASURABLE
     return tuple(name for one in kinds for name in has if channel_of(name) == one)
 

@@ -415,6 +415,9 @@ def _layers(
 def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
     lines = {qualified("line", n): ends["to"] for n, ends in rig.ports("line").items()}
     behind = any(lines.get(b.name) == block.name for b in blocks if b.name in lines)
+    why = _LUMPED.get(block.covers.partition(" of ")[0], "")
+    if block.thermometer:
+        why = why.removesuffix(", nor the temperature of the gas")
     return {
         "name": block.name,
         "channel": block.channel,
@@ -422,7 +425,7 @@ def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
         "covers": block.covers,
         "why": _BEHIND_LINE
         if behind and "valve" in block.covers and block.kind == "chamber"
-        else _LUMPED.get(block.covers.partition(" of ")[0], ""),
+        else why,
     }
 
 

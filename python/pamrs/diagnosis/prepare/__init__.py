@@ -5,9 +5,10 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
-recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed` (signals),
-`Block`, `Residual`, `available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and
-their residuals), `begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
+recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
+`thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`, `available_blocks`, `begun`,
+`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
+(beginnings that nobody measured).
 """
 
 from __future__ import annotations
@@ -31,7 +32,15 @@ from pamrs.diagnosis.prepare._plausible import (
     implausible,
     without_impossible,
 )
-from pamrs.diagnosis.prepare._signals import Prepared, binned, noise_level, prepare, smoothed
+from pamrs.diagnosis.prepare._signals import (
+    Prepared,
+    binned,
+    noise_level,
+    prepare,
+    smoothed,
+    thermometers_of,
+    warm_chambers,
+)
 from pamrs.diagnosis.prepare._units import suspected_units
 
 __all__ = [
@@ -59,6 +68,8 @@ __all__ = [
     "said_of_beginnings",
     "smoothed",
     "suspected_units",
+    "thermometers_of",
+    "warm_chambers",
     "without_copies",
     "without_impossible",
 ]

@@ -64,7 +64,7 @@ class _Beginnings:
     def remembered(self, block: Block) -> int:
         """Samples up to the last one that shows how what nobody measured in a block began."""
         return max(
-            self._last(block, self._by_outlets(block)) if block.beside else 0,
+            self._last(block, self._by_outlets(block)) if _set(block) and block.beside else 0,
             self._last(block, self._by_tubes(block)) if block.tubes else 0,
         )
 
@@ -171,7 +171,7 @@ def _set(block: Block) -> list[str]:
 def _unmeasured(block: Block) -> str:
     """What nobody measured in a block, in words, and what would tell it."""
     told = []
-    if block.beside:
+    if _set(block) and block.beside:
         gauges = [dotted("supply_pressure", name.partition(".")[2]) for name in _set(block)]
         told.append(
             "they show where the regulator began, and nobody measured that (a gauge for "

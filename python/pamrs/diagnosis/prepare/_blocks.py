@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
-from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of
+from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
@@ -80,6 +80,11 @@ class Block:
         outlet has no gauge.
     tubes : tuple of Tube
         Tubes of segments that begin or end at it.
+    thermometer : str
+        Channel of the temperature at which its gas begins, where that is measured.
+    anchor : float or None
+        Time after which the pressures that drive it are taken anew inside a window [s]; None:
+        never.
     """
 
     name: str
@@ -91,12 +96,14 @@ class Block:
     covers: str
     beside: tuple[str, ...] = ()
     tubes: tuple[Tube, ...] = ()
+    thermometer: str = ""
+    anchor: float | None = None
 
     @property
     def kind(self) -> str:
-        """``supply``, ``chamber`` (the inlet of a line too), ``arm`` (of a hanging load too) or
-        ``pull`` (what the muscles put on a joint or a load): its name without that of the tank,
-        chamber or joint.
+        """``supply``, ``chamber`` (the inlet of a line too), ``temperature`` (of a chamber's gas),
+        ``arm`` (of a hanging load too) or ``pull`` (what the muscles put on a joint or a load): its
+        name without that of the tank, chamber or joint.
         """
         kind = self.name.partition(".")[0]
         alike = {"line": "chamber", "load": "arm", "force": "pull", "torque": "pull"}
@@ -105,7 +112,7 @@ class Block:
     @property
     def closure(self) -> str | None:
         """The sum of terms that can stand for what is missing in it; None where the simulator has
-        none: at a load, at a force and in front of a line.
+        none: at a load, at a force, at a temperature and in front of a line.
         """
         named = self.name.partition(".")[0]
         return None if named in ("load", "line") else CLOSURE_OF.get(self.kind)
@@ -210,6 +217,7 @@ class _Map:
     def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
         self.settings = settings
         self.rig, self.has = rig, frozenset(channels)
+        self.thermometers = {n: c for n, c in thermometers_of(rig).items() if c in self.has}
         self.ways = _ways(rig, self.has)
         self.angles = (
             ("length",)
@@ -421,6 +429,26 @@ class _Map:
             covers + _called(name),
             ("supply",) if unread else (),
             self.tubes_at(full),
+            self.thermometers.get(name, ""),
+        )
+
+    def temperature(self, chamber: Block | None) -> Block | None:
+        """The block of a gas whose temperature is measured: that of its pressure, read off by the
+        thermometer. The pressure is taken anew as often as its own windows begin, so that it does
+        not drift; the temperature goes on.
+        """
+        if chamber is None or not chamber.thermometer:
+            return None
+        name = chamber.name.partition(".")[2]
+        return replace(
+            chamber,
+            name=dotted("temperature", name),
+            channel=chamber.thermometer,
+            drives=(*chamber.drives, chamber.channel),
+            window=None,
+            covers="gas" + _called(name),
+            beside=("chamber", *chamber.beside),
+            anchor=chamber.window,
         )
 
     def inlet(self, name: str) -> Block | None:
@@ -522,15 +550,16 @@ def _called(name: str) -> str:
 
 
 def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
-    """The blocks that these channels can tell apart: supplies, inlets of lines, chambers, then
-    joints or the load, each in the order of the rig file.
+    """The blocks that these channels can tell apart: supplies, inlets of lines, chambers, gases
+    with a thermometer, then joints or the load, each in the order of the rig file.
 
     Every tank (or regulator), chamber, joint and hanging load is a block of its own, driven by the
     measured channels next to it, with the baseline parameters of what it stands for; so is a valve
     where a gauge stands between it and the line behind it, beside the chamber, which is driven from
-    the valve on where that can be; and so are muscles whose force (or torque at a joint) is
-    measured. A rig with joints or a load and without valves and supplies is driven by the pressures
-    of its muscles: these are given, and only what they move is judged.
+    the valve on where that can be; so are muscles whose force (or torque at a joint) is measured,
+    and a gas that has a temperature of its own and a thermometer. A rig with joints or a load and
+    without valves and supplies is driven by the pressures of its muscles: these are given, and only
+    what they move is judged.
 
     Parameters
     ----------
@@ -551,7 +580,8 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     whole = _Map(rig, closed, settings)
     found = [have.supply(name) for name in rig.tables("supply")]
     found += [have.inlet(name) for name in rig.tables("line")]
-    found += [whole.chamber(name) or have.chamber(name) for name in rig.tables("chamber")]
+    chambers = [whole.chamber(name) or have.chamber(name) for name in rig.tables("chamber")]
+    found += [*chambers, *(have.temperature(chamber) for chamber in chambers)]
     found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
     found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
     found += [have.pull(name) for name in pulls_of(rig)]
@@ -629,13 +659,15 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
     state = [
         n
         for n in prepared.signals
-        if n == block.channel or (block.kind == "arm" and channel_of(n) == "joint_angle")
+        if n in (block.channel, block.thermometer)
+        or (block.kind == "arm" and channel_of(n) == "joint_angle")
     ]
     around = {block.channel, *block.drives}
     drives = {
         n: s
         for n, s in prepared.signals.items()
-        if channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around)
+        if n == block.thermometer
+        or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
     }
     return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
 
@@ -700,8 +732,31 @@ def predicted(
         signals,
         lead + prepared.n,
         outlets,
+        _anchors(block, prepared, starts, lead),
     )
     return prediction[lead:]
+
+
+def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0) -> list[int]:
+    """Samples at which the pressures of a block are taken anew inside its windows."""
+    if block.anchor is None:
+        return []
+    each = (lead + start for start in prepared.starts(block.anchor, block.drives))
+    return sorted(set(each) - set(starts))
+
+
+def _shown(block: Block, start: Array, noise: float, settings: PrepareSettings) -> Array:
+    """What the start of a window can do, (n, k): of a pressure without the temperature at which its
+    gas began, once that is forgotten; of a temperature without where a thermometer stood that is
+    not late.
+    """
+    if not block.thermometer:
+        return start
+    if block.kind == "temperature":
+        return start[:, start.any(axis=0)]
+    with np.errstate(over="ignore"):  # of a model that ran away, which no fit keeps
+        told = float(np.linalg.norm(start[:, -1])) * settings.begun_temperature_error > noise
+    return start if told else start[:, :-1]
 
 
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
@@ -738,6 +793,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         names,
         begun(block, prepared, starts),
         prepared.n,
+        anchors=_anchors(block, prepared, starts),
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")
@@ -747,14 +803,18 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
     )
-    rows = prepared.usable(block.channel, block.drives, starts)
+    rows, noise = (
+        prepared.usable(block.channel, block.drives, starts),
+        prepared.noise[block.channel],
+    )
     value = np.where(rows, measured - prediction, 0.0)
     jacobian[~rows] = 0.0
     shifted = prediction.copy()
     k = len(names)
     bases: list[tuple[int, int, Array]] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
-        slopes, start = jacobian[a:b, :k], jacobian[a:b, k:]
+        slopes = jacobian[a:b, :k]
+        start = _shown(block, jacobian[a:b, k:], noise, prepared.settings.prepare)
         if np.count_nonzero(rows[a:b]) < least * start.shape[1]:
             rows[a:b] = False
             value[a:b] = 0.0
@@ -769,4 +829,4 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     jac = jacobian[:, :k] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
-    return Residual(value, jac, shown, rows, prepared.noise[block.channel], bases)
+    return Residual(value, jac, shown, rows, noise, bases)

@@ -12,12 +12,24 @@ from scipy.stats import chi2
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
+from pamrs.effects import info_of
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
-__all__ = ["COMMANDS", "Prepared", "binned", "held", "noise_level", "prepare", "smoothed"]
+__all__ = [
+    "COMMANDS",
+    "Prepared",
+    "binned",
+    "held",
+    "noise_level",
+    "prepare",
+    "smoothed",
+    "thermometers_of",
+    "warm_chambers",
+]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -385,7 +397,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
     _check_commands(recording, rig, core.inputs)
     signals, raw, noise, lengths = {}, {}, {}, {}
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
-    for name in (*drives, *pulls_of(rig).values()):
+    for name in (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values()):
         if name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
@@ -416,6 +428,32 @@ def pulls_of(rig: Rig) -> dict[str, str]:
     if rig.model["load"]:
         return {"": "force"}
     return {name: dotted("joint_torque", name) for name in rig.tables("joint")}
+
+
+def warm_chambers(rig: Rig) -> list[str]:
+    """Names of the chambers whose gas has a temperature of its own: those with an energy balance,
+    and those on which an effect acts that gives them one.
+    """
+    warming = [entry.get("at", "") for entry in rig.effects if info_of(entry["id"]).frees_mass]
+    return [
+        name
+        for name, table in rig.tables("chamber").items()
+        if table["gas"] == "energy_balance" or "" in warming or name in warming
+    ]
+
+
+def thermometers_of(rig: Rig) -> dict[str, str]:
+    """Channels of the temperatures of a rig's gases that can be judged, by the names of their
+    chambers: those that no valve or line joins to another gas with a temperature of its own, which
+    comes along with what flows and drives no block.
+    """
+    warm = {qualified("chamber", name): name for name in warm_chambers(rig)}
+    lines = rig.ports("line")
+    behind = {qualified("line", name): ends["to"] for name, ends in lines.items()}
+    ways = [(e["from"], behind.get(e["to"], e["to"])) for e in rig.ports("valve").values()]
+    ways += [(ends["from"], ends["to"]) for ends in lines.values()]
+    joined = {end for way in ways if all(end in warm for end in way) for end in way}
+    return {name: dotted("temperature", name) for full, name in warm.items() if full not in joined}
 
 
 def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:

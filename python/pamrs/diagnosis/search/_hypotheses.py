@@ -500,7 +500,9 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
     """A group with a form of what is missing, where no name is likely and one is found that carries
     over.
     """
-    trial, start, suspects = refit.trial, refit.start, refit.trial.suspects
+    trial, start = refit.trial, refit.start
+    # what is missing in a chamber is missing in the temperature of its gas too
+    suspects = [b for b in trial.suspects if "chamber" not in b.beside] or trial.suspects
     settings = trial.settings.closures
     if group.probabilities["unlisted"] < settings.from_probability or len(
         {b.kind for b in suspects}
@@ -508,8 +510,8 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
         return group  # of two chambers one form would have to serve both
     if any(b.closure is None for b in suspects):
         tell(
-            "no form of what is missing is looked for, since that of a load, of a force or of a "
-            "valve in front of a line is not in the simulator"
+            "no form of what is missing is looked for, since that of a load, of a force, of a "
+            "temperature or of a valve in front of a line is not in the simulator"
         )
         return group
     group = replace(group, sought=True)

@@ -111,6 +111,13 @@ class NextExperimentSettings(SettingsGroup):
         reason="the same of a length",
         origin="data sheet of a usual linear transducer",
     )
+    temperature_noise: float = setting(
+        0.1,
+        unit="K",
+        above=0.0,
+        reason="the same of the temperature of a gas",
+        origin="data sheet of a usual thermocouple amplifier",
+    )
     sample_time: float = setting(
         0.005,
         unit="s",

@@ -103,6 +103,14 @@ class PrepareSettings(SettingsGroup):
         reason="fewest samples of a stretch: a cubic takes four",
         origin="judgement",
     )
+    begun_temperature_error: float = setting(
+        5.0,
+        unit="K",
+        above=0.0,
+        reason="error of the temperature at which a thermometer says that a gas begins: windows of "
+        "the pressure in which so much would be seen are freed of it",
+        origin="judgement: a thermocouple is off by two kelvins, and late (docs/decisions/0116)",
+    )
     bridged_samples: int = setting(
         3,
         unit="count",

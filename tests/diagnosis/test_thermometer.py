@@ -1,0 +1,263 @@
+"""A recorded temperature of a gas is a block of its own, beside the pressure of the same gas."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.diagnosis.next_experiment import checked_channels, measurable
+from pamrs.diagnosis.prepare import available_blocks, thermometers_of
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.recordings import Recording, propose
+from pamrs.report.chain import chain_svg
+from pamrs.rig import parse_rig
+from tests.diagnosis.noisy import noisy
+from tests.diagnosis.test_gas_law import TEXT, WALL
+from tests.reference import network
+from tests.simulation.test_thermometer import late
+
+NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "temperature": 0.2}
+ROLES = ("fit", "fit", "held_out")
+TANK = """
+schema = "pamrs.rig/1"
+name = "tank"
+[gas]
+temperature = { value = 20, unit = "degC" }
+[chamber]
+dead_volume      = { value = 2.0, unit = "l", tol = 0.02 }
+initial_pressure = { value = 6.0, unit = "bar" }
+gas = "energy_balance"
+heat_transfer_coefficient = { value = 20, unit = "W/(m2 K)", tol = 4 }
+[line]
+kind           = "orifice"
+from           = "chamber"
+to             = "ambient"
+discharge_area = { value = 2.0, unit = "mm2", tol = 0.04 }
+[sensors]
+pressure_zero = { value = 0.0, unit = "Pa", tol = 500.0 }
+"""
+_BALANCE = TANK[TANK.index('gas = "') : TANK.index("[line]")]
+COEFFICIENTS = TANK.replace(
+    _BALANCE,
+    "".join(f'{k} = {{ value = 1.35, unit = "1" }}\n' for k in ("alpha_in", "alpha_out", "alpha")),
+)
+
+
+def blown(rig: pamrs.Rig, *, lag: float = 0.0, off: float = 0.0) -> list[Recording]:
+    """Three blow-downs by the reference model, ten seconds at 50 Hz each, with what a thermometer
+    reads that is so late [s] and so much off [K].
+    """
+    step, found = 0.02, []
+    gas = rig.model["gas"]
+    volume = rig.parameter("chamber.dead_volume").value
+    for k, role in enumerate(ROLES):
+        begin = {"muscle_pressure": (4.0 + k) * 1e5}
+        run = network.simulate(json.loads(rig.to_json()), {}, step, begin, 1e-8, rows=501)
+        absolute = run["muscle_pressure"] + gas["ambient_pressure"]
+        read = absolute * volume / (run["air_mass"] * gas["gas_constant"])
+        read = late(run["time"], read, lag) if lag > 0.0 else read
+        channels = {"muscle_pressure": run["muscle_pressure"], "temperature": read + off}
+        found.append(noisy(f"r{k}", role, step, channels, NOISE, [7, k]))
+    return found
+
+
+def filled(rig: pamrs.Rig, skipped: float = 0.0) -> list[Recording]:
+    """Three logs of eight seconds at 200 Hz of a chamber that is filled and vented in steps, each
+    begun some time [s] after the plant was.
+    """
+    found = []
+    for seed, role in enumerate(ROLES):
+        rng = np.random.default_rng(seed)
+        time = np.arange(0.0, 8.0, 0.005)
+        steps = 5.0 + rng.uniform(0.5, 4.0, 16) * np.tile([1.0, -1.0], 8)
+        command = steps[(time / 0.5).astype(int)]
+        run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
+        channels = {"valve_command": command} | {name: run[name] for name in NOISE}
+        first = round(skipped / 0.005)
+        kept = {name: values[first:] for name, values in channels.items()}
+        found.append(noisy(f"r{seed}", role, 0.005, kept, NOISE, [7, seed]))
+    return found
+
+
+def without(recordings: list[Recording], channel: str = "temperature") -> list[Recording]:
+    def rest(of: Mapping[str, object]) -> dict[str, object]:
+        return {name: value for name, value in of.items() if name != channel}
+
+    return [replace(r, channels=rest(r.channels), mask=rest(r.mask)) for r in recordings]
+
+
+def found_in(rig: pamrs.Rig, recordings: list[Recording]) -> pamrs.Diagnosis:
+    return pamrs.diagnose(pamrs.Case("case", rig, recordings, Path()))
+
+
+def test_a_true_model_misses_nothing_however_much_the_thermometer_is_off() -> None:
+    rig = parse_rig(TANK)
+    found = found_in(rig, blown(rig, off=1.5))
+    assert found.verdict == "none"
+    assert [b.blocks for b in found.blocks] == [["chamber", "temperature"]]
+    assert found.data[0].used == ["muscle_pressure", "temperature"]
+    assert not found.data[0].unused
+
+
+def test_a_wall_is_known_better_with_a_thermometer() -> None:
+    nominal = parse_rig(TANK)
+    recordings = blown(nominal.with_parameters({WALL: 60.0}))
+    walls = []
+    for given in (recordings, without(recordings)):
+        (wrong,) = found_in(nominal, given).wrong_parameters
+        assert wrong["name"] == WALL
+        assert abs(wrong["value"] - 60.0) < 3.0 * wrong["std"]
+        walls.append(wrong["std"])
+    with_it, without_it = walls
+    assert with_it < 0.85 * without_it
+
+
+def test_a_slow_thermometer_is_no_heat_of_the_gas() -> None:
+    rig = parse_rig(TANK)
+    found = found_in(rig, blown(rig, lag=0.5))
+    assert found.verdict == "effects"
+    assert [e["id"] for e in found.effects] == ["thermometer_lag"]
+    assert not found.wrong_parameters
+    assert not found.ambiguity
+    own = found.effects[0]["parameters"]["time_constant"]
+    assert own["value"] == pytest.approx(0.5, abs=3.0 * own["std"] + 0.01)
+
+
+def test_a_thermometer_that_the_rig_file_knows_hides_no_wall() -> None:
+    known = parse_rig(
+        TANK + '[[effects]]\nid = "thermometer_lag"\n[effects.parameters]\n'
+        'time_constant = { value = 0.4, unit = "s", std = 0.2 }\n'
+    )
+    truth = parse_rig(TANK).with_parameters({WALL: 60.0})
+    found = found_in(known, blown(truth, lag=0.5))
+    (wrong,) = found.wrong_parameters
+    assert wrong["name"] == WALL
+    assert wrong["value"] == pytest.approx(60.0, rel=0.05)
+    assert not found.effects
+
+
+def test_a_log_may_begin_while_the_gas_is_warm() -> None:
+    """What the gas began with is no missing physics where a thermometer says it."""
+    rig = parse_rig(TEXT)
+    recordings = filled(rig, 0.6)
+    first = [r.channels["temperature"][0] for r in recordings]
+    assert max(abs(t - rig.model["gas"]["temperature"]) for t in first) > 8.0
+    assert found_in(rig, recordings).verdict == "none"
+    assert found_in(rig, without(recordings)).verdict != "none"
+
+
+def test_holes_of_either_sensor_are_not_judged() -> None:
+    rig = parse_rig(TANK)
+    recordings = blown(rig)
+    for recording in recordings:
+        for channel, first in (("temperature", 60), ("muscle_pressure", 150)):
+            recording.channels[channel][first : first + 30] = np.nan
+            recording.mask[channel][first : first + 30] = False
+    assert found_in(rig, recordings).verdict == "none"
+
+
+def test_a_gas_without_a_temperature_says_what_to_write() -> None:
+    rig = parse_rig(COEFFICIENTS)
+    recordings = blown(parse_rig(TANK))
+    found = found_in(rig, recordings)
+    reason = found.data[0].unused["temperature"]
+    assert 'gas = "energy_balance"' in reason
+    assert "heat_transfer_coefficient" in reason
+    assert "[chamber]" in reason
+    bare = found_in(rig, without(recordings))
+    assert found.probabilities == bare.probabilities
+    # as a model that holds the effect has one
+    held = rig.with_effect("heat_transfer", {"heat_transfer_coefficient": 20.0})
+    assert thermometers_of(held) == {"": "temperature"}
+    again = found_in(held, recordings)
+    assert "temperature" in again.data[0].used
+    assert [b.blocks for b in again.blocks] == [["chamber", "temperature"]]
+
+
+def test_of_two_gases_that_are_joined_neither_is_judged() -> None:
+    """The second gets the cold air of the first, which drives no block."""
+    first = TANK.replace("[chamber]", "[chamber.a]").replace('"chamber"', '"chamber.a"')
+    first = first.replace('"ambient"', '"chamber.b"')
+    other = TANK[TANK.index("[chamber]") : TANK.index("[line]")].replace("6.0", "0.0")
+    rig = parse_rig(first + other.replace("[chamber]", "[chamber.b]"))
+    assert thermometers_of(rig) == {}
+    channels = [f"{kind}.{name}" for name in "ab" for kind in ("muscle_pressure", "temperature")]
+    recordings = []
+    for k, role in enumerate(ROLES):
+        begin = {"muscle_pressure.a": (4.0 + k) * 1e5}
+        run = pamrs.simulate(rig, duration=10.0, sample_time=0.02, initial=begin)
+        noise = {name: NOISE[name.partition(".")[0]] for name in channels}
+        own = {name: run[name] for name in channels}
+        recordings.append(noisy(f"r{k}", role, 0.02, own, noise, [7, k]))
+    found = found_in(rig, recordings)
+    assert {block for group in found.blocks for block in group.blocks} == {"chamber.a", "chamber.b"}
+    assert "comes from another chamber" in found.data[0].unused["temperature.b"]
+
+
+def test_a_plan_knows_which_gas_may_have_a_thermometer() -> None:
+    assert measurable(parse_rig(TANK), "temperature") == ("temperature",)
+    assert measurable(parse_rig(COEFFICIENTS), "temperature") == ()
+    with pytest.raises(pamrs.errors.ParameterError, match="'temperature', which is not allowed"):
+        checked_channels(parse_rig(COEFFICIENTS), ("muscle_pressure", "temperature"))
+
+
+@pytest.mark.slow
+def test_a_plan_says_what_a_thermometer_would_tell() -> None:
+    rig, channels = parse_rig(TEXT), ["valve_command", "supply_pressure", "muscle_pressure"]
+    plan = pamrs.plan_diagnosis(rig, channels, experiments=["step_and_shut"])
+    assert plan.sight("thermometer_lag").verdict == "not seen"
+    (more,) = [a for a in plan.additions if a.name == "temperature"]
+    assert "thermometer_lag" in more.seen
+    then = pamrs.plan_diagnosis(rig, [*channels, "temperature"], experiments=["step_and_shut"])
+    assert then.sight("thermometer_lag").verdict == "seen"
+    (own,) = [b for b in then.blocks if b["name"] == "temperature"]
+    assert own["covers"] == "gas"
+    (chamber,) = [b for b in then.blocks if b["name"] == "chamber"]
+    assert "temperature" not in chamber["why"]
+
+
+def test_the_drawing_has_the_thermometer_in_the_chamber() -> None:
+    rig = parse_rig(TANK)
+    found = found_in(rig, blown(rig, lag=0.5))
+    drawn = chain_svg(found)
+    assert drawn is not None
+    assert "temperature" in drawn
+    assert "missing:" in drawn
+    assert "thermometer lag" in drawn
+    text = found.summary()
+    assert "temperature" in text
+    assert "budget of the temperature" in text.lower()
+
+
+def test_a_log_tells_the_temperature_of_the_gas_from_others(tmp_path: Path) -> None:
+    wave = np.sin(0.1 * np.arange(100))
+    columns = {"time [s]": 0.1 * np.arange(100), "p chamber [bar]": 4.0 + wave}
+    columns |= {"chamber temp [degC]": 20.0 + wave, "motor temp [degC]": 40.0 + wave}
+    log = tmp_path / "log.csv"
+    rows = np.column_stack(list(columns.values()))
+    np.savetxt(log, rows, delimiter=",", header=",".join(columns), comments="")
+    for text, more in ((TANK, {"temperature": "chamber temp"}), (COEFFICIENTS, {})):
+        found = propose([log], parse_rig(text))
+        told = {m.channel: m.series.name for m in found.logs[0].matches}
+        assert told == {"muscle_pressure": "p chamber", **more}
+
+
+def test_a_thermometer_adds_its_block_and_changes_no_other() -> None:
+    rig, settings = parse_rig(TEXT), DiagnosisSettings().prepare
+    channels = ("valve_command", "supply_pressure", "muscle_pressure")
+    plain = {b.name: b for b in available_blocks(rig, channels, settings)}
+    more = {b.name: b for b in available_blocks(rig, (*channels, "temperature"), settings)}
+    assert set(more) - set(plain) == {"temperature"}
+    assert more["supply"] == plain["supply"]
+    assert replace(more["chamber"], thermometer="") == plain["chamber"]
+    own = more["temperature"]
+    assert (own.channel, own.kind, own.closure) == ("temperature", "temperature", None)
+    assert set(own.drives) == {"valve_command", "supply_pressure", "muscle_pressure"}
+    assert own.anchor == plain["chamber"].window
+    assert own.window is None
