@@ -565,8 +565,8 @@ def experiments_of(
         # what has no gauge is moved no higher than what has one
         highest = max(limits.values())
         limits = {chain: limits.get(chain, highest) for chain in seen}
-    seen = seen_in(rig, records, settings.rate_window) if has_frame(rig) else None
-    return library(rig, settings, sample_time=step, highest=limits or None, seen=seen, only=only)
+    shown = seen_in(rig, records, settings.rate_window) if has_frame(rig) else None
+    return library(rig, settings, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
 _WITHOUT_NAME = {

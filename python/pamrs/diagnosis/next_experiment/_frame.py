@@ -25,15 +25,6 @@ __all__ = ["Frame", "Seen", "frame_of", "seen_in"]
 
 Array = NDArray[np.float64]
 
-_PULLS = 0.05
-"""Share of its pull at the longest length, or at the highest pressure, from which a muscle is said
-to pull: less is slack."""
-_HELD = 0.7
-"""Where between the shortest and the longest length pressures are moved: near the longer end, where
-a muscle pulls from the lowest pressures on."""
-_LEAST = 0.01
-"""Least stroke that is worth moving, as a share of the longest length."""
-
 
 @dataclass(frozen=True)
 class Seen:
@@ -110,6 +101,8 @@ class Frame:
     ----------
     rig : Rig
         The rig that it is a part of.
+    settings : NextExperimentSettings
+        From where on a muscle pulls, and a stroke is one.
     lengths : Range
         Shortest and longest length [m].
     rate : float
@@ -123,6 +116,7 @@ class Frame:
     """
 
     rig: Rig
+    settings: NextExperimentSettings
     lengths: Range
     rate: float
     held: float
@@ -135,8 +129,9 @@ class Frame:
         """
         pressures = {name: span.at(share) for name, span in self.spans.alone.items()}
         chambers = {chain.chamber: pressures[chain.name] for chain in chains_of(self.rig)}
-        low = _shortest(self.rig, chambers, self.lengths)
-        if self.lengths.high - low < _LEAST * self.lengths.high:
+        own = self.settings
+        low = _shortest(self.rig, chambers, self.lengths, own.pulling_share)
+        if self.lengths.high - low < own.worth_stroke * self.lengths.high:
             return None
         return Range(low, self.lengths.high)
 
@@ -176,13 +171,14 @@ def frame_of(
     rest = min(float(muscle["rest_length"]) for muscle in rig.tables("muscle").values())
     longest = min(load["max_length"], rest if seen is None else seen.lengths.high)
     whole = Range(min(load["min_length"], longest), longest)
-    shortest = _shortest(rig, {c.chamber: 0.5 * tops[c.name] for c in chains}, whole)
+    half = {c.chamber: 0.5 * tops[c.name] for c in chains}
+    shortest = _shortest(rig, half, whole, settings.pulling_share)
     if seen is not None:
         least = longest - settings.least_stroke * rest
         shortest = max(whole.low, min(seen.lengths.low, max(shortest, least)))
     lengths = Range(shortest, longest)
-    held = lengths.at(_HELD)
-    share = _lowest(rig, chains, tops, held)
+    held = lengths.at(settings.held_share)
+    share = _lowest(rig, chains, tops, held, settings.pulling_share)
     alone = {}
     for chain in chains:
         top = tops[chain.name]
@@ -192,6 +188,7 @@ def frame_of(
         alone[chain.name] = Range(low, top)
     return Frame(
         rig,
+        settings,
         lengths,
         max(settings.length_rate, 0.0 if seen is None else seen.rate),
         held,
@@ -200,10 +197,12 @@ def frame_of(
     )
 
 
-def _shortest(rig: Rig, pressures: Mapping[str, float], lengths: Range) -> float:
-    """The shortest length from which on to the longest one the muscles pull [m]."""
+def _shortest(rig: Rig, pressures: Mapping[str, float], lengths: Range, pulling: float) -> float:
+    """The shortest length from which on to the longest one the muscles pull [m]: by a share of what
+    they pull at the longest.
+    """
     tried = np.linspace(lengths.high, lengths.low, 41)
-    least = _PULLS * _pull(rig, pressures, lengths.high)
+    least = pulling * _pull(rig, pressures, lengths.high)
     found = float(tried[0])
     for length in map(float, tried[1:]):
         if _pull(rig, pressures, length) < max(least, 0.0):
@@ -212,15 +211,17 @@ def _shortest(rig: Rig, pressures: Mapping[str, float], lengths: Range) -> float
     return found
 
 
-def _lowest(rig: Rig, chains: Iterable[Chain], tops: Mapping[str, float], length: float) -> float:
+def _lowest(
+    rig: Rig, chains: Iterable[Chain], tops: Mapping[str, float], length: float, pulling: float
+) -> float:
     """The lowest share of their highest pressures, from a tenth to a half, at which the muscles
-    pull.
+    pull: by a share of what they pull at the highest.
     """
 
     def pull(share: float) -> float:
         return _pull(rig, {c.chamber: share * tops[c.name] for c in chains}, length)
 
-    least = max(0.0, _PULLS * pull(1.0))
+    least = max(0.0, pulling * pull(1.0))
     return next((s for s in map(float, np.linspace(0.1, 0.5, 21)) if pull(s) >= least), 0.5)
 
 

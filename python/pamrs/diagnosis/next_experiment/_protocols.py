@@ -164,7 +164,7 @@ class _Maker:
 
     def multisine(self) -> Experiment:
         frequencies = list(self.frequencies)
-        time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        time = np.asarray(np.arange(round(30.0 / self.dt) + 1) * self.dt, dtype=np.float64)
         wave = waves(np.array(frequencies), time, 0.0)
         wave *= 0.4 / np.abs(wave).max()
         reference = np.clip(time / 3.0, 0.0, 1.0) * (

@@ -165,7 +165,7 @@ class _Several:
         return words, {"levels_bar": {n: [in_bar(s.low), in_bar(s.high)] for n, s in spans.items()}}
 
     def multisine(self) -> Experiment:
-        time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        time = np.asarray(np.arange(round(30.0 / self.dt) + 1) * self.dt, dtype=np.float64)
         usual, ratio = self.settings.multisine_frequencies, self.settings.frequency_ratio
         references, used = {}, {}
         for k, chain in enumerate(self.chains):

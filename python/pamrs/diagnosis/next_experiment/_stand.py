@@ -97,8 +97,8 @@ class Stand:
         extra : float
             What is done by hand, as time [s].
         **options
-            ``shut``, ``dither`` and another ``bandwidth``, as for
-            :func:`pamrs.diagnosis.next_experiment._chains.commands_for`.
+            ``shut``, ``dither`` and another ``bandwidth``, for the loops that find the commands of
+            valves.
         """
         rig = self.rig.with_parameters(changes) if changes else self.rig
         if self.regulated:

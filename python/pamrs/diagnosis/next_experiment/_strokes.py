@@ -32,9 +32,6 @@ __all__ = ["stroke_library"]
 
 Array = NDArray[np.float64]
 
-_FILL = 3.0
-"""Time in which the muscle is filled and rests before its length moves [s]."""
-
 
 def stroke_library(
     stand: Stand, settings: NextExperimentSettings
@@ -70,6 +67,7 @@ class _Strokes:
 
     def __init__(self, stand: Stand, frame: Frame, settings: NextExperimentSettings) -> None:
         self.stand, self.frame, self.settings = stand, frame, settings
+        self.fill = settings.filling_time
         self.dt = stand.sample_time
 
     def quickest(self, stroke: Range) -> float:
@@ -124,6 +122,10 @@ class _Strokes:
         references = self.held(share, length.size)
         return self.stand.driven(name, text, excitation, references, length=length, **options)
 
+    def filled(self, stroke: Range) -> Points:
+        """Where every stroke begins: the muscle is filled at the longest length."""
+        return [(0.0, stroke.high), (self.fill, stroke.high)]
+
     def triangles(self, points: Points, stroke: Range, period: float, cycles: int) -> Points:
         """Points continued by triangles from the longest length to the shortest and back."""
         for _ in range(cycles):
@@ -135,7 +137,7 @@ class _Strokes:
         if stroke is None:
             return None
         period = max(15.0, 2.0 * self.quickest(stroke))
-        points = self.triangles(_filled(stroke.high), stroke, period, 2)
+        points = self.triangles(self.filled(stroke), stroke, period, 2)
         text = (
             f"hold {self.told(share)} and move the length as a triangle between "
             f"{in_mm(stroke.high):g} and {in_mm(stroke.low):g} mm with a period of {period:g} s, "
@@ -150,7 +152,7 @@ class _Strokes:
             return None
         quick = self.quickest(stroke)
         periods, cycles = [9.0 * quick, 3.0 * quick, quick], [1, 1, 3]
-        points = _filled(stroke.high)
+        points = self.filled(stroke)
         for period, count in zip(periods, cycles, strict=True):
             points = self.triangles(points, stroke, period, count)
         speeds = [2.0 * (stroke.high - stroke.low) / period for period in periods]
@@ -175,7 +177,7 @@ class _Strokes:
         points, text, numbers = nested_triangles(
             stroke.low, stroke.high, "the length", MM, (max(12.0, 4.0 * quick), quick)
         )
-        begun = [*_filled(stroke.high), *((t + _FILL, value) for t, value in points[1:])]
+        begun = [*self.filled(stroke), *((t + self.fill, value) for t, value in points[1:])]
         text = f"hold {self.told(share)} and {text}"
         numbers |= {"held_bar": self.numbers(stroke, share)["held_bar"]}
         return self.moved("nested_strokes", text, numbers, begun, share)
@@ -186,7 +188,7 @@ class _Strokes:
             return None
         way, middle = 0.5 * self.quickest(stroke), stroke.at(0.5)
         points = then(
-            _filled(stroke.high),
+            self.filled(stroke),
             (way, stroke.low),
             (hold, stroke.low),
             (0.5 * way, middle),
@@ -209,8 +211,8 @@ class _Strokes:
         lengths: Points = [(0.0, stroke.high)]
         levels: Points = [(0.0, 0.0)]
         for share in shares:
-            levels = then(levels, (1.0, share), (_FILL - 1.0 + 2.0 * period, share))
-            lengths = self.triangles(then(lengths, (_FILL, stroke.high)), stroke, period, 2)
+            levels = then(levels, (1.0, share), (self.fill - 1.0 + 2.0 * period, share))
+            lengths = self.triangles(then(lengths, (self.fill, stroke.high)), stroke, period, 2)
         text = (
             f"hold {self.told(*shares)} one after the other, and at each move the length as a "
             f"triangle between {in_mm(stroke.high):g} and {in_mm(stroke.low):g} mm with a period "
@@ -256,8 +258,9 @@ class _Strokes:
         stroke = self.frame.stroke(low)
         if stroke is None:
             return None
-        time = np.arange(round((seconds + _FILL) / self.dt) + 1) * self.dt
-        faded = np.clip(time / _FILL, 0.0, 1.0)
+        rows = round((seconds + self.fill) / self.dt) + 1
+        time = np.asarray(np.arange(rows) * self.dt, dtype=np.float64)
+        faded = np.clip(time / self.fill, 0.0, 1.0)
         usual, ratio = np.array(self.settings.multisine_frequencies), self.settings.frequency_ratio
         count = len(self.stand.chains) + 1
         each = [usual * ratio ** (k / count) for k in range(count)]
@@ -301,7 +304,7 @@ class _Strokes:
         if stroke is None:
             return None
         period = max(12.0, round(1.5 * self.quickest(stroke), 1))
-        points = self.triangles(_filled(stroke.high), stroke, period, 2)
+        points = self.triangles(self.filled(stroke), stroke, period, 2)
         points = then(points, (10.0, stroke.high))
         rows = round(points[-1][0] / self.dt) + 1
         closed = within(rows, self.dt, [(2.0, points[-1][0] + 1.0)])
@@ -314,11 +317,6 @@ class _Strokes:
         numbers = {**self.numbers(stroke, share), "period_s": period, "cycles": 2, "hold_s": 10.0}
         shut: Mapping[str, NDArray[np.bool_]] = _all(self.stand.chains, closed)
         return self.moved("sealed_strokes", text, numbers, points, share, shut=shut)
-
-
-def _filled(length: float) -> Points:
-    """Where every stroke begins: the muscle is filled at the longest length."""
-    return [(0.0, length), (_FILL, length)]
 
 
 def _unit(wave: Array) -> Array:

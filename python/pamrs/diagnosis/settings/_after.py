@@ -149,6 +149,38 @@ class NextExperimentSettings(SettingsGroup):
         "muscle's length at rest",
         origin="judgement: well beyond the sliding before friction, well inside what muscles do",
     )
+    worth_stroke: float = setting(
+        0.01,
+        unit="1",
+        above=0.0,
+        reason="least stroke of a load frame that is worth moving, as a share of the length",
+        origin="judgement: a few times the sliding before friction",
+    )
+    pulling_share: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        most=0.5,
+        reason="share of what a muscle pulls at its longest, or at its highest pressure, from "
+        "which it is taken to pull: at less it may be slack",
+        origin="judgement",
+    )
+    held_share: float = setting(
+        0.7,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="where between its shortest and its longest length a load frame holds a muscle "
+        "while pressures are moved",
+        origin="judgement: near the longer end, where muscles pull from low pressures on",
+    )
+    filling_time: float = setting(
+        3.0,
+        unit="s",
+        above=0.0,
+        reason="time in which a muscle is filled and rests before a load frame moves",
+        origin="judgement: a third of it to fill",
+    )
     sample_time: float = setting(
         0.005,
         unit="s",
