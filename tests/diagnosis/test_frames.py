@@ -131,6 +131,15 @@ def test_a_muscle_that_was_held_is_moved_by_the_least_stroke() -> None:
     assert np.ptp(length) == pytest.approx(OWN.least_stroke * REST, abs=3e-4)
 
 
+def test_a_stand_that_cannot_move_gets_no_strokes() -> None:
+    text = BENCH.to_toml_text().replace("17.0,", "27.4,").replace("28.5,", "27.55,")
+    still = pamrs.rig.parse_rig(text)
+    assert still.tables("load")[""]["max_length"] == pytest.approx(0.2755)
+    found = library(still, OWN, sample_time=0.01)
+    assert found
+    assert all(np.ptp(e.commands["length"]) == 0.0 for e in found)
+
+
 @pytest.mark.parametrize(
     "rig",
     [BENCH, PAIR, *(pytest.param(rig, marks=pytest.mark.slow) for rig in (VALVED, REGULATED))],
