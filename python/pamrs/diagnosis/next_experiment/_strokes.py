@@ -4,13 +4,14 @@ are moved (as of any rig), and both at once.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.next_experiment._chains import Chain, Range, can_shut
+from pamrs.diagnosis.next_experiment._chains import Range, can_shut
 from pamrs.diagnosis.next_experiment._experiment import (
     MM,
     Experiment,
@@ -72,7 +73,7 @@ class _Strokes:
 
     def quickest(self, stroke: Range) -> float:
         """Period of the quickest triangle over a stroke [s]."""
-        return max(2.0, round(2.0 * (stroke.high - stroke.low) / self.frame.rate, 1))
+        return max(2.0, _up(2.0 * (stroke.high - stroke.low) / self.frame.rate))
 
     def held(self, share: float, rows: int) -> dict[str, Array]:
         """All pressures led to a share of their ranges and held, for so many samples."""
@@ -173,7 +174,7 @@ class _Strokes:
         if stroke is None:
             return None
         # of the widest loop, which goes over nine tenths of the stroke
-        quick = max(1.2, round(0.9 * self.quickest(stroke), 1))
+        quick = max(1.2, _up(0.9 * self.quickest(stroke)))
         points, text, numbers = nested_triangles(
             stroke.low, stroke.high, "the length", MM, (max(12.0, 4.0 * quick), quick)
         )
@@ -315,14 +316,15 @@ class _Strokes:
             f"with a period of {period:g} s, 2 cycles, and hold it for 10 s"
         )
         numbers = {**self.numbers(stroke, share), "period_s": period, "cycles": 2, "hold_s": 10.0}
-        shut: Mapping[str, NDArray[np.bool_]] = _all(self.stand.chains, closed)
+        shut = {chain.name: closed for chain in self.stand.chains}
         return self.moved("sealed_strokes", text, numbers, points, share, shut=shut)
+
+
+def _up(seconds: float) -> float:
+    """The next longer time that is said with one digit behind the point [s]."""
+    return math.ceil(10.0 * seconds) / 10.0
 
 
 def _unit(wave: Array) -> Array:
     """A wave between -1 and 1."""
     return np.asarray(wave / np.abs(wave).max())
-
-
-def _all(chains: Sequence[Chain], closed: NDArray[np.bool_]) -> dict[str, NDArray[np.bool_]]:
-    return {chain.name: closed for chain in chains}
