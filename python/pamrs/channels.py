@@ -14,6 +14,7 @@ UNITS: Final[dict[str, str]] = {
     "time": "s",
     "valve_command": "V",
     "supply_command": "Pa",
+    "pressure_command": "Pa",
     "supply_pressure": "Pa",
     "line_pressure": "Pa",
     "muscle_pressure": "Pa",

@@ -509,13 +509,6 @@ def test_two_regulators_and_pulsed_valves_are_planned(monkeypatch) -> None:
     assert leak.channels == measurable(PULSED)
 
 
-def test_frames_are_refused_in_words() -> None:
-    bench = pamrs.rigs.named("bench")
-    for what in (library, pamrs.plan_diagnosis):
-        with pytest.raises(DiagnosisError, match="frame"):
-            what(bench, OWN if what is library else ["muscle_pressure"])
-
-
 def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
     hypotheses = [
         (

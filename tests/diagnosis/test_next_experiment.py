@@ -81,6 +81,12 @@ PAIRS = {
         ("leak_muscle", {"conductance": 2e-12}, "extensor"),
         ("step_and_shut.extensor", "multisine"),
     ),
+    "friction or creep on a frame": (
+        pamrs.rigs.bench(),
+        ("muscle_hysteresis", {"friction_constant": 2.0, "friction_pressure": 0.0}),
+        ("muscle_creep", {"stiffness": 300.0, "time_constant": 3.0}),
+        ("slow_triangle", "nested_strokes"),
+    ),
     "regulator or sensor": (
         REGULATED,
         ("supply_regulator_deadband", {"dead_band": 2e3}),

@@ -95,6 +95,9 @@ def diagnose_command(
     angle_noise: Annotated[
         str | None, typer.Option(help="With --plan: sample noise of the angle, like '0.03 deg'.")
     ] = None,
+    force_noise: Annotated[
+        str | None, typer.Option(help="With --plan: sample noise of a load cell, like '1 N'.")
+    ] = None,
 ) -> None:
     """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
     could be found at all.
@@ -110,14 +113,16 @@ def diagnose_command(
             raise typer.BadParameter("--consider needs a case: --plan has no recordings to judge")
         if any(path is not None for path in (report, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
-        _plan(plan, channels, pressure_noise, angle_noise, json)
+        _plan(plan, channels, pressure_noise, angle_noise, force_noise, json)
         return
     if case is None:
         raise typer.BadParameter(
             "the argument CASE is missing: a case folder is needed, or a rig by --plan"
         )
-    if not (channels is None and pressure_noise is None and angle_noise is None):
-        raise typer.BadParameter("--channels, --pressure-noise and --angle-noise need --plan")
+    if any(given is not None for given in (channels, pressure_noise, angle_noise, force_noise)):
+        raise typer.BadParameter(
+            "--channels, --pressure-noise, --angle-noise and --force-noise need --plan"
+        )
     from pamrs._writing import write_atomically
     from pamrs.recordings import load_case
 
@@ -183,6 +188,7 @@ def _plan(
     channels: str | None,
     pressure_noise: str | None,
     angle_noise: str | None,
+    force_noise: str | None,
     json: Path | None,
 ) -> None:
     """What a diagnosis could tell, to standard output and a file."""
@@ -199,6 +205,8 @@ def _plan(
         )
     if angle_noise is not None:
         noise["joint_angle"] = exact("angle_noise", angle_noise, "angle")
+    if force_noise is not None:
+        noise["force"] = exact("force_noise", force_noise, "force")
     given = (
         [name for name in measurable(loaded) if channel_of(name) != "temperature"]
         if channels is None

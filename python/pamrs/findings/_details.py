@@ -129,7 +129,8 @@ class Protocol(Entry):
     time : (n,) array
         [s].
     commands : dict of str to (n,) array
-        By channel: ``valve_command`` [V], ``supply_command`` [Pa, gauge].
+        By channel: ``valve_command`` [V], ``supply_command`` and ``pressure_command`` [Pa, gauge],
+        ``length`` [m].
     units : dict of str to str
         SI unit of each channel.
     """

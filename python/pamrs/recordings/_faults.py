@@ -28,7 +28,7 @@ _RAIL_SAME: Final = 0.3  # difference before and after it, over that step
 _REST: Final = 12.0  # quanta that a channel at rest may span
 
 #: Set by the controller or the user: constant stretches are their nature.
-COMMANDS: Final = frozenset({"valve_command", "supply_command", "reference"})
+COMMANDS: Final = frozenset({"valve_command", "supply_command", "pressure_command", "reference"})
 #: Stops and dry friction hold these exactly still.
 MECHANICAL: Final = frozenset({"joint_angle", "length"})
 #: Transducers whose end of range is a fault.

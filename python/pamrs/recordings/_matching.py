@@ -55,6 +55,8 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
 #: Channels that a diagnosis sets the rig by, or that stand in a gas: no weak word, and no unit,
 #: names them alone.
 _ONLY_NAMED: Final = frozenset({"ambient_temperature", "temperature"})
+#: Channels of files that are played, which no log has.
+_PLAYED: Final = frozenset({"pressure_command"})
 _NOT: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error")
@@ -121,7 +123,7 @@ def channels_of(rig: Rig | None) -> list[str]:
         With the names of its blocks; at the end the ambient temperature, which has none.
     """
     if rig is None:
-        return [name for name in CHANNELS if name != "time"]
+        return [name for name in CHANNELS if name != "time" and name not in _PLAYED]
     kinds = (
         ("valve", "valve_command"),
         ("supply", "supply_pressure"),

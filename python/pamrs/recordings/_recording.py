@@ -61,6 +61,7 @@ CHANNELS: Final[dict[str, _Channel]] = {
         ("time", -math.inf, math.inf),
         ("valve_command", -1000.0, 1000.0),
         ("supply_command", -1.3e5, 1e8),
+        ("pressure_command", -1.3e5, 1e8),
         ("supply_pressure", -1.3e5, 1e8),
         ("line_pressure", -1.3e5, 1e8),
         ("muscle_pressure", -1.3e5, 1e8),

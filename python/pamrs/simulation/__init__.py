@@ -16,7 +16,7 @@ from pamrs.simulation._driving import (
     regulators_of,
     switching_valves,
 )
-from pamrs.simulation._replay import differences, replay
+from pamrs.simulation._replay import differences, reading, replay
 from pamrs.simulation._side_by_side import REDUCTIONS, simulate_batch
 from pamrs.simulation._simulation import (
     Balance,
@@ -44,6 +44,7 @@ __all__ = [
     "has_frame",
     "initial_names",
     "input_names",
+    "reading",
     "regulators_of",
     "switching_valves",
     "replay",

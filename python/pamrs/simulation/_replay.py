@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import dotted
+from pamrs.channels import channel_of, dotted
 from pamrs.errors import RecordingError
 from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
 from pamrs.simulation._simulation import Simulation, simulate
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
 
-__all__ = ["differences", "replay"]
+__all__ = ["differences", "reading", "replay"]
 
 Array = NDArray[np.float64]
 
@@ -37,8 +37,9 @@ def replay(rig: Rig, recording: Recording) -> Simulation:
     """Simulate a rig from a recording's first values under its inputs.
 
     Commands of valves and regulators come from the recording, the length of a load frame and the
-    pressures of chambers that nothing feeds as well; what a recording leaves unusable holds its
-    last usable value. Parameters that had another value in the recording have it.
+    pressures of chambers that nothing feeds as well (``muscle_pressure``, or where that was not
+    measured ``pressure_command``); what a recording leaves unusable holds its last usable value.
+    Parameters that had another value in the recording have it.
 
     Parameters
     ----------
@@ -97,16 +98,37 @@ def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:
         drive["length"] = _held(recording, "length")
     # Where muscles pull and nothing feeds them, their measured pressure is what moves them.
     if (frame or rig.tables("joint")) and not (valves or rig.tables("supply")):
-        given = [
-            name for name in rig.tables("chamber") if _usable(recording, "muscle_pressure", name)
-        ]
-        full = {name: dotted("muscle_pressure", name) for name in given}
+        given = {}
+        for name in rig.tables("chamber"):
+            if _usable(recording, "muscle_pressure", name):
+                measured = _held(recording, dotted("muscle_pressure", name))
+                given[name] = measured - _zero(rig, "muscle_pressure", name)
+            elif _usable(recording, "pressure_command", name):
+                given[name] = _held(recording, dotted("pressure_command", name))
         if given:
-            drive["pressure"] = {
-                name: _held(recording, full[name]) - _zero(rig, "muscle_pressure", name)
-                for name in given
-            }
+            drive["pressure"] = given
     return drive
+
+
+def reading(result: Simulation, channel: str) -> Array | None:
+    """What a sensor of a stand would read of a run.
+
+    Parameters
+    ----------
+    result : Simulation
+        The run.
+    channel : str
+        Channel of a recording; ``force`` is the pull of all muscles.
+
+    Returns
+    -------
+    (n,) array or None
+        In SI; None where the run has no such channel.
+    """
+    if channel == "force":
+        forces = [result[name] for name in result if channel_of(name) == "muscle_force"]
+        return np.asarray(np.sum(forces, axis=0), dtype=np.float64) if forces else None
+    return np.asarray(result[channel], dtype=np.float64) if channel in result else None
 
 
 def differences(result: Simulation, recording: Recording) -> dict[str, float]:

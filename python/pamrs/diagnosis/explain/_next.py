@@ -37,7 +37,7 @@ from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import regulators_of
+from pamrs.simulation import has_frame, regulators_of
 
 __all__ = ["next_experiment"]
 
@@ -70,6 +70,14 @@ _LOOPS = _Telling(
     "pressures that are already recorded",
     "what grows with the speed, with the width of the loop or with neither shows the class of "
     "what is missing",
+)
+_STROKES = _Telling(
+    "nested_strokes",
+    "hold the pressure and move the length slowly through nested loops of three widths, then "
+    "faster, inside the lengths that are already recorded",
+    "what grows with the speed, with the width of the loop or with neither shows the class of "
+    "what is missing",
+    alone=False,
 )
 _SHUT = _Telling(
     "step_and_shut",
@@ -123,7 +131,7 @@ _OVER = _Telling(
 def _telling(block: Block, rig: Rig) -> _Telling:
     """What tells most about a block of a rig whatever is missing there."""
     if block.mechanical:
-        return _LOOPS
+        return _STROKES if has_frame(rig) else _LOOPS
     if is_sealed(rig):
         if _joining(block, rig):
             return _OVER

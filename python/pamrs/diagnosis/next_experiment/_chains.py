@@ -1,9 +1,10 @@
 """The chains of a rig that a person commands, the pressures between which each is worth moving, and
 commands that make pressures follow references.
 
-A chain is a chamber with the valves that fill and vent it, or a regulator with what it fills.
-Commands are found on the model by a loop over the pressures that inverts the valves, and then sent
-as they are, so that every hypothesis answers to the same ones.
+A chain is a chamber with the valves that fill and vent it, or a regulator with what it fills, or
+on a load frame without either a chamber whose pressure the bench sets. Commands are found on the
+model by a loop over the pressures that inverts the valves, and then sent as they are, so that every
+hypothesis answers to the same ones.
 """
 
 from __future__ import annotations
@@ -17,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import dotted
 from pamrs.control import OrificeInverse
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
-from pamrs.simulation import Simulation, Simulator, regulators_of, simulate
+from pamrs.simulation import Simulation, Simulator, has_frame, regulators_of, simulate
 
 __all__ = [
     "Chain",
@@ -36,7 +37,9 @@ __all__ = [
     "is_sealed",
     "joined",
     "pressure_range",
+    "sent_for",
     "spans_of",
+    "top_of",
     "trial_of",
 ]
 
@@ -50,38 +53,41 @@ valve would open without bound."""
 
 @dataclass(frozen=True)
 class Range:
-    """Pressures between which an experiment moves, gauge [Pa].
+    """Pressures, gauge [Pa], or lengths [m] between which an experiment moves.
 
     Attributes
     ----------
     low, high : float
-        At which the arm just moves, and at which it nears its upper stop.
+        Pressures at which the arm just moves, and at which it nears its upper stop; the shortest
+        and the longest length.
     """
 
     low: float
     high: float
 
     def at(self, share: float) -> float:
-        """The pressure at a share of the range [Pa]."""
+        """The pressure [Pa] or length [m] at a share of the range."""
         return self.low + share * (self.high - self.low)
 
 
 @dataclass(frozen=True)
 class Chain:
-    """What one or several commands move: the air of one chamber, or that behind one regulator.
+    """What one or several commands move: the air of one chamber, or that behind one regulator, or
+    that whose pressure a bench sets.
 
     Attributes
     ----------
     name : str
         Of its chamber or regulator; empty where the rig has one chain.
     valves : tuple of str
-        Names of the valves at the chamber; none for a regulator.
+        Names of the valves at the chamber; none for a regulator, or a pressure that is set.
     regulator : str or None
-        Name of the regulator; None for valves.
+        Name of the regulator; None for valves, or a pressure that is set.
     chamber : str
         Name of the chamber whose pressure is moved.
     moves : tuple of str
-        Channels of what its muscles move: ``joint_angle.elbow``, ``length``.
+        Channels of what its muscles move: ``joint_angle.elbow``, ``length``; nothing where a frame
+        moves their length.
     """
 
     name: str
@@ -95,6 +101,8 @@ class Chain:
         """Channels of its commands."""
         if self.regulator is not None:
             return (dotted("supply_command", self.regulator),)
+        if not self.valves:
+            return (dotted("pressure_command", self.chamber),)
         return tuple(dotted("valve_command", name) for name in self.valves)
 
     @property
@@ -118,7 +126,8 @@ class Chain:
 
 def chains_of(rig: Rig) -> list[Chain]:
     """The chains that a person commands, in the order of the rig file; regulators only where there
-    are no valves (in front of valves they hold what they are set to).
+    are no valves (in front of valves they hold what they are set to), and on a frame without either
+    the chambers of its muscles, whose pressures the bench sets.
 
     Parameters
     ----------
@@ -137,6 +146,9 @@ def chains_of(rig: Rig) -> list[Chain]:
             for chamber in rig.tables("chamber")
             if chamber in fed
         ]
+    elif has_frame(rig) and not rig.tables("supply"):
+        own = [ends["chamber"].partition(".")[2] for ends in rig.ports("muscle").values()]
+        found = [Chain(chamber, (), None, chamber, ()) for chamber in dict.fromkeys(own)]
     else:
         found = []
         for name in regulators_of(rig):
@@ -163,7 +175,9 @@ def joined(rig: Rig, node: str) -> list[str]:
 
 
 def _moved(rig: Rig, chambers: set[str]) -> tuple[str, ...]:
-    """Channels of what the muscles in some chambers move."""
+    """Channels of what the muscles in some chambers move; nothing on a frame, which moves them."""
+    if has_frame(rig):
+        return ()
     ends = [e for e in rig.ports("muscle").values() if e["chamber"].partition(".")[2] in chambers]
     if rig.tables("load"):
         return ("length",) if ends else ()
@@ -174,15 +188,15 @@ def _moved(rig: Rig, chambers: set[str]) -> tuple[str, ...]:
 
 
 def is_sealed(rig: Rig) -> bool:
-    """Whether nobody sends a command to a rig: a chamber without a valve and without a supply."""
-    return not (rig.tables("valve") or rig.tables("supply"))
+    """Whether nobody sends a command to a rig: a chamber without a valve, a supply and a frame."""
+    return not (rig.tables("valve") or rig.tables("supply") or has_frame(rig))
 
 
 def can_shut(rig: Rig, chain: Chain) -> bool:
     """Whether the valves of a chain can hold its air: a 3/2 valve that switches fills or vents."""
     tables = rig.tables("valve")
     closing = ("closed", "either")
-    return chain.regulator is None and all(
+    return bool(chain.valves) and all(
         tables[name]["spool"] != "switching"
         or tables[name]["with_current"] in closing
         or tables[name]["without_current"] in closing
@@ -194,7 +208,12 @@ def driving(commands: Mapping[str, Array]) -> dict[str, Any]:
     """Commands by channel as keywords of :func:`pamrs.simulate`."""
     out: dict[str, Any] = {}
     for channel, values in commands.items():
-        out.setdefault(channel_of(channel), {})[channel.partition(".")[2]] = values
+        keyword, _, block = channel.partition(".")
+        if keyword == "length":
+            out[keyword] = values
+        else:
+            keyword = "pressure" if keyword == "pressure_command" else keyword
+            out.setdefault(keyword, {})[block] = values
     return out
 
 
@@ -279,6 +298,7 @@ def commands_for(
     shut: Mapping[str, Mask] | None = None,
     dither: Array | None = None,
     initial: Mapping[str, float] | None = None,
+    length: Array | None = None,
 ) -> dict[str, Array]:
     """Commands that make the pressures of a rig's chains follow references.
 
@@ -299,6 +319,8 @@ def commands_for(
         Added to every command [V].
     initial : mapping, optional
         As for :func:`pamrs.simulate`.
+    length : (n,) array, optional
+        What a load frame prescribes meanwhile [m]; needed where there is one.
 
     Returns
     -------
@@ -314,8 +336,9 @@ def commands_for(
     )
     valves = {c.name: [_Valve(rig, name, orifice) for name in c.valves] for c in chains}
     slopes = {name: np.gradient(values, sample_time) for name, values in references.items()}
+    every = max(1, round(0.01 / sample_time))
 
-    def update(sample: Mapping[str, float]) -> dict[str, dict[str, float]]:
+    def update(sample: Mapping[str, float]) -> dict[str, Any]:
         k = min(n - 1, round(sample["time"] / sample_time))
         volts: dict[str, float] = {}
         for chain in chains:
@@ -332,14 +355,45 @@ def commands_for(
                 supply = sample[valve.fed] + ambient
                 shaken = 0.0 if dither is None else float(dither[k])
                 volts[name] = valve.answer(flow, pressure + ambient, supply, shaken)
-        return {"valve_command": volts}
+        if length is None:
+            return {"valve_command": volts}
+        return {"valve_command": volts, "length": float(length[min(n - 1, k + every)])}
 
-    simulator = Simulator(rig, sample_time=sample_time, initial=initial or None)
-    every = max(1, round(0.01 / sample_time))
+    start = dict(initial or {}) if length is None else {**(initial or {}), "length": length[0]}
+    simulator = Simulator(rig, sample_time=sample_time, initial=start or None)
     total = (n - 1 + every - 1) // every * every
     found = simulator.control(update, total * sample_time, period=every * sample_time)
     channels = [channel for chain in chains for channel in chain.commands]
     return {channel: np.ascontiguousarray(found[channel][:n]) for channel in channels}
+
+
+def sent_for(
+    rig: Rig, references: Mapping[str, Array], *, length: Array | None = None, **options: Any
+) -> dict[str, Array]:
+    """What is sent to a rig so that the pressures of its chains follow references.
+
+    Parameters
+    ----------
+    rig : Rig
+        A rig with chains.
+    references : mapping of str to (n,) array
+        Gauge pressure [Pa] by the name of each chain.
+    length : (n,) array, optional
+        What its load frame prescribes [m]; needed where there is one.
+    **options
+        As for :func:`commands_for`; of what is set to its pressure they mean nothing.
+
+    Returns
+    -------
+    dict of str to (n,) array
+        By channel: commands of valves [V], pressures that are set [Pa, gauge], the length [m].
+    """
+    chains = [chain for chain in chains_of(rig) if chain.name in references]
+    if chains[0].valves:
+        sent = commands_for(rig, references, length=length, **options)
+    else:
+        sent = {chain.commands[0]: references[chain.name] for chain in chains}
+    return sent if length is None else {**sent, "length": length}
 
 
 def trial_of(
@@ -414,16 +468,46 @@ def _most(
     return [float(p) for p in said]
 
 
-def _top(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) -> float:
-    """Highest pressure that a chain is moved to [Pa, gauge]."""
+def _mapped(rig: Rig, chain: Chain) -> list[float]:
+    """Highest pressures of the force maps of the muscles in the chamber of a chain [Pa, gauge]."""
+    muscles, own = rig.ports("muscle"), qualified("chamber", chain.chamber)
+    return [
+        float(table["map_pressure"][-1])
+        for name, table in rig.tables("muscle").items()
+        if table["model"] == "map" and muscles[name]["chamber"] == own
+    ]
+
+
+def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) -> float:
+    """Highest pressure that a chain is moved to [Pa, gauge].
+
+    Parameters
+    ----------
+    rig : Rig
+        The rig.
+    chain : Chain
+        One of its chains.
+    highest : float or mapping of str to float or None
+        Gauge pressure that is not to be exceeded [Pa], of several chains by their names.
+
+    Raises
+    ------
+    DiagnosisError
+        If nothing says how high a pressure that is set may go.
+    """
     said = _most(rig, chain, highest)
-    if chain.regulator is None:
+    if not said and not chain.valves:
+        said = _mapped(rig, chain)
+    if chain.valves:
         return min(0.8 * _source(rig, chain), *said, math.inf)
     if not said:
+        fed = "fed by a regulator" if chain.regulator is not None else "set to its pressure"
         raise DiagnosisError(
-            f"rig {rig.name!r} is fed by a regulator, and nothing says how high its pressure may "
+            f"rig {rig.name!r} is {fed}, and nothing says how high its pressure may "
             "go: [limits] max_pressure of the rig file, or a recording of the pressure, is needed"
         )
+    if chain.regulator is None:
+        return min(said)
     inlet = _inlets(rig).get(chain.regulator, math.inf)
     return min(*said, 0.8 * inlet)  # a tank falls while it is drawn from
 
@@ -471,7 +555,7 @@ def pressure_range(
             f"rig {rig.name!r} has {there}; the pressures of a rig of one chain were asked for"
         )
     (chain,) = chains
-    top = _top(rig, chain, highest)
+    top = top_of(rig, chain, highest)
     if not chain.moves:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
     ramp = np.linspace(0.0, top, 1501)
@@ -488,12 +572,8 @@ def _played(
     rig: Rig, references: Mapping[str, Array], settings: NextExperimentSettings
 ) -> Simulation:
     """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
-    chains = chains_of(rig)
     try:
-        if chains[0].regulator is not None:
-            commands = {chain.commands[0]: references[chain.name] for chain in chains}
-        else:
-            commands = commands_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
+        commands = sent_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
         return simulate(rig, sample_time=0.01, **driving(commands))
     except SimulationError as error:
         raise DiagnosisError(
@@ -558,7 +638,7 @@ def spans_of(
         while the pressures rise.
     """
     chains, ramp = chains_of(rig), settings.ramp_time
-    tops = {chain.name: _top(rig, chain, highest) for chain in chains}
+    tops = {chain.name: top_of(rig, chain, highest) for chain in chains}
     time = np.asarray(np.arange(round(ramp / 0.01) + 1) * 0.01, dtype=np.float64)
     # vented muscles may push like struts: nobody goes below a tenth
     rising: dict[str, Array] = {name: top * (0.1 + 0.9 * time / ramp) for name, top in tops.items()}

@@ -37,6 +37,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     weights_of,
 )
 from pamrs.diagnosis.next_experiment._experiment import Experiment
+from pamrs.diagnosis.next_experiment._frame import seen_in
 from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
@@ -46,7 +47,7 @@ from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, Ran
 from pamrs.recordings import Recording
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, core_rig
+from pamrs.simulation import Simulation, core_rig, has_frame, reading
 
 __all__ = [
     "Outcome",
@@ -567,7 +568,8 @@ def experiments_of(
         # what has no gauge is moved no higher than what has one
         highest = max(limits.values())
         limits = {chain: limits.get(chain, highest) for chain in seen}
-    return library(rig, settings, sample_time=step, highest=limits or None, only=only)
+    shown = seen_in(rig, records, settings.rate_window) if has_frame(rig) else None
+    return library(rig, settings, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
 _WITHOUT_NAME = {
@@ -624,7 +626,11 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
         channel=channel,
         unit=unit_of(channel),
         time=best.runs[0].time,
-        predicted={label: run[channel] for label, run in zip(labels, best.runs, strict=True)},
+        predicted={
+            label: values
+            for label, run in zip(labels, best.runs, strict=True)
+            if (values := reading(run, channel)) is not None
+        },
         leading=labels[0],
         bin_time=np.asarray(
             (np.arange(prepared.n // width) + 0.5) * width * prepared.dt, dtype=np.float64

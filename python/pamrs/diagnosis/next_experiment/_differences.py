@@ -35,7 +35,7 @@ from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import Simulation, core_rig
+from pamrs.simulation import Simulation, core_rig, has_frame, reading
 
 __all__ = [
     "Left",
@@ -59,7 +59,7 @@ Array = NDArray[np.float64]
 COMMANDS = ("valve_command", "supply_command")
 """Channels that a person sends."""
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
-_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "temperature")
+_MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "force", "temperature")
 """Channels that the cut chain uses."""
 
 
@@ -69,6 +69,7 @@ def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
     return pressures | {
         "joint_angle": settings.angle_noise,
         "length": settings.length_noise,
+        "force": settings.force_noise,
         "temperature": settings.temperature_noise,
     }
 
@@ -87,10 +88,11 @@ def noise_of(
 def measurable(rig: Rig, kind: str = "") -> tuple[str, ...]:
     """Channels of a rig that the cut chain uses, of one kind or of all: ``valve_command.flexor``,
     ``muscle_pressure.flexor``, ``joint_angle.elbow``; the temperature of a gas that has one of its
-    own.
+    own; a load frame has a cell for the force.
     """
     core, warm = core_rig(rig), thermometers_of(rig).values()
-    every = dict.fromkeys((*core.inputs, *core.channels))
+    cell = ("force",) if has_frame(rig) else ()
+    every = dict.fromkeys((*core.inputs, *core.channels, *cell))
     has = [name for name in every if channel_of(name) != "temperature" or name in warm]
     kinds = (kind,) if kind else _MEASURABLE
     return tuple(name for one in kinds for name in has if channel_of(name) == one)
@@ -149,8 +151,8 @@ def taken(
     rng : numpy.random.Generator, optional
         Adds that noise; none by default.
     """
-    names = [c for c in measurable(rig) if c in run and (channel_of(c) in COMMANDS or c in noise)]
-    channels = {c: np.asarray(run[c], dtype=np.float64) for c in names}
+    names = [c for c in measurable(rig) if channel_of(c) in COMMANDS or c in noise]
+    channels = {c: v for c in names if (v := reading(run, c)) is not None}
     if rng is not None:
         channels = {
             c: v + rng.normal(0.0, noise[c], v.size) if c in noise else v

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,22 +13,45 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.next_experiment._chains import driving
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import Simulation, simulate
+from pamrs.simulation import Simulation, has_frame, simulate
 
 __all__ = [
+    "BAR",
+    "MM",
     "Experiment",
     "Points",
     "in_bar",
+    "in_mm",
+    "limited",
+    "listed",
     "nested_triangles",
     "of_commands",
     "other_payload",
     "then",
     "through",
+    "waves",
     "within",
 ]
 
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class Said:
+    """How a quantity is said: its unit, the factor from SI, and digits behind the point."""
+
+    unit: str
+    factor: float
+    digits: int
+
+    def __call__(self, value: float) -> float:
+        """A value in SI as it is said."""
+        return round(value * self.factor, self.digits)
+
+
+BAR = Said("bar", 1e-5, 2)
+MM = Said("mm", 1e3, 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,8 +68,8 @@ class Experiment:
     excitation : dict
         The same for a program: ``kind`` and numbers with their unit in the name.
     command : (n,) array or None
-        Valve command [V], or set pressure of a regulator [Pa, gauge]; None for a chamber without
-        either.
+        Valve command [V], or pressure that a regulator or a bench is set to [Pa, gauge]; None for a
+        chamber that nobody sends a command to.
     rows : int
         Number of samples.
     sample_time : float
@@ -62,7 +85,8 @@ class Experiment:
     needs : str
         What it takes that the rig file does not say to be there, in words; empty for nothing.
     also : dict of str to (n,) array
-        Further commands by their channels, as ``command``.
+        Further commands by their channels, as ``command``, and the length that a frame prescribes
+        [m].
     """
 
     name: str
@@ -111,6 +135,36 @@ class Experiment:
         )
 
 
+def limited(values: Array, most: float) -> Array:
+    """A signal (n,) that follows another one, from one sample to the next by no more than so
+    much.
+    """
+    if values.size < 2 or float(np.abs(np.diff(values)).max()) <= most * (1.0 + 1e-9):
+        return values
+    out = np.empty_like(values)
+    now = out[0] = values[0]
+    for k, wanted in enumerate(values[1:], 1):
+        now = out[k] = min(max(wanted, now - most), now + most)
+    return out
+
+
+def waves(frequencies: Array, time: Array, turned: float) -> Array:
+    """A sum of sines (n,) that grow smaller above 0.6 Hz, their phases by Schroeder's rule and
+    turned by an angle [rad], so that its peaks are low.
+    """
+    count = frequencies.size
+    size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
+    phase = -np.pi * np.arange(count) * np.arange(1, count + 1) / count + turned
+    each = np.sin(2 * np.pi * frequencies[:, None] * time + phase[:, None])
+    return np.asarray((size[:, None] * each).sum(axis=0))
+
+
+def listed(words: Sequence[str]) -> str:
+    """``a``, ``a and b``, ``a, b and c``."""
+    *first, last = words
+    return f"{', '.join(first)} and {last}" if first else last
+
+
 def through(points: Points, sample_time: float) -> Array:
     """Straight lines through (time, value) points."""
     end = points[-1][0]
@@ -130,13 +184,20 @@ def then(points: Points, *legs: tuple[float, float]) -> Points:
 
 def in_bar(pressure: float) -> float:
     """A pressure as it is said [bar]."""
-    return round(pressure * 1e-5, 2)
+    return BAR(pressure)
+
+
+def in_mm(length: float) -> float:
+    """A length as it is said [mm]."""
+    return MM(length)
 
 
 def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     """Another payload that a person may hang on: the parameter, its value [kg], and what it takes
     that the rig file does not list; None where there is none.
     """
+    if has_frame(rig):
+        return None
     if rig.tables("load"):
         name = "load.mass"
     elif rig.tables("link"):
@@ -152,12 +213,18 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     return name, other, "" if others else f"another payload, about {other:.3g} kg"
 
 
-def nested_triangles(low: float, high: float, what: str) -> tuple[Points, str, dict[str, Any]]:
-    """Triangles of three sizes around the middle of a range of pressures [Pa], slow and then fast:
-    corners, words and numbers.
+def nested_triangles(
+    low: float,
+    high: float,
+    what: str,
+    said: Said = BAR,
+    periods: tuple[float, float] = (12.0, 1.2),
+) -> tuple[Points, str, dict[str, Any]]:
+    """Triangles of three sizes around the middle of a range of pressures [Pa] or lengths [m], slow
+    and then fast: corners, words and numbers.
     """
     middle, reach = low + 0.5 * (high - low), 0.45 * (high - low)
-    sizes, periods = (1.0, 0.6, 0.3), (12.0, 1.2)
+    sizes = (1.0, 0.6, 0.3)
     points: Points = then([(0.0, 0.0)], (2.0, middle))
     for period in periods:
         for share in sizes:
@@ -167,15 +234,15 @@ def nested_triangles(low: float, high: float, what: str) -> tuple[Points, str, d
                 (0.5 * period, middle - share * reach),
                 (0.25 * period, middle),
             )
-    reaches = [in_bar(share * reach) for share in sizes]
+    reaches, unit = [said(share * reach) for share in sizes], said.unit
     text = (
-        f"drive {what} in nested triangles around {in_bar(middle):g} bar, of "
-        f"±{reaches[0]:g}, ±{reaches[1]:g} and ±{reaches[2]:g} bar, "
-        "first with a period of 12 s, then of 1.2 s"
+        f"drive {what} in nested triangles around {said(middle):g} {unit}, of "
+        f"±{reaches[0]:g}, ±{reaches[1]:g} and ±{reaches[2]:g} {unit}, "
+        f"first with a period of {periods[0]:g} s, then of {periods[1]:g} s"
     )
     numbers = {
-        "middle_bar": in_bar(middle),
-        "reach_bar": reaches,
+        f"middle_{unit}": said(middle),
+        f"reach_{unit}": reaches,
         "periods_s": list(periods),
     }
     return points, text, numbers

@@ -54,7 +54,7 @@ from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationErr
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-from pamrs.simulation import core_rig, has_frame
+from pamrs.simulation import core_rig
 
 __all__ = ["plan_diagnosis"]
 
@@ -69,6 +69,7 @@ BASIC = (
     "hold_low",
     "hold_high",
     "blow_over",
+    "slow_strokes",
 )
 """Kinds of experiments that a plan assumes by default, those of them that the rig can do."""
 _LUMPED = {
@@ -152,18 +153,18 @@ def plan_diagnosis(
     ----------
     rig : Rig
         Nominal model, one that can be diagnosed: with valves or regulators, one chain or several,
-        whole or a part; not one whose load is a frame.
+        whole or a part.
     channels : iterable of str
         Channels at hand, of ``valve_command``, ``supply_command``, ``supply_pressure``,
         ``line_pressure`` (of a line with an inlet), ``muscle_pressure`` and ``joint_angle`` or
-        ``length``; of a rig with several blocks by their names (``muscle_pressure.flexor``), or
-        without a name for all of a kind.
+        ``length``, on a load frame ``force``; of a rig with several blocks by their names
+        (``muscle_pressure.flexor``), or without a name for all of a kind.
     noise : mapping of str to float, optional
         Sample noise by channel, or by kind of channel [SI]; that of typical transducers by default
         (``next_experiment`` of the settings).
     experiments : sequence of str, optional
         Names or kinds of the experiments that will be made; multisine, sealed holds, slow triangle
-        and steps by default.
+        and steps by default, and slow strokes of a frame.
     settings : DiagnosisSettings, optional
         From where on an effect counts as seen, and two as apart; the published ones by default.
     progress : callable, optional
@@ -310,9 +311,6 @@ def _check_rig(rig: Rig) -> None:
     reasons = {
         f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects"
         if rig.effects
-        else "",
-        "its load is a frame; a mass, [joint] and [arm], or no muscle can be planned"
-        if has_frame(rig)
         else "",
     } - {""}
     if reasons:

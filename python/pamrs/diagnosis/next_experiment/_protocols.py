@@ -21,7 +21,6 @@ from pamrs.diagnosis.next_experiment._chains import (
     Range,
     can_shut,
     chains_of,
-    commands_for,
     joined,
     pressure_range,
     trial_of,
@@ -31,13 +30,16 @@ from pamrs.diagnosis.next_experiment._experiment import (
     Points,
     in_bar,
     nested_triangles,
-    of_commands,
     other_payload,
     then,
     through,
+    waves,
     within,
 )
+from pamrs.diagnosis.next_experiment._frame import Seen, frame_of
 from pamrs.diagnosis.next_experiment._several import several_library
+from pamrs.diagnosis.next_experiment._stand import Stand
+from pamrs.diagnosis.next_experiment._strokes import stroke_library
 from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
@@ -55,47 +57,22 @@ _SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
 class _Maker:
     """Builds the experiments of one rig."""
 
-    def __init__(
-        self, rig: Rig, sample_time: float, span: Range, settings: NextExperimentSettings
-    ) -> None:
-        self.rig, self.dt, self.span = rig, sample_time, span
+    def __init__(self, stand: Stand, span: Range, settings: NextExperimentSettings) -> None:
+        self.stand, self.rig, self.dt, self.span = stand, stand.rig, stand.sample_time, span
         self.bandwidth, self.frequencies = settings.bandwidth, settings.multisine_frequencies
-        (self.chain,) = chains_of(rig)
-        self.regulated = self.chain.regulator is not None
-        self.what = "the regulator's set pressure" if self.regulated else "the muscle pressure"
+        (self.chain,) = stand.chains
+        regulated = stand.regulated
+        self.what = "the regulator's set pressure" if regulated else "the muscle pressure"
         self.valves = "the valves" if len(self.chain.valves) > 1 else "the valve"
 
     def driven(
         self, name: str, text: str, excitation: dict[str, Any], reference: Array, **options: Any
     ) -> Experiment:
-        changes, initial = options.pop("changes", {}), options.pop("initial", {})
-        extra, bandwidth = options.pop("extra", 0.0), options.pop("bandwidth", self.bandwidth)
-        needs = options.pop("needs", "")
-        rig = self.rig.with_parameters(changes) if changes else self.rig
-        if self.regulated:
-            sent = {self.chain.commands[0]: np.clip(reference, 0.0, self.span.high)}
-        else:
-            shut = {"": options.pop("shut")} if "shut" in options else None
-            sent = commands_for(
-                rig,
-                {"": reference},
-                sample_time=self.dt,
-                bandwidth=bandwidth,
-                shut=shut,
-                initial=initial,
-                **options,
-            )
-        return of_commands(
-            name,
-            text,
-            excitation,
-            sent,
-            self.dt,
-            initial=initial,
-            changes=changes,
-            extra=extra,
-            needs=needs,
-        )
+        if self.stand.regulated:
+            reference = np.clip(reference, None, self.span.high)
+        if "shut" in options:
+            options["shut"] = {"": options["shut"]}
+        return self.stand.driven(name, text, excitation, {"": reference}, **options)
 
     def levels(self, *shares: float) -> tuple[list[float], str]:
         pressures = [self.span.at(s) for s in shares]
@@ -105,6 +82,7 @@ class _Maker:
 
     def triangle(self, name: str, period: float, cycles: int, **options: Any) -> Experiment:
         low, high = self.span.at(0.05), self.span.at(0.95)
+        period = self.stand.period(period, high - low)
         points: Points = then([(0.0, 0.0)], (2.0, low))
         for _ in range(cycles):
             points = then(points, (0.5 * period, high), (0.5 * period, low))
@@ -186,18 +164,8 @@ class _Maker:
 
     def multisine(self) -> Experiment:
         frequencies = list(self.frequencies)
-        time = np.arange(round(30.0 / self.dt) + 1) * self.dt
-        size = 1.0 / np.sqrt(1.0 + (np.array(frequencies) / 0.6) ** 2)
-        phase = (
-            -np.pi
-            * np.arange(len(frequencies))
-            * np.arange(1, len(frequencies) + 1)
-            / len(frequencies)
-        )
-        wave = (
-            size[:, None]
-            * np.sin(2 * np.pi * np.array(frequencies)[:, None] * time + phase[:, None])
-        ).sum(axis=0)
+        time = np.asarray(np.arange(round(30.0 / self.dt) + 1) * self.dt, dtype=np.float64)
+        wave = waves(np.array(frequencies), time, 0.0)
         wave *= 0.4 / np.abs(wave).max()
         reference = np.clip(time / 3.0, 0.0, 1.0) * (
             self.span.at(0.5) + wave * (self.span.high - self.span.low)
@@ -257,7 +225,9 @@ class _Maker:
         return self.driven("step_and_shut", text, excitation, reference, shut=shut, bandwidth=30.0)
 
     def nested(self) -> Experiment:
-        points, text, numbers = nested_triangles(self.span.low, self.span.high, self.what)
+        low, high = self.span.low, self.span.high
+        quick = self.stand.period(1.2, 0.9 * (high - low))
+        points, text, numbers = nested_triangles(low, high, self.what, periods=(12.0, quick))
         return self.driven("nested_triangles", text, numbers, through(points, self.dt))
 
     def null_ramp(self) -> Experiment:
@@ -428,6 +398,7 @@ def library(
     *,
     sample_time: float | None = None,
     highest: float | Mapping[str, float] | None = None,
+    seen: Seen | None = None,
     only: Collection[str] | None = None,
 ) -> list[Experiment]:
     """The standard experiments that a rig can do.
@@ -435,14 +406,16 @@ def library(
     Parameters
     ----------
     rig : Rig
-        A rig with valves or regulators, with or without arms or a hanging load; or chambers that
-        nobody sends a command to.
+        A rig with valves or regulators, with or without arms or a load; a load frame that sets the
+        pressures itself; or chambers that nobody sends a command to.
     settings : NextExperimentSettings
         Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
         Time between samples [s].
     highest : float or mapping of str to float, optional
         Gauge pressure that is not to be exceeded [Pa], of several chains by their names.
+    seen : Seen, optional
+        What recordings showed a load frame to do; what a plain machine can by default.
     only : collection of str, optional
         Names or kinds of those to make; all by default.
 
@@ -454,16 +427,11 @@ def library(
     Raises
     ------
     DiagnosisError
-        If no experiment is made for such a rig, nothing says how high a regulator may be set, or
-        the model of the rig does not hold while its pressures rise.
+        If no experiment is made for such a rig, nothing says how high a pressure may be set, or the
+        model of the rig does not hold while its pressures rise.
     ParameterError
         If ``highest`` has a name that is none of a chain.
     """
-    if has_frame(rig):
-        raise DiagnosisError(
-            f"the load of rig {rig.name!r} is a frame; experiments are made for a mass, [joint] "
-            "and [arm], or no muscle"
-        )
     chains = chains_of(rig)
     if not chains and (rig.tables("supply") or rig.tables("muscle") or rig.tables("valve")):
         raise DiagnosisError(
@@ -484,13 +452,18 @@ def library(
         span = pressure_range(rig, settings, highest=highest)
         sealed = _sealed_library(rig, settings, span)
         return [e for e in sealed if only is None or e.name in only or e.kind in only]
-    if len(chains) == 1:
-        span = pressure_range(rig, settings, highest=highest)
-        makers = _of_one(_Maker(rig, step, span, settings))
-    else:
+    frame = frame_of(rig, settings, highest, seen) if has_frame(rig) else None
+    stand = Stand(rig, chains, step, settings.bandwidth, frame)
+    if len(chains) > 1:
         if not isinstance(highest, Mapping):
             highest = {} if highest is None else {c.name: highest for c in chains}
-        makers = several_library(rig, chains, settings, step, highest)
+        makers = several_library(stand, settings, highest)
+    elif frame is not None:
+        makers = _of_one(_Maker(stand, frame.spans.alone[""], settings))
+    else:
+        span = pressure_range(rig, settings, highest=highest)
+        makers = _of_one(_Maker(stand, span, settings))
+    makers |= stroke_library(stand, settings)
     out = []
     for name, maker in makers.items():
         if only is not None and name not in only and name.partition(".")[0] not in only:

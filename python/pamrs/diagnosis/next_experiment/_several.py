@@ -20,22 +20,22 @@ from pamrs.diagnosis.next_experiment._chains import (
     Range,
     Spans,
     can_shut,
-    commands_for,
     spans_of,
 )
 from pamrs.diagnosis.next_experiment._experiment import (
     Experiment,
     Points,
     in_bar,
+    listed,
     nested_triangles,
-    of_commands,
     other_payload,
     then,
     through,
+    waves,
     within,
 )
+from pamrs.diagnosis.next_experiment._stand import Stand
 from pamrs.diagnosis.settings import NextExperimentSettings
-from pamrs.rig import Rig
 
 __all__ = ["several_library"]
 
@@ -43,28 +43,20 @@ Array = NDArray[np.float64]
 
 
 def several_library(
-    rig: Rig,
-    chains: Sequence[Chain],
-    settings: NextExperimentSettings,
-    sample_time: float,
-    highest: Mapping[str, float],
+    stand: Stand, settings: NextExperimentSettings, highest: Mapping[str, float]
 ) -> dict[str, Callable[[], Experiment | None]]:
     """What makes each experiment of a rig of several chains, by its name.
 
     Parameters
     ----------
-    rig : Rig
-        The rig.
-    chains : sequence of Chain
-        All of its chains.
+    stand : Stand
+        The rig with all of its chains.
     settings : NextExperimentSettings
-        Bandwidth of the loops.
-    sample_time : float
-        Time between samples [s].
+        How pressures are found, and frequencies.
     highest : mapping of str to float
         Gauge pressures by chain that are not to be exceeded [Pa].
     """
-    make = _Several(rig, chains, settings, sample_time, highest)
+    make, rig, chains = _Several(stand, settings, highest), stand.rig, stand.chains
     all_shut = all(can_shut(rig, chain) for chain in chains)
     makers: dict[str, Callable[[], Experiment | None]] = {"multisine": make.multisine}
     if all_shut:
@@ -89,52 +81,19 @@ class _Several:
     """Builds the experiments of one rig of several chains."""
 
     def __init__(
-        self,
-        rig: Rig,
-        chains: Sequence[Chain],
-        settings: NextExperimentSettings,
-        sample_time: float,
-        highest: Mapping[str, float],
+        self, stand: Stand, settings: NextExperimentSettings, highest: Mapping[str, float]
     ) -> None:
-        self.rig, self.chains, self.dt = rig, list(chains), sample_time
-        self.bandwidth, self.settings = settings.bandwidth, settings
-        self.highest = highest
-        self.regulated = chains[0].regulator is not None
-        self.what = "set pressure" if self.regulated else "pressure"
+        self.stand, self.driven = stand, stand.driven
+        self.rig, self.chains, self.dt = stand.rig, stand.chains, stand.sample_time
+        self.settings, self.highest = settings, highest
+        self.what = "set pressure" if stand.regulated else "pressure"
 
     @cached_property
     def spans(self) -> Spans:
         """Between which pressures the chains move; found with the first experiment."""
+        if self.stand.frame is not None:
+            return self.stand.frame.spans
         return spans_of(self.rig, self.settings, highest=self.highest)
-
-    def driven(
-        self,
-        name: str,
-        text: str,
-        excitation: dict[str, Any],
-        references: Mapping[str, Array],
-        *,
-        shut: Mapping[str, NDArray[np.bool_]] | None = None,
-        bandwidth: float | None = None,
-        changes: dict[str, float] | None = None,
-        extra: float = 0.0,
-        needs: str = "",
-    ) -> Experiment:
-        """An experiment whose pressures follow references, by the name of each chain."""
-        rig = self.rig.with_parameters(changes) if changes else self.rig
-        if self.regulated:
-            sent = {c.commands[0]: np.clip(references[c.name], 0.0, None) for c in self.chains}
-        else:
-            sent = commands_for(
-                rig,
-                references,
-                sample_time=self.dt,
-                bandwidth=self.bandwidth if bandwidth is None else bandwidth,
-                shut=shut,
-            )
-        return of_commands(
-            name, text, excitation, sent, self.dt, changes=changes, extra=extra, needs=needs
-        )
 
     def alone(
         self,
@@ -160,8 +119,8 @@ class _Several:
             }
         others = [c for c in self.chains if c is not chain]
         levels = [f"{in_bar(self.spans.held[c.name]):g} bar" for c in others]
-        held = _listed(levels if len(set(levels)) > 1 else levels[:1])
-        text = f"{text}, and hold {_listed([c.name for c in others])} at {held}"
+        held = listed(levels if len(set(levels)) > 1 else levels[:1])
+        text = f"{text}, and hold {listed([c.name for c in others])} at {held}"
         excitation = {
             "moved": chain.name,
             **excitation,
@@ -200,22 +159,18 @@ class _Several:
     def levels(self) -> tuple[str, dict[str, Any]]:
         """Between which pressures all chains move, in words and numbers."""
         spans = {c.name: self.reach(c) for c in self.chains}
-        words = _listed(
+        words = listed(
             [f"{n} between {in_bar(s.low):g} and {in_bar(s.high):g} bar" for n, s in spans.items()]
         )
         return words, {"levels_bar": {n: [in_bar(s.low), in_bar(s.high)] for n, s in spans.items()}}
 
     def multisine(self) -> Experiment:
-        time = np.arange(round(30.0 / self.dt) + 1) * self.dt
+        time = np.asarray(np.arange(round(30.0 / self.dt) + 1) * self.dt, dtype=np.float64)
         usual, ratio = self.settings.multisine_frequencies, self.settings.frequency_ratio
         references, used = {}, {}
         for k, chain in enumerate(self.chains):
             frequencies = np.array(usual) * ratio ** (k / len(self.chains))
-            count = frequencies.size
-            size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
-            phase = -np.pi * np.arange(count) * np.arange(1, count + 1) / count + 2.0 * k
-            waves = np.sin(2 * np.pi * frequencies[:, None] * time + phase[:, None])
-            wave = (size[:, None] * waves).sum(axis=0)
+            wave = waves(frequencies, time, 2.0 * k)
             span, begin = self.reach(chain), chain.before(self.rig)
             moved = span.at(0.5) + 0.5 * wave / np.abs(wave).max() * (span.high - span.low)
             faded = np.clip(time / 3.0, 0.0, 1.0)
@@ -270,8 +225,9 @@ class _Several:
         return words, {"levels_bar": levels}
 
     def triangle(self, chain: Chain) -> Experiment:
-        span, period = self.spans.alone[chain.name], 15.0
+        span = self.spans.alone[chain.name]
         low, high = span.at(0.05), span.at(0.95)
+        period = self.stand.period(15.0, high - low)
         points: Points = then([(0.0, 0.0)], (2.0, low))
         for _ in range(2):
             points = then(points, (0.5 * period, high), (0.5 * period, low))
@@ -306,7 +262,10 @@ class _Several:
 
     def nested(self, chain: Chain) -> Experiment:
         span = self.spans.alone[chain.name]
-        points, text, numbers = nested_triangles(span.low, span.high, self.told(chain))
+        quick = self.stand.period(1.2, 0.9 * (span.high - span.low))
+        points, text, numbers = nested_triangles(
+            span.low, span.high, self.told(chain), periods=(12.0, quick)
+        )
         return self.alone(chain, "nested_triangles", points, text, numbers)
 
     def staircase(self) -> Experiment:
@@ -340,12 +299,14 @@ class _Several:
 
     def fast(self) -> Experiment:
         words, numbers = self.levels()
+        rise = max(span.high - span.low for span in map(self.reach, self.chains))
+        period = self.stand.period(1.5, rise)
         text = (
-            f"drive every {self.what} as a triangle with a period of 1.5 s, one after the other by "
-            f"1/{len(self.chains)} of it: {words}, 10 cycles"
+            f"drive every {self.what} as a triangle with a period of {period:g} s, one after the "
+            f"other by 1/{len(self.chains)} of it: {words}, 10 cycles"
         )
-        also = {**numbers, "period_s": 1.5, "cycles": 10}
-        return self.together("fast_triangle", self._against(1.5, 10), text, also)
+        also = {**numbers, "period_s": period, "cycles": 10}
+        return self.together("fast_triangle", self._against(period, 10), text, also)
 
     def payload(self) -> Experiment | None:
         found = other_payload(self.rig)
@@ -391,9 +352,3 @@ def _turned(shares: Sequence[float], k: int) -> Sequence[float]:
     at = (k // 2) % len(shares)
     turned = [*shares[at:], *shares[:at]]
     return [1.0 - share for share in turned] if k % 2 else turned
-
-
-def _listed(names: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last

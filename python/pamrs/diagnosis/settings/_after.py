@@ -118,6 +118,76 @@ class NextExperimentSettings(SettingsGroup):
         reason="the same of the temperature of a gas",
         origin="data sheet of a usual thermocouple amplifier",
     )
+    force_noise: float = setting(
+        1.0,
+        unit="N",
+        above=0.0,
+        reason="the same of a force",
+        origin="data sheet of a usual load cell of 2 to 5 kN: 0.02 to 0.05 % of its range",
+    )
+    length_rate: float = setting(
+        1.0 / 60.0,
+        unit="m/s",
+        above=0.0,
+        reason="fastest change of the length on a load frame of which no recording shows a faster",
+        origin="data sheets of electromechanical testing machines: 500 to 3000 mm/min",
+    )
+    pressure_rate: float = setting(
+        2e5,
+        unit="Pa/s",
+        above=0.0,
+        reason="fastest change of a pressure that a bench sets, of which no recording shows a "
+        "faster",
+        origin="judgement: a proportional regulator of 100 l/min fills 0.3 l by 5 bar/s",
+    )
+    rate_window: float = setting(
+        0.3,
+        unit="s",
+        above=0.0,
+        reason="time over which a rate of a recording is counted",
+        origin="judgement: over it the noise of a length is a tenth of a mm/s",
+    )
+    least_stroke: float = setting(
+        0.1,
+        unit="1",
+        above=0.0,
+        most=0.5,
+        reason="stroke of a load frame whose recordings hold the length, as a share of the "
+        "muscle's length at rest",
+        origin="judgement: well beyond the sliding before friction, well inside what muscles do",
+    )
+    worth_stroke: float = setting(
+        0.01,
+        unit="1",
+        above=0.0,
+        reason="least stroke of a load frame that is worth moving, as a share of the length",
+        origin="judgement: a few times the sliding before friction",
+    )
+    pulling_share: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        most=0.5,
+        reason="share of what a muscle pulls at its longest, or at its highest pressure, from "
+        "which it is taken to pull: at less it may be slack",
+        origin="judgement",
+    )
+    held_share: float = setting(
+        0.7,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="where between its shortest and its longest length a load frame holds a muscle "
+        "while pressures are moved",
+        origin="judgement: near the longer end, where muscles pull from low pressures on",
+    )
+    filling_time: float = setting(
+        3.0,
+        unit="s",
+        above=0.0,
+        reason="time in which a muscle is filled and rests before a load frame moves",
+        origin="judgement: a third of it to fill",
+    )
     sample_time: float = setting(
         0.005,
         unit="s",
