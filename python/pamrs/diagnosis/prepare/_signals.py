@@ -248,7 +248,7 @@ def filter_length(dt: float, settings: PrepareSettings) -> int:
 
 def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings) -> Lengths:
     """Samples over which each sample of a channel can be smoothed: the longest filter to which a
-    cubic fits but for the noise, 1 where none does.
+    cubic fits but for the noise, 1 where none does; all of them where the channel stands still.
 
     A pressure has a corner where a valve or a regulator switches, and a filter over the corner
     makes it a bow. What a cubic misses is compared with the noise, or with what it misses at most
@@ -270,6 +270,8 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     (n,) array of int
     """
     shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
+    if _stands_still(values, noise, length, settings):
+        return np.full(values.size, values.size, dtype=np.intp)
     found = np.ones(values.size, dtype=np.intp)
     for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
         basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
@@ -281,8 +283,23 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     return found
 
 
+def _stands_still(values: Array, noise: float, length: int, settings: PrepareSettings) -> bool:
+    """Whether means of a channel over so many samples differ by no more than its noise makes them.
+
+    What is held is its mean: its noise would drive a model, and an effect that makes the model
+    answer less to what is driven would seem to be in the data.
+    """
+    pieces = values[: values.size // length * length].reshape(-1, length)
+    if len(pieces) < 2:
+        return False
+    means = pieces.mean(axis=1)
+    spread = float(np.sum((means - means.mean()) ** 2)) * length
+    return spread <= noise**2 * float(chi2.isf(settings.smoothing_odds, len(means) - 1))
+
+
 def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
-    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative.
+    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative; the mean
+    of one that stands still.
 
     Parameters
     ----------
@@ -291,12 +308,15 @@ def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
     dt : float
         Sample time [s].
     lengths : (n,) array of int
-        Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is.
+        Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is, all
+        samples for the mean.
 
     Returns
     -------
     value, slope : (n,) arrays
     """
+    if (lengths == values.size).all():
+        return np.full(values.size, values.mean()), np.zeros(values.size)
     value, slope = values.copy(), np.gradient(values, dt)
     for count in np.unique(lengths[lengths > 1]):
         rows = lengths == count
