@@ -146,7 +146,7 @@ class Rig:
         measured: dict[str, _Signal],
         samples: int,
         outlets: dict[str, float] | None = None,
-        anchors: list[int] = [],
+        anchors: list[int] = ...,
     ) -> tuple[_Array, _Array | None]: ...
     def closure_terms(
         self,

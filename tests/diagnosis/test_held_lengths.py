@@ -1,4 +1,4 @@
-"""A channel that stands still is its mean: noise of a held length drives no model."""
+"""A channel that is held or drifts is one cubic: noise of a held length drives no model."""
 
 from __future__ import annotations
 
@@ -17,32 +17,33 @@ LAYOUT = Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml
 SETTINGS = DiagnosisSettings().prepare
 
 
-def test_a_held_channel_is_its_mean_and_its_slope_is_zero() -> None:
-    held = 0.25 + NOISE * np.random.default_rng(1).normal(size=3000)
-    value, slope = smoothed(held, DT, lengths_of(held, NOISE, DT, SETTINGS))
-    assert value == pytest.approx(np.full(3000, held.mean()), rel=1e-12)
-    assert not slope.any()
+@pytest.mark.parametrize("drift", [0.0, 1.0, 20.0])
+def test_a_held_channel_or_one_that_drifts_is_one_cubic(drift: float) -> None:
+    true = 0.25 + drift * NOISE * np.linspace(0.0, 1.0, 3000)
+    noisy = true + NOISE * np.random.default_rng(1).normal(size=3000)
+    value, slope = smoothed(noisy, DT, lengths_of(noisy, NOISE, DT, SETTINGS))
+    assert np.abs(value - true).max() < 0.15 * NOISE
+    assert slope == pytest.approx(np.gradient(value, DT), abs=1e-3 * NOISE)
 
 
 @pytest.mark.parametrize("moved", [1.0, 3.0])
-def test_a_channel_that_moves_by_some_of_its_noise_is_not_held(moved: float) -> None:
-    time = DT * np.arange(3000)
-    sine = moved * NOISE * np.sin(2.0 * np.pi * 0.1 * time)
+@pytest.mark.parametrize("frequency", [0.1, 1.5, 7.0, 13.0])
+def test_a_channel_that_moves_by_some_of_its_noise_is_no_cubic(
+    moved: float, frequency: float
+) -> None:
+    sine = moved * NOISE * np.sin(2.0 * np.pi * frequency * DT * np.arange(3000))
     noisy = sine + NOISE * np.random.default_rng(2).normal(size=3000)
-    value, _ = smoothed(noisy, DT, lengths_of(noisy, NOISE, DT, SETTINGS))
-    assert np.std(value - sine) < 0.6 * NOISE
-    assert np.std(value) > 0.5 * np.std(sine)
+    assert lengths_of(noisy, NOISE, DT, SETTINGS).any()
 
 
-def test_drift_of_a_tenth_of_the_noise_is_seen() -> None:
-    drift = np.linspace(0.0, 0.5, 12000) * NOISE
-    noisy = drift + NOISE * np.random.default_rng(3).normal(size=12000)
-    value, _ = smoothed(noisy, DT, lengths_of(noisy, NOISE, DT, SETTINGS))
-    assert np.ptp(value) > 0.0
+def test_a_short_move_in_a_long_recording_is_seen() -> None:
+    noisy = NOISE * np.random.default_rng(3).normal(size=60000)
+    noisy[30000:30050] += 3.0 * NOISE
+    assert lengths_of(noisy, NOISE, DT, SETTINGS).any()
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "drift"), [(1, 0.0), (2, 0.0), (1, 1.0), (2, 1.0)])
+def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: float) -> None:
     rig = pamrs.load_rig(LAYOUT)
     rest = rig.parameter("muscle.rest_length").value
     rng = np.random.default_rng(seed)
@@ -50,7 +51,7 @@ def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int) -> None:
     recordings = []
     for k, (share, frequency) in enumerate([(0.95, 0.1), (0.90, 0.17), (0.85, 0.24)]):
         pressure = 3e5 - 1.6e5 * np.cos(2.0 * np.pi * frequency * time)
-        length = np.full(time.size, share * rest)
+        length = share * rest + drift * NOISE * time / time[-1]
         run = pamrs.simulate(rig, length=length, pressure=pressure, sample_time=DT)
         clean = {"muscle_pressure": pressure, "length": length, "force": run["muscle_force"]}
         sizes = {"muscle_pressure": 400.0, "length": NOISE, "force": 1.0}

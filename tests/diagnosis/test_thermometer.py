@@ -261,3 +261,51 @@ def test_a_thermometer_adds_its_block_and_changes_no_other() -> None:
     assert set(own.drives) == {"valve_command", "supply_pressure", "muscle_pressure"}
     assert own.anchor == plain["chamber"].window
     assert own.window is None
+
+
+@pytest.mark.parametrize("every", [5, 25])
+@pytest.mark.parametrize("holds", [True, False])
+def test_a_thermometer_slower_than_the_log_is_left_alone(every: int, holds: bool) -> None:
+    rig = parse_rig(TANK)
+    slow = []
+    for recording in blown(rig):
+        read, time = recording.channels["temperature"], recording.time
+        line = np.interp(time, time[::every], read[::every])
+        step = np.repeat(read[::every], every)[: read.size]
+        channels = {**recording.channels, "temperature": step if holds else line}
+        slow.append(replace(recording, channels=channels))
+    found = found_in(rig, slow)
+    assert found.verdict == "none"
+    assert any("temperature is not judged: in 'r0' one sample in" in w for w in found.warnings)
+
+
+def test_a_dead_thermometer_stops_no_diagnosis() -> None:
+    rig = parse_rig(TANK)
+    first, *others = blown(rig)
+    mask = {**first.mask, "temperature": np.zeros(len(first), dtype=bool)}
+    found = found_in(rig, [replace(first, mask=mask), *others])
+    assert found.verdict == "none"
+    assert any("in 'r0' only 0 of 501 samples are usable" in w for w in found.warnings)
+
+
+@pytest.mark.parametrize(
+    "name", ["room_air_temp", "ambient_air_temperature", "muscle_temperature", "air"]
+)
+def test_no_temperature_of_the_room_or_the_rubber_is_that_of_the_gas(
+    tmp_path: Path, name: str
+) -> None:
+    wave, log = np.sin(0.1 * np.arange(100)), tmp_path / "log.csv"
+    columns = {"time [s]": 0.1 * np.arange(100), "p chamber [bar]": 4.0 + wave}
+    other = {f"{name} [degC]": 21.0 + 0.1 * wave}
+    for more, told in (({"T_gas [degC]": 20.0 + wave}, "T_gas"), ({}, None)):
+        every = columns | more | other
+        rows = np.column_stack(list(every.values()))
+        np.savetxt(log, rows, delimiter=",", header=",".join(every), comments="")
+        found = propose([log], parse_rig(TANK)).logs[0].matches
+        assert {m.channel: m.series.name for m in found}.get("temperature") == told
+
+
+def test_a_rig_that_states_the_lag_of_its_thermometer_can_be_planned() -> None:
+    rig = parse_rig(TANK).with_effect("thermometer_lag", {"time_constant": 0.4})
+    plan = pamrs.plan_diagnosis(rig, ["muscle_pressure", "temperature"])
+    assert "thermometer_lag" not in {sight.effect for sight in plan.sights}

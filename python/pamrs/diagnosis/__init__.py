@@ -41,6 +41,7 @@ from pamrs.diagnosis.prepare import (
     suspected_units,
     without_copies,
     without_impossible,
+    without_poor_thermometers,
 )
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -219,7 +220,8 @@ def diagnose(
     sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
     case = replace(case, recordings=sound)
     kept, copies = without_copies(case.recordings, chosen.overlap)
-    case = replace(case, recordings=kept)
+    sound, unread = without_poor_thermometers(kept, case.rig, chosen.prepare)
+    case, held = replace(case, recordings=sound), [*unread, *held]
     seen = available_blocks(case.rig, case.channels, chosen.prepare)
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
     case = replace(case, recordings=shortened)

@@ -42,7 +42,7 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
         (
             "temperature",
             "temperature temp temperatur thermo tc tgas tair ttank tchamber",
-            "gas air luft chamber kammer tank muscle muskel tgas tair ttank tchamber",
+            "gas chamber kammer tank tgas tair ttank tchamber",
         ),
         (
             "ambient_temperature",
@@ -205,6 +205,9 @@ def _score(series: Series, name: str, several: bool, remarks: list[str]) -> floa
         if channel in _ONLY_NAMED:
             # where it is says more than that it is a temperature
             place, what = (weak, strong) if channel == "temperature" else (strong, weak)
+            elsewhere = _WORDS["ambient_temperature"][0] | _WORDS["supply_pressure"][0] - {"tank"}
+            if channel == "temperature" and elsewhere & set(words):
+                return 0.0
             if not place & set(words) or not (what & set(words) or understood_unit(series.unit)):
                 return 0.0
             score += 2.0 if strong & set(words) else 0.0

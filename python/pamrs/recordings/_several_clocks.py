@@ -18,7 +18,7 @@ from pamrs.recordings._recording import Issue, Recording, judged
 __all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock"]
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
-#: No block needs them, and they need not last as long as the others.
+#: A diagnosis can do without them: they need not last as long as the others.
 SLOW: Final = frozenset({"temperature", "ambient_temperature"})
 #: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
 UNTOLD: Final = SLOW | COMMANDS

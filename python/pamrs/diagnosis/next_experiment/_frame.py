@@ -1,8 +1,9 @@
 """What a load frame may be asked to do: between which lengths and how fast it moves the muscle's
 end, at which length it holds it, and between which pressures the muscle then pulls.
 
-Nothing is asked that recordings did not show, or, before there are any, that a plain testing
-machine cannot do or at which the muscle would have to push.
+Lengths and pressures stay within what recordings showed, or, before there are any, where the muscle
+need not push; rates within what recordings showed or a plain testing machine can do, whichever is
+faster.
 """
 
 from __future__ import annotations
@@ -86,11 +87,11 @@ def _usable(record: Recording, name: str) -> Array:
 
 
 def _fastest(values: Array, step: int, sample_time: float) -> float:
-    """Largest change of a signal over so many samples, as a rate."""
+    """Largest change of a signal over so many samples, as a rate, but for one in two hundred."""
     moved = np.abs(values[step:] - values[:-step])
     if not np.isfinite(moved).any():
         return 0.0
-    return float(np.nanmax(moved)) / (step * sample_time)
+    return float(np.nanquantile(moved, 0.995)) / (step * sample_time)
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,7 @@ from pamrs.diagnosis.fit import (
     changes,
     fits,
     free_baseline,
+    known_parameters,
     places_of,
     residuals,
     starts_of,
@@ -49,7 +50,7 @@ from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
-from pamrs.effects import CATALOGUE, term_of
+from pamrs.effects import CATALOGUE, info_of, term_of
 from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
@@ -308,13 +309,13 @@ def _check_rig(rig: Rig) -> None:
             f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
             "pamrs.load_rig(path)"
         )
-    reasons = {
-        f"it already has the effect {rig.effects[0]['id']!r}; plan with a rig without effects"
-        if rig.effects
-        else "",
-    } - {""}
-    if reasons:
-        raise DiagnosisError(f"rig {rig.name!r}: {'; '.join(sorted(reasons))}")
+    # how a sensor lags is known of a rig, what it leaves out is not
+    known = [e["id"] for e in rig.effects if info_of(e["id"]).block != "sensors"]
+    if known:
+        raise DiagnosisError(
+            f"rig {rig.name!r}: it already has the effect {known[0]!r}; plan with a rig without "
+            "effects: copy the file and leave its [[effects]] out"
+        )
 
 
 def _noise(
@@ -384,9 +385,11 @@ def _possible(rig: Rig, start: Start, most_halvings: int) -> Start | None:
 
 
 def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
-    """Whether a rig has what an effect acts on, and a block of the cut chain in which it could
-    show.
+    """Whether a rig has what an effect acts on but not the effect, and a block of the cut chain in
+    which it could show.
     """
+    if effect in {held["id"] for held in rig.effects}:
+        return False
     return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
 
 
@@ -443,7 +446,8 @@ def _parts(
     problem = Problem(blocks, [prepared], core_rig(stands), settings)
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
-    spread = np.array([stands.parameter(name).tol for name in baseline])
+    known = known_parameters(stands, settings.fit)
+    spread = np.array([known[name].tol for name in baseline])
     width = bin_width(prepared, settings.noise.fit_bin_time)
     scale, slopes, moved = {}, {}, {}
     for block in blocks:

@@ -41,6 +41,7 @@ from pamrs.diagnosis.prepare._signals import (
     thermometers_of,
     warm_chambers,
 )
+from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import suspected_units
 
 __all__ = [
@@ -72,4 +73,5 @@ __all__ = [
     "warm_chambers",
     "without_copies",
     "without_impossible",
+    "without_poor_thermometers",
 ]

@@ -6,9 +6,10 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 from scipy.signal import savgol_filter
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
 
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
@@ -34,6 +35,9 @@ __all__ = [
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Lengths = NDArray[np.intp]
+
+_TERMS = 4
+"""Terms of a cubic."""
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
@@ -248,7 +252,7 @@ def filter_length(dt: float, settings: PrepareSettings) -> int:
 
 def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings) -> Lengths:
     """Samples over which each sample of a channel can be smoothed: the longest filter to which a
-    cubic fits but for the noise, 1 where none does; all of them where the channel stands still.
+    cubic fits but for the noise, 1 where none does; 0 where one cubic fits the whole channel.
 
     A pressure has a corner where a valve or a regulator switches, and a filter over the corner
     makes it a bow. What a cubic misses is compared with the noise, or with what it misses at most
@@ -270,8 +274,8 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     (n,) array of int
     """
     shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
-    if _stands_still(values, noise, length, settings):
-        return np.full(values.size, values.size, dtype=np.intp)
+    if _is_one_cubic(values, noise, length, settings):
+        return np.zeros(values.size, dtype=np.intp)
     found = np.ones(values.size, dtype=np.intp)
     for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
         basis = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, count), 4))[0]
@@ -283,23 +287,35 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     return found
 
 
-def _stands_still(values: Array, noise: float, length: int, settings: PrepareSettings) -> bool:
-    """Whether means of a channel over so many samples differ by no more than its noise makes them.
+def _is_one_cubic(values: Array, noise: float, length: int, settings: PrepareSettings) -> bool:
+    """Whether one cubic fits a whole channel but for its noise: what is held, or drifts.
 
-    What is held is its mean: its noise would drive a model, and an effect that makes the model
-    answer less to what is driven would seem to be in the data.
+    Noise of such a channel would drive a model, and an effect that makes the model answer less to
+    what drives it would seem to be in the data. Asked of what the cubic misses are its means over
+    so many samples, all together and the largest, and its variance: the noise is known by the same
+    samples, so that the latter may be off by twice what chance does.
     """
-    pieces = values[: values.size // length * length].reshape(-1, length)
-    if len(pieces) < 2:
+    missed = values - _cubic(values)(np.linspace(-1.0, 1.0, values.size))
+    pieces = missed[: values.size // length * length].reshape(-1, length)
+    count, odds = len(pieces), settings.smoothing_odds
+    if count <= _TERMS:
         return False
-    means = pieces.mean(axis=1)
-    spread = float(np.sum((means - means.mean()) ** 2)) * length
-    return spread <= noise**2 * float(chi2.isf(settings.smoothing_odds, len(means) - 1))
+    means = pieces.mean(axis=1) * (math.sqrt(length) / noise)
+    spread = 1.0 + 2.0 * float(norm.isf(odds)) * math.sqrt(2.0 / values.size)
+    return bool(
+        means @ means <= chi2.isf(odds, count - _TERMS)
+        and np.abs(means).max() <= norm.isf(0.5 * odds / count)
+        and float(np.mean(missed**2)) <= spread * noise**2
+    )
+
+
+def _cubic(values: Array) -> Polynomial:
+    """The cubic of least squares through a channel, over -1 to 1."""
+    return Polynomial.fit(np.linspace(-1.0, 1.0, values.size), values, _TERMS - 1)
 
 
 def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
-    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative; the mean
-    of one that stands still.
+    """A channel smoothed by local cubics (Savitzky & Golay 1964), and its time derivative.
 
     Parameters
     ----------
@@ -308,15 +324,16 @@ def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
     dt : float
         Sample time [s].
     lengths : (n,) array of int
-        Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is, all
-        samples for the mean.
+        Length of the filter at each sample, as of `lengths_of`; 1 for the sample as it is, 0
+        for one cubic through all samples.
 
     Returns
     -------
     value, slope : (n,) arrays
     """
-    if (lengths == values.size).all():
-        return np.full(values.size, values.mean()), np.zeros(values.size)
+    if not lengths.any():
+        whole, places = _cubic(values), np.linspace(-1.0, 1.0, values.size)
+        return whole(places), whole.deriv()(places) * (2.0 / (dt * (values.size - 1)))
     value, slope = values.copy(), np.gradient(values, dt)
     for count in np.unique(lengths[lengths > 1]):
         rows = lengths == count

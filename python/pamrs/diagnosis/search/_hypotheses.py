@@ -451,12 +451,13 @@ def _hypotheses(
 
 
 def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Candidate]:
-    """Of lasting effects, those that leave least first, the first one and what weighs nearly as
-    much as the heaviest: a value that is wrong beside one of them may be so beside all.
+    """Of lasting effects, those that leave least first, the first one and the heaviest of the
+    others, unless it weighs far less: a value that is wrong beside one may be so beside all.
     """
     settings = trial.settings.search
     top = max(map(weight, lasting), default=0.0)
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > settings.polish_from]
+    near.sort(key=weight, reverse=True)
     return [*lasting[:1], *near[: max(settings.most_paired - 1, 0)]]
 
 

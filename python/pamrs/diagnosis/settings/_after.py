@@ -186,7 +186,7 @@ class NextExperimentSettings(SettingsGroup):
         unit="s",
         above=0.0,
         reason="time in which a muscle is filled and rests before a load frame moves",
-        origin="judgement: a third of it to fill",
+        origin="judgement: 1 s to fill, the rest to settle",
     )
     sample_time: float = setting(
         0.005,
