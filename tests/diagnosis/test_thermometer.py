@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.next_experiment import checked_channels, measurable
+from pamrs.diagnosis.next_experiment import checked_channels, library, measurable
+from pamrs.diagnosis.next_experiment._choice import outcome_of
 from pamrs.diagnosis.prepare import available_blocks, thermometers_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording, propose
@@ -309,3 +310,14 @@ def test_a_rig_that_states_the_lag_of_its_thermometer_can_be_planned() -> None:
     rig = parse_rig(TANK).with_effect("thermometer_lag", {"time_constant": 0.4})
     plan = pamrs.plan_diagnosis(rig, ["muscle_pressure", "temperature"])
     assert "thermometer_lag" not in {sight.effect for sight in plan.sights}
+
+
+def test_two_models_are_compared_where_only_one_has_a_temperature_of_its_gas() -> None:
+    bare, settings = parse_rig(COEFFICIENTS), DiagnosisSettings()
+    warm = bare.with_effect("heat_transfer")
+    experiment = library(bare, settings.next_experiment)[0]
+    pair = [("with", warm, 0.5), ("without", bare, 0.5)]
+    noise = {"muscle_pressure": 400.0, "temperature": 0.2}
+    told = outcome_of(experiment, pair, noise, ("muscle_pressure", "temperature"), settings)
+    alone = outcome_of(experiment, pair, noise, ("muscle_pressure",), settings)
+    np.testing.assert_array_equal(told.distance, alone.distance)

@@ -216,7 +216,10 @@ def outcome_of(
     rigs = [experiment.changed(rig) for _, rig, _ in hypotheses]
     if runs is None:
         runs = two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
-    measured = (*channels, *((sensor,) if sensor else ()))
+    # a gas may have a temperature with one hypothesis and none with another
+    able = [set(measurable(rig)) for rig in rigs]
+    partly = set.union(*able) - set.intersection(*able)
+    measured = tuple(c for c in (*channels, *((sensor,) if sensor else ())) if c not in partly)
     heard = {c: v for c, v in noise.items() if c in measured}
 
     def cut(one: tuple[Rig, Simulation]) -> Problem:
