@@ -42,9 +42,8 @@ def test_a_short_move_in_a_long_recording_is_seen() -> None:
     assert lengths_of(noisy, NOISE, DT, SETTINGS).any()
 
 
-@pytest.mark.parametrize(("seed", "drift"), [(1, 0.0), (2, 0.0), (1, 1.0), (2, 1.0)])
-def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: float) -> None:
-    rig = pamrs.load_rig(LAYOUT)
+def bench(plant: pamrs.Rig, rig: pamrs.Rig, seed: int, drift: float) -> pamrs.Case:
+    """Three logs at held lengths, which drift by so many of their noises."""
     rest = rig.parameter("muscle.rest_length").value
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 30.0, DT)
@@ -52,14 +51,28 @@ def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: f
     for k, (share, frequency) in enumerate([(0.95, 0.1), (0.90, 0.17), (0.85, 0.24)]):
         pressure = 3e5 - 1.6e5 * np.cos(2.0 * np.pi * frequency * time)
         length = share * rest + drift * NOISE * time / time[-1]
-        run = pamrs.simulate(rig, length=length, pressure=pressure, sample_time=DT)
+        run = pamrs.simulate(plant, length=length, pressure=pressure, sample_time=DT)
         clean = {"muscle_pressure": pressure, "length": length, "force": run["muscle_force"]}
         sizes = {"muscle_pressure": 400.0, "length": NOISE, "force": 1.0}
-        channels = {
-            n: v[: time.size] + sizes[n] * rng.normal(size=time.size) for n, v in clean.items()
-        }
+        channels = {n: v + sizes[n] * rng.normal(size=time.size) for n, v in clean.items()}
         mask = {n: np.ones(time.size, dtype=bool) for n in channels}
         role = "held_out" if k == 2 else "fit"
         recordings.append(Recording(f"run_{k + 1}", role, time, DT, channels, mask, [], {}))
-    found = pamrs.diagnose(pamrs.Case("bench", rig, recordings, Path()))
+    return pamrs.Case("bench", rig, recordings, Path())
+
+
+@pytest.mark.parametrize(("seed", "drift"), [(1, 0.0), (2, 0.0), (1, 1.0), (2, 1.0)])
+def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: float) -> None:
+    rig = pamrs.load_rig(LAYOUT)
+    found = pamrs.diagnose(bench(rig, rig, seed, drift))
     assert found.verdict == "none"
+    assert not any("is fitted to each recording" in w for w in found.warnings)
+
+
+def test_a_force_that_is_missing_all_the_time_is_said() -> None:
+    rig = pamrs.load_rig(LAYOUT)
+    plant = rig.with_effect("activation_pressure", {"threshold": 8e3})
+    found = pamrs.diagnose(bench(plant, rig, 1, 0.0))
+    (warning,) = (w for w in found.warnings if "is fitted to each recording" in w)
+    assert warning.startswith("muscle_force of the whole rig is ")
+    assert found.verdict == "none"  # a force that never changes may be the cell's zero

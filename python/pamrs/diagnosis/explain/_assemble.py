@@ -31,7 +31,7 @@ from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.explain._free_run import free_run
+from pamrs.diagnosis.explain._free_run import free_run, said_of_constants
 from pamrs.diagnosis.explain._next import next_experiment
 from pamrs.diagnosis.fit import (
     CHOSEN,
@@ -116,11 +116,13 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
     runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)
+    effects = _effects(judged, verdict, fitted)
+    constants = said_of_constants(runs or [], [effect.id for effect in effects])
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
         where=words.where(located, fitted, judged, picture),
-        effects=_effects(judged, verdict, fitted),
+        effects=effects,
         ambiguity=ambiguity,
         probabilities=probabilities,
         parameters=_parameters(nominal, *known, settings.fit),
@@ -134,7 +136,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
             fitted,
             held,
         ),
-        warnings=_warnings(case, models, table, settings, same=held is fitted),
+        warnings=constants + _warnings(case, models, table, settings, same=held is fitted),
         rig=models.final
         if verdict == "none"
         else _with_std(models.final, nominal, models.chosen, models.owners),

@@ -5,20 +5,27 @@ measured: what each block's error comes to when nothing measured corrects it.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from pamrs.channels import unit_of
+from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem
 from pamrs.diagnosis.prepare import Residual
+from pamrs.effects import info_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import differences, replay
 
-__all__ = ["free_run"]
+__all__ = ["free_run", "said_of_constants"]
+
+_FREED = ("muscle_force", "joint_torque", "temperature")
+"""Channels whose constant is fitted to each recording."""
+_FAR = 5.0
+"""How many times more than its block the whole rig misses before that is worth a sentence."""
 
 Stages = dict[str, dict[Key, Residual]]
 
@@ -72,7 +79,7 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
     after, why_after = (before, why) if final is nominal else _errors(final, recording)
     notes = [f"nominal model: {why}"] if why else []
     notes += [f"with what was found: {why_after}"] if why_after and final is not nominal else []
-    covering = {b.channel: b.name for b in problem.blocks}
+    covering = {_simulated(b.channel): b.name for b in problem.blocks}
 
     def cut(stage: str, channel: str) -> float | None:
         if channel not in covering:
@@ -97,6 +104,42 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
         },
         note="; ".join(notes),
     )
+
+
+def _simulated(channel: str) -> str:
+    """What a simulation calls a measured channel: the force on a load is that of its muscles."""
+    return "muscle_force" if channel == "force" else channel
+
+
+def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
+    """Channels that the whole rig misses by far more than their blocks do, in words: what is
+    constant in a recording is fitted to each, and no block is judged by it.
+
+    Parameters
+    ----------
+    runs : sequence of FreeRun
+        Of the recordings that were held out, or of all.
+    effects : sequence of str
+        What was found: the free run takes readings as they are, so that those of a sensor explain
+        a difference of their own.
+    """
+    if any(info_of(effect).block == "sensors" for effect in effects):
+        return []
+    worst: dict[str, tuple[float, FreeRunError, str]] = {}
+    for run in runs:
+        for channel, error in run.channels.items():
+            if channel_of(channel) not in _FREED or not error.cut_after:
+                continue
+            times = error.after / error.cut_after
+            if times > max(_FAR, worst.get(channel, (0.0, error, ""))[0]):
+                worst[channel] = (times, error, run.recording)
+    return [
+        f"{channel} of the whole rig is {error.after:.3g} {error.unit} off in {name!r} (root mean "
+        f"square), that of its block {error.cut_after:.2g} {error.unit}: what is constant in a "
+        "recording (a zero of the sensor, a dead weight, an effect that does the same all the "
+        "time) is fitted to each recording and is not judged"
+        for channel, (_, error, name) in worst.items()
+    ]
 
 
 def _as_logged(recording: Recording) -> Recording:

@@ -218,7 +218,7 @@ def outcome_of(
         runs = two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
     # a gas may have a temperature with one hypothesis and none with another
     able = [set(measurable(rig)) for rig in rigs]
-    partly = set.union(*able) - set.intersection(*able)
+    partly = {c for one in able for c in one if not all(c in other for other in able)}
     measured = tuple(c for c in (*channels, *((sensor,) if sensor else ())) if c not in partly)
     heard = {c: v for c, v in noise.items() if c in measured}
 
