@@ -22,6 +22,7 @@ ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 CONSTANTS = {
     "prepare/_ambient.py": {"_SAME"},  # of temperatures that are told as one
+    "prepare/_signals.py": {"_TERMS"},  # of a cubic
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
     "next_experiment/_chains.py": {"_LEAST_SHARE"},  # of the choked flow

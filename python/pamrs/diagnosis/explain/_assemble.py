@@ -117,7 +117,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
     runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)
     effects = _effects(judged, verdict, fitted)
-    constants = said_of_constants(runs or [], [effect.id for effect in effects])
+    constants = said_of_constants(runs or [], [effect.id for effect in effects], settings.warnings)
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,

@@ -13,6 +13,7 @@ import numpy as np
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem
 from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.settings import WarningSettings
 from pamrs.effects import info_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
@@ -24,8 +25,6 @@ __all__ = ["free_run", "said_of_constants"]
 
 _FREED = ("muscle_force", "joint_torque", "temperature")
 """Channels whose constant is fitted to each recording."""
-_FAR = 5.0
-"""How many times more than its block the whole rig misses before that is worth a sentence."""
 
 Stages = dict[str, dict[Key, Residual]]
 
@@ -111,7 +110,9 @@ def _simulated(channel: str) -> str:
     return "muscle_force" if channel == "force" else channel
 
 
-def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
+def said_of_constants(
+    runs: Sequence[FreeRun], effects: Sequence[str], settings: WarningSettings
+) -> list[str]:
     """Channels that the whole rig misses by far more than their blocks do, in words: what is
     constant in a recording is fitted to each, and no block is judged by it.
 
@@ -122,6 +123,8 @@ def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[s
     effects : sequence of str
         What was found: the free run takes readings as they are, so that those of a sensor explain
         a difference of their own.
+    settings : WarningSettings
+        How far off is worth a sentence.
     """
     if any(info_of(effect).block == "sensors" for effect in effects):
         return []
@@ -131,7 +134,7 @@ def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[s
             if channel_of(channel) not in _FREED or not error.cut_after:
                 continue
             times = error.after / error.cut_after
-            if times > max(_FAR, worst.get(channel, (0.0, error, ""))[0]):
+            if times > max(settings.far_alone, worst.get(channel, (0.0, error, ""))[0]):
                 worst[channel] = (times, error, run.recording)
     return [
         f"{channel} of the whole rig is {error.after:.3g} {error.unit} off in {name!r} (root mean "

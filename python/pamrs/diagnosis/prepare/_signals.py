@@ -136,13 +136,14 @@ class Prepared:
 
         At the edge of a recording the filter's derivative is ten times as noisy as inside, and a
         joint that is given a speed that it did not have slides from where it stood. At a start the
-        longest stretch counts to which a cubic still fits but for the noise.
+        longest stretch counts to which a cubic still fits but for the noise: of a channel that is
+        one cubic all of it.
         """
         key = (channel, tuple(starts))
         settings = self.settings.prepare
         if key not in self._begun:
             value, slope = (array.copy() for array in self.signals[channel])
-            for at in starts:
+            for at in starts if self.lengths[channel].any() else []:
                 state = _state(
                     self.raw[channel],
                     self.recording.mask[channel],

@@ -14,9 +14,6 @@ from pamrs.rig import Rig
 
 __all__ = ["without_poor_thermometers"]
 
-_NEW = 0.5
-"""Share of samples that are new, from which a thermometer is as fast as the log."""
-
 
 def without_poor_thermometers(
     recordings: Sequence[Recording], rig: Rig, settings: PrepareSettings
@@ -57,7 +54,7 @@ def _fault(recording: Recording, name: str, settings: PrepareSettings) -> str:
         return f"only {usable} of {mask.size} samples are usable"
     bends = np.abs(np.diff(values[mask], 2))
     new = float(np.mean(bends > 1e-6 * float(np.ptp(values[mask]))))
-    if 0.0 < new < _NEW:
+    if 0.0 < new < settings.least_new_share:
         return (
             f"one sample in {1.0 / new:.1f} is new, the others repeat or lie on lines between: log "
             "it as fast as the pressures, or the pressures as slowly"

@@ -311,6 +311,14 @@ class PlanSettings(SettingsGroup):
 class WarningSettings(SettingsGroup):
     """From where on the result carries a warning or a sentence; none of them moves a verdict."""
 
+    far_alone: float = setting(
+        5.0,
+        unit="1",
+        above=1.0,
+        reason="how many times more than its block the whole rig misses of what is freed of a "
+        "constant before that is said",
+        origin="judgement",
+    )
     missed_noises: float = setting(
         3.0,
         unit="noise levels",

@@ -38,6 +38,15 @@ class PrepareSettings(SettingsGroup):
         "for",
         origin="docs/decisions/0099",
     )
+    least_new_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of a thermometer's samples that neither repeat nor lie on a line between "
+        "others, from which it is as fast as the log",
+        origin="judgement; docs/decisions/0116",
+    )
     least_spectra: int = setting(
         16,
         unit="count",
