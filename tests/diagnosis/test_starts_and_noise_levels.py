@@ -52,7 +52,7 @@ def recorded(seed: int, angle: np.ndarray | None = None) -> Prepared:
     )
 
 
-def slopes_at_first(path: Array) -> tuple[float, float]:
+def slopes_at_first(path: np.ndarray) -> tuple[float, float]:
     """Root mean square, over twelve seeds, of the speed at the first sample [rad/s]: that of the
     filter, and that of a window that starts there.
     """
