@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, example, given, settings
 from hypothesis import strategies as st
 
 import pamrs
@@ -52,6 +52,8 @@ def worst(run: Run, step: float | None) -> float:
     st.sampled_from([0.08, 0.3, 0.7, 1.0, 1.6]),
     st.lists(st.floats(0.0, 10.0), min_size=ROWS, max_size=ROWS),
 )
+# the command turns it back just as it reaches its stop
+@example(28.63654590234348, 0.7, [2.8117035, 0.4291361, 3.995758, 0.0, 0.0, 5.9965711, *[3.0] * 25])
 def test_a_spool_of_second_order(frequency: float, damping: float, volts: list[float]) -> None:
     """It overshoots, strikes its stops and leaves them, under steps of the command."""
     spool = {"spool": "second_order", "natural_frequency": frequency, "damping_ratio": damping}

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
 
 #: A position over some time: from when to when (s), and what it is then, or at a time.
 Piece = tuple[float, float, float | Callable[[float], float]]
@@ -65,11 +66,26 @@ def _sprung(part: Mapping[str, Any], x: Sequence[float], sample_time: float) -> 
                 events=out,
                 dense_output=True,
             )
-            pieces.append((time, float(run.t[-1]), partial(_along, run.sol)))
-            y, rate, time = float(run.y[0, -1]), float(run.y[1, -1]), float(run.t[-1])
-            if run.status == 1:
+            struck = _grazed(run, out)
+            stop = float(run.t[-1]) if struck is None else struck
+            pieces.append((time, stop, partial(_along, run.sol)))
+            y, rate = (float(v) for v in run.sol(stop))
+            time = stop
+            if run.status == 1 or struck is not None:
                 y, rate = math.copysign(1.0, y), 0.0
     return pieces
+
+
+def _grazed(run: Any, out: Callable[[float, Any], float]) -> float | None:
+    """When a spool first struck a stop and would have turned within the same step, so that no step
+    ended beyond it; None if it did not.
+    """
+    for first, then, was, now in zip(run.t, run.t[1:], run.y[1], run.y[1, 1:], strict=False):
+        if was * now < 0.0:
+            turn = brentq(lambda t: run.sol(t)[1], first, then, xtol=1e-15)
+            if out(turn, run.sol(turn)) > 0.0:
+                return float(brentq(lambda t: out(t, run.sol(t)), first, turn, xtol=1e-15))
+    return None
 
 
 def _along(solution: Callable[[float], Any], time: float) -> float:
