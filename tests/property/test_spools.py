@@ -101,6 +101,15 @@ def test_valves_that_switch(
     assert worst(run, 2e-5) < SMOOTH
 
 
+def test_full_periods_of_a_carrier_are_one_pulse() -> None:
+    """A valve that needs more than a period of its carrier opens where the duty stays full."""
+    own = {"with_current": "fill", "without_current": "closed", "carrier_frequency": 210.0}
+    own |= {"opening_delay": 6.2e-3, "closing_delay": 5e-4, "carrier_phase": 0.77}
+    volts = np.where(np.arange(31) == 25, 24.0, 0.0)
+    run = run_of({"valve": switching(**own)}, {"valve_command": volts}, SAMPLE_TIME)
+    assert worst(run, 2e-5) < SMOOTH
+
+
 def pulsed_pair(**own: Any) -> Run:
     """Two 2/2 valves at one chamber, one fills and one vents, their duties given as volts."""
     common = {"carrier_frequency": 80.0, "opening_delay": 2.1e-3, "closing_delay": 1.3e-3, **own}

@@ -145,8 +145,10 @@ def _coil(
         for k in range(math.floor(-phase), math.ceil(last * frequency)):
             begin, end = (k + phase) / frequency, (k + 1 + phase) / frequency
             sample = min(max(math.floor(begin / sample_time + 1e-9), 0), len(duties) - 1)
-            off = begin + abs(duties[sample]) / frequency
-            found += [(begin, off, taken(duties[sample])), (off, end, rest)]
+            duty = duties[sample]
+            # a full period is one: no rounding error is a gap behind it
+            off = end if abs(duty) >= 1.0 else begin + abs(duty) / frequency
+            found += [(begin, off, taken(duty)), (off, end, rest)]
     merged: list[tuple[float, float, float]] = []
     for begin, end, aim in found:
         begin, end = max(begin, 0.0), min(end, last)
