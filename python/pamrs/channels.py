@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "rate_of", "unit_of"]
+__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "rate_of", "recorded_as", "unit_of"]
 
 #: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
 #: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``; behind that
@@ -63,6 +63,12 @@ def rate_of(name: str) -> str:
     """
     kind, dot, block = name.partition(".")
     return f"{'length_rate' if kind == 'length' else 'joint_rate'}{dot}{block}"
+
+
+def recorded_as(name: str) -> str:
+    """What a recording calls a simulated channel: ``force`` is what it has of ``muscle_force``."""
+    kind, dot, block = name.partition(".")
+    return f"{'force' if kind == 'muscle_force' else kind}{dot}{block}"
 
 
 def unit_of(name: str) -> str:

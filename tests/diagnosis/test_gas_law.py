@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -21,15 +22,25 @@ TEXT = ISO[: ISO.index("alpha_in")] + (
 )
 
 
-def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:
-    """Eight seconds at 200 Hz of a chamber that is filled and vented in steps."""
+def recorded(
+    rig: pamrs.Rig,
+    role: str,
+    seed: int,
+    noise: Mapping[str, float] = NOISE,
+    skipped: float = 0.0,
+) -> Recording:
+    """Eight seconds at 200 Hz of a chamber that is filled and vented in steps, the first ones left
+    out; the channels that have noise.
+    """
     rng = np.random.default_rng(seed)
     time = np.arange(0.0, 8.0, 0.005)
     steps = 5.0 + rng.uniform(0.5, 4.0, 16) * np.tile([1.0, -1.0], 8)
     command = steps[(time / 0.5).astype(int)]
     run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-    channels = {"valve_command": command} | {name: run[name] for name in NOISE}
-    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [7, seed])
+    first = round(skipped / 0.005)
+    channels = {"valve_command": command} | {name: run[name] for name in noise}
+    kept = {name: values[first:] for name, values in channels.items()}
+    return noisy(f"r{seed}", role, 0.005, kept, noise, [7, seed])
 
 
 def diagnosed(nominal: pamrs.Rig, true: pamrs.Rig) -> pamrs.Diagnosis:

@@ -10,9 +10,10 @@ import pytest
 import pamrs
 from pamrs.diagnosis.prepare._signals import lengths_of, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.recordings import Recording
+from tests.diagnosis import frames
+from tests.diagnosis.frames import DT, played
 
-DT, NOISE = 0.01, 3e-5
+NOISE = frames.NOISE["length"]
 LAYOUT = Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml"
 SETTINGS = DiagnosisSettings().prepare
 
@@ -45,19 +46,13 @@ def test_a_short_move_in_a_long_recording_is_seen() -> None:
 def bench(plant: pamrs.Rig, rig: pamrs.Rig, seed: int, drift: float) -> pamrs.Case:
     """Three logs at held lengths, which drift by so many of their noises."""
     rest = rig.parameter("muscle.rest_length").value
-    rng = np.random.default_rng(seed)
     time = np.arange(0.0, 30.0, DT)
     recordings = []
     for k, (share, frequency) in enumerate([(0.95, 0.1), (0.90, 0.17), (0.85, 0.24)]):
         pressure = 3e5 - 1.6e5 * np.cos(2.0 * np.pi * frequency * time)
         length = share * rest + drift * NOISE * time / time[-1]
-        run = pamrs.simulate(plant, length=length, pressure=pressure, sample_time=DT)
-        clean = {"muscle_pressure": pressure, "length": length, "force": run["muscle_force"]}
-        sizes = {"muscle_pressure": 400.0, "length": NOISE, "force": 1.0}
-        channels = {n: v + sizes[n] * rng.normal(size=time.size) for n, v in clean.items()}
-        mask = {n: np.ones(time.size, dtype=bool) for n in channels}
         role = "held_out" if k == 2 else "fit"
-        recordings.append(Recording(f"run_{k + 1}", role, time, DT, channels, mask, [], {}))
+        recordings.append(played(plant, f"run_{k + 1}", role, length, pressure, 10 * seed + k))
     return pamrs.Case("bench", rig, recordings, Path())
 
 

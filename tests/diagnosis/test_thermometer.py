@@ -19,7 +19,7 @@ from pamrs.recordings import Recording, propose
 from pamrs.report.chain import chain_svg
 from pamrs.rig import parse_rig
 from tests.diagnosis.noisy import noisy
-from tests.diagnosis.test_gas_law import TEXT, WALL
+from tests.diagnosis.test_gas_law import TEXT, WALL, recorded
 from tests.reference import network
 from tests.simulation.test_thermometer import late
 
@@ -72,18 +72,7 @@ def filled(rig: pamrs.Rig, skipped: float = 0.0) -> list[Recording]:
     """Three logs of eight seconds at 200 Hz of a chamber that is filled and vented in steps, each
     begun some time [s] after the plant was.
     """
-    found = []
-    for seed, role in enumerate(ROLES):
-        rng = np.random.default_rng(seed)
-        time = np.arange(0.0, 8.0, 0.005)
-        steps = 5.0 + rng.uniform(0.5, 4.0, 16) * np.tile([1.0, -1.0], 8)
-        command = steps[(time / 0.5).astype(int)]
-        run = pamrs.simulate(rig, valve_command=command, sample_time=0.005)
-        channels = {"valve_command": command} | {name: run[name] for name in NOISE}
-        first = round(skipped / 0.005)
-        kept = {name: values[first:] for name, values in channels.items()}
-        found.append(noisy(f"r{seed}", role, 0.005, kept, NOISE, [7, seed]))
-    return found
+    return [recorded(rig, role, seed, NOISE, skipped) for seed, role in enumerate(ROLES)]
 
 
 def without(recordings: list[Recording], channel: str = "temperature") -> list[Recording]:

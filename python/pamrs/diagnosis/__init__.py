@@ -218,10 +218,9 @@ def diagnose(
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
     sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
-    case = replace(case, recordings=sound)
-    kept, copies = without_copies(case.recordings, chosen.overlap)
-    sound, unread = without_poor_thermometers(kept, case.rig, chosen.prepare)
-    case, held = replace(case, recordings=sound), [*unread, *held]
+    kept, copies = without_copies(sound, chosen.overlap)
+    kept, unread = without_poor_thermometers(kept, case.rig, chosen.prepare)
+    case = replace(case, recordings=kept)
     seen = available_blocks(case.rig, case.channels, chosen.prepare)
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
     case = replace(case, recordings=shortened)
@@ -240,7 +239,8 @@ def diagnose(
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
     begun = said_of_beginnings(blocks, [*inner.recordings, *outer.recordings])
-    warnings = [*suspected, *copies, *masked, *held, *left_out, *begun, *diagnosis.warnings]
+    warnings = [*suspected, *copies, *masked, *unread, *held, *left_out, *begun]
+    warnings += diagnosis.warnings
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         warnings.insert(

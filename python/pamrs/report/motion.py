@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted, laboratory_unit
+from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
 from pamrs.report.figures import COLOURS, STYLE, decimate
 
@@ -41,8 +41,6 @@ _PANELS: Final = (
     ("muscle force", ("muscle_force",)),
     ("gas temperature", ("temperature",)),
 )
-#: A recorded channel that is drawn beside a simulated one of another name.
-_RECORDED_AS: Final = {"muscle_force": "force"}
 _NAMES: Final = {
     "supply_command": "set",
     "supply_pressure": "supply",
@@ -171,8 +169,7 @@ def _recorded(name: str, given: Mapping[str, Any]) -> str:
     """Name of the recorded channel that belongs beside a simulated one, empty where there is
     none.
     """
-    head, dot, block = name.partition(".")
-    other = _RECORDED_AS.get(head, head) + dot + block
+    other = recorded_as(name)
     return other if other in given else ""
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, recorded_as
 from pamrs.errors import RecordingError
 from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
 from pamrs.simulation._simulation import Simulation, simulate
@@ -29,8 +29,6 @@ _STATES = {
     "joint_angle": ("joint", "angle_zero"),
     "length": ("load", "length_zero"),
 }
-#: A recorded channel beside a simulated one of another name.
-_RECORDED_AS = {"muscle_force": "force"}
 
 
 def replay(rig: Rig, recording: Recording) -> Simulation:
@@ -157,9 +155,12 @@ def differences(result: Simulation, recording: Recording) -> dict[str, float]:
     skipped |= {dotted("muscle_pressure", name) for name in drive.get("pressure", ())}
     found = {}
     for name in result:
-        head, _, block = name.partition(".")
-        other = dotted(_RECORDED_AS.get(head, head), block)
-        if {head, name} & skipped or other not in recording.mask or not recording.mask[other].any():
+        other = recorded_as(name)
+        if (
+            {channel_of(name), name} & skipped
+            or other not in recording.mask
+            or not recording.mask[other].any()
+        ):
             continue
         rows = recording.mask[other]
         found[name] = float(

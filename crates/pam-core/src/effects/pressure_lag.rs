@@ -5,7 +5,7 @@
 //! lag is too short for a step. Where the recorded pressure drives a block, the true one is
 //! `y + T y'`. At `T = 0` both are the same. E. O. Doebelin, *Measurement Systems*, ch. 6.
 
-use super::{At, AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
+use super::{AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::blocks::gas::Gas;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
@@ -46,23 +46,18 @@ pub fn read<S: Scalar>(reading: S, from: S, to: S, time_constant: S, step: f64) 
     to - behind + (reading - from + behind) * left
 }
 
-/// Lag of a pressure sensor; its state is the reading.
+/// Lag of a sensor of a gas, of its pressure or its temperature; its state is the reading.
 #[derive(Debug, Clone, Copy)]
-struct PressureLag<S> {
+struct Lag<S> {
     time_constant: S,
 }
 
-fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
-    Box::new(PressureLag { time_constant: values[0] })
+/// The lag of a time constant [s].
+pub fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
+    Box::new(Lag { time_constant: values[0] })
 }
 
-impl<S: Scalar> Effect<S> for PressureLag<S> {
-    fn start(&self, _gas: &Gas, at: &At<S>, own: &mut [S]) {
-        if let At::Chamber { pressure, .. } = at {
-            own[0] = *pressure;
-        }
-    }
-
+impl<S: Scalar> Effect<S> for Lag<S> {
     fn read(&self, reading: S, from: S, to: S, step: f64) -> S {
         read(reading, from, to, self.time_constant, step)
     }
@@ -98,7 +93,7 @@ mod tests {
 
     #[test]
     fn the_closed_form_begins_with_the_rate() {
-        let (sensor, mut rate) = (PressureLag { time_constant: 0.02_f64 }, [0.0]);
+        let (sensor, mut rate) = (Lag { time_constant: 0.02_f64 }, [0.0]);
         sensor.linear_rates(&[1e5], 1.4e5, &mut rate);
         assert_eq!(rate, [2e6]);
         let step = 1e-8;

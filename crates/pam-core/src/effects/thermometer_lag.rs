@@ -1,16 +1,14 @@
 //! `thermometer_lag`: the recorded temperature of a gas lags behind the true one, by the mass of
 //! the thermometer.
 //!
-//! `T y' = temperature - y`, the law of [`super::pressure_lag::read`]: over a step the true
-//! temperature is taken as straight. A thermocouple of 0.1 mm in still air takes some tenths of a
-//! second, one of 1 mm in a sheath some seconds. The gas does not feel its thermometer. E. O.
-//! Doebelin, *Measurement Systems*, ch. 8.
+//! `T y' = temperature - y`, the law of [`super::pressure_lag`]: over a step the true temperature
+//! is taken as straight. A thermocouple of 0.1 mm in still air takes some tenths of a second, one
+//! of 1 mm in a sheath some seconds. The gas does not feel its thermometer. E. O. Doebelin,
+//! *Measurement Systems*, ch. 8.
 
-use super::pressure_lag::{read, SHORTEST};
-use super::{AtRest, Effect, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
-use crate::blocks::gas::Gas;
+use super::pressure_lag::{make, SHORTEST};
+use super::{AtRest, EffectInfo, EffectParameter, EffectState, Form, Port, Role};
 use crate::made_by;
-use crate::scalar::Scalar;
 
 /// What it is.
 pub const INFO: EffectInfo = EffectInfo {
@@ -34,37 +32,15 @@ pub const INFO: EffectInfo = EffectInfo {
     ..EffectInfo::USUAL
 };
 
-/// Lag of a thermometer; its state is the reading [K].
-#[derive(Debug, Clone, Copy)]
-struct ThermometerLag<S> {
-    time_constant: S,
-}
-
-fn make<S: Scalar>(values: &[S], _gas: &Gas) -> Box<dyn Effect<S>> {
-    Box::new(ThermometerLag { time_constant: values[0] })
-}
-
-impl<S: Scalar> Effect<S> for ThermometerLag<S> {
-    fn read(&self, reading: S, from: S, to: S, step: f64) -> S {
-        read(reading, from, to, self.time_constant, step)
-    }
-
-    fn linear_rates(&self, own: &[S], input: S, rates: &mut [S]) {
-        rates[0] = (input - own[0]) / self.time_constant;
-    }
-
-    fn lag(&self) -> S {
-        self.time_constant
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::blocks::gas::Gas;
 
     #[test]
     fn a_plunge_is_followed_by_two_thirds_in_a_time_constant() {
-        let thermometer = ThermometerLag { time_constant: 0.4_f64 };
+        let gas = Gas::new(101_325.0, 293.15, 287.05, 1.4);
+        let thermometer = make(&[0.4_f64], &gas);
         let mut reading = 293.15;
         for _ in 0..40 {
             reading = thermometer.read(reading, 253.15, 253.15, 0.01);

@@ -29,14 +29,17 @@ impl<S: Scalar> Plant<'_, S> {
     /// Place of the reading of a sensor that lags, and how far it does [s]; None for one that does
     /// not.
     pub fn lagging(&self, gas: usize) -> Option<(usize, S)> {
-        let acting = self.wiring.ports.reading[gas].as_ref()?;
-        Some((self.layout.effect(acting.first), self.effect(acting).lag()))
+        self.lag_of(self.wiring.ports.reading[gas].as_ref())
     }
 
     /// Place of the reading of a thermometer that lags, and how far it does [s]; None for one that
     /// does not.
     pub fn thermometer(&self, gas: usize) -> Option<(usize, S)> {
-        let acting = self.wiring.ports.thermometer[gas].as_ref()?;
+        self.lag_of(self.wiring.ports.thermometer[gas].as_ref())
+    }
+
+    fn lag_of(&self, sensor: Option<&Acting>) -> Option<(usize, S)> {
+        let acting = sensor?;
         Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 

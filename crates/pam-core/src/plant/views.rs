@@ -130,6 +130,9 @@ impl<S: Scalar> Plant<'_, S> {
             self.effect(acting).start(&self.rig.gas, &at, self.own_mut(acting, state));
         }
         for gas in 0..self.layout.gases {
+            if let Some((reading, _)) = self.lagging(gas) {
+                state[reading] = state[self.layout.pressure(gas)];
+            }
             if let Some((reading, _)) = self.thermometer(gas) {
                 state[reading] = self.temperature(gas, state);
             }

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pamrs.channels import channel_of, unit_of
+from pamrs.channels import channel_of, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem
 from pamrs.diagnosis.prepare import Residual
 from pamrs.diagnosis.settings import WarningSettings
@@ -78,12 +78,13 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
     after, why_after = (before, why) if final is nominal else _errors(final, recording)
     notes = [f"nominal model: {why}"] if why else []
     notes += [f"with what was found: {why_after}"] if why_after and final is not nominal else []
-    covering = {_simulated(b.channel): b.name for b in problem.blocks}
+    covering = {b.channel: b.name for b in problem.blocks}
 
     def cut(stage: str, channel: str) -> float | None:
-        if channel not in covering:
+        block = covering.get(recorded_as(channel))
+        if block is None:
             return None
-        residual = found[stage][covering[channel], recording.name]
+        residual = found[stage][block, recording.name]
         values = residual.value[residual.rows]
         return math.sqrt(float(np.mean(values**2))) if values.size else None
 
@@ -103,11 +104,6 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
         },
         note="; ".join(notes),
     )
-
-
-def _simulated(channel: str) -> str:
-    """What a simulation calls a measured channel: the force on a load is that of its muscles."""
-    return "muscle_force" if channel == "force" else channel
 
 
 def said_of_constants(

@@ -217,9 +217,10 @@ def outcome_of(
     if runs is None:
         runs = two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
     # a gas may have a temperature with one hypothesis and none with another
-    able = [set(measurable(rig)) for rig in rigs]
-    partly = {c for one in able for c in one if not all(c in other for other in able)}
-    measured = tuple(c for c in (*channels, *((sensor,) if sensor else ())) if c not in partly)
+    able = [measurable(rig) for rig in rigs]
+    measured = tuple(
+        c for c in (*channels, *((sensor,) if sensor else ())) if all(c in one for one in able)
+    )
     heard = {c: v for c, v in noise.items() if c in measured}
 
     def cut(one: tuple[Rig, Simulation]) -> Problem:

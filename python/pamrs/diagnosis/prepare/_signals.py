@@ -24,6 +24,7 @@ __all__ = [
     "COMMANDS",
     "Prepared",
     "binned",
+    "few_usable",
     "held",
     "noise_level",
     "prepare",
@@ -296,7 +297,7 @@ def _is_one_cubic(values: Array, noise: float, length: int, settings: PrepareSet
     so many samples, all together and the largest, and its variance: the noise is known by the same
     samples, so that the latter may be off by twice what chance does.
     """
-    missed = values - _cubic(values)(np.linspace(-1.0, 1.0, values.size))
+    missed = values - _cubic(values)(np.arange(values.size))
     pieces = missed[: values.size // length * length].reshape(-1, length)
     count, odds = len(pieces), settings.smoothing_odds
     if count <= _TERMS:
@@ -311,8 +312,8 @@ def _is_one_cubic(values: Array, noise: float, length: int, settings: PrepareSet
 
 
 def _cubic(values: Array) -> Polynomial:
-    """The cubic of least squares through a channel, over -1 to 1."""
-    return Polynomial.fit(np.linspace(-1.0, 1.0, values.size), values, _TERMS - 1)
+    """The cubic of least squares through a channel, over the numbers of its samples."""
+    return Polynomial.fit(np.arange(values.size), values, _TERMS - 1)
 
 
 def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
@@ -333,8 +334,8 @@ def smoothed(values: Array, dt: float, lengths: Lengths) -> tuple[Array, Array]:
     value, slope : (n,) arrays
     """
     if not lengths.any():
-        whole, places = _cubic(values), np.linspace(-1.0, 1.0, values.size)
-        return whole(places), whole.deriv()(places) * (2.0 / (dt * (values.size - 1)))
+        whole, samples = _cubic(values), np.arange(values.size)
+        return whole(samples), whole.deriv()(samples) / dt
     value, slope = values.copy(), np.gradient(values, dt)
     for count in np.unique(lengths[lengths > 1]):
         rows = lengths == count
@@ -439,7 +440,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         if name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
-        if mask.sum() < max(own.least_channel_samples, own.least_channel_share * mask.size):
+        if few_usable(mask, own):
             raise DiagnosisError(
                 f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of "
                 f"{name} are usable"
@@ -457,6 +458,12 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         for name, values in commands.items()
     }
     return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings)
+
+
+def few_usable(mask: Mask, settings: PrepareSettings) -> bool:
+    """Whether too few samples of a channel are usable for a diagnosis."""
+    least = max(settings.least_channel_samples, settings.least_channel_share * mask.size)
+    return bool(mask.sum() < least)
 
 
 def pulls_of(rig: Rig) -> dict[str, str]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pamrs.diagnosis.prepare._signals import thermometers_of
+from pamrs.diagnosis.prepare._signals import few_usable, thermometers_of
 from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -49,9 +49,8 @@ def without_poor_thermometers(
 def _fault(recording: Recording, name: str, settings: PrepareSettings) -> str:
     """Why a temperature cannot be judged; empty where it can."""
     values, mask = recording.channels[name], recording.mask[name]
-    usable = int(mask.sum())
-    if usable < max(settings.least_channel_samples, settings.least_channel_share * mask.size):
-        return f"only {usable} of {mask.size} samples are usable"
+    if few_usable(mask, settings):
+        return f"only {int(mask.sum())} of {mask.size} samples are usable"
     bends = np.abs(np.diff(values[mask], 2))
     new = float(np.mean(bends > 1e-6 * float(np.ptp(values[mask]))))
     if 0.0 < new < settings.least_new_share:
