@@ -76,6 +76,8 @@ class Candidate:
         less probable before any data.
     densities : callable
         Logarithms of the density of what it leaves, by block and stretch of time.
+    forms_tried : bool
+        Whether its effects were tried in other forms beside each other.
     """
 
     effects: tuple[str, ...]
@@ -88,6 +90,7 @@ class Candidate:
     wrong: tuple[str, ...] = ()
     places: float = 0.0
     densities: Callable[[], Densities] = field(default=dict, repr=False)
+    forms_tried: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -598,21 +601,34 @@ class Attempts:
     ) -> Candidate:
         """Effects fitted on from a fit, with some parameters freed."""
         effects = tuple(start.effect for start in starts)
-        free, held, forms = parts_of(starts)
-        found = fit(
-            self.inner,
-            self.nominal,
-            effects,
-            free,
-            self.autocorrelation(warm),
-            fixed=held,
-            warm=warm,
-            freed=wrong,
-            evaluations=evaluations,
-            share=share,
-            forms=forms,
-        )
+        weights, found = self.autocorrelation(warm), warm
+        for _ in range(self.settings.fit.most_weightings):
+            free, held, forms = parts_of(starts)
+            found = fit(
+                self.inner,
+                self.nominal,
+                effects,
+                free,
+                weights,
+                fixed=held,
+                warm=found,
+                freed=wrong,
+                evaluations=evaluations,
+                share=share,
+                forms=forms,
+            )
+            left = self.autocorrelation(found)
+            if not self._lighter(left, weights):
+                break
+            weights, starts = left, [self.start_of(found, effect) for effect in effects]
         return replace(self.judged(effects, found), wrong=wrong)
+
+    def _lighter(self, left: dict[str, float], weights: dict[str, float]) -> bool:
+        """Whether a fit leaves so much less autocorrelation than it was weighted by that it ended
+        before its end.
+        """
+        times = self.settings.noise.correlated_variance
+        return any(times * now < weights[block] for block, now in left.items())
 
     def united(self, candidates: list[Candidate]) -> Fit | None:
         """One fit with everything that some hypotheses name, each for a block of its own; None
@@ -668,7 +684,7 @@ class Attempts:
             )
         except SimulationError:
             return candidate
-        return replace(polished, gain=candidate.gain)
+        return replace(polished, gain=candidate.gain, forms_tried=candidate.forms_tried)
 
 
 def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Which effects are worth a fit, and how sure that is: scores, resamples of the recordings, one
 recording left out after the other.
 
-Public: `Score`, `Screen`, `Stand`, `screen`, `stand_of`, `by_effect`, `best_size`, `inclusion`,
-`left_out`.
+Public: `Score`, `Screen`, `Stand`, `screen`, `stand_of`, `by_effect`, `best_of_each_kind`,
+`best_size`, `inclusion`, `left_out`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from pamrs.diagnosis.screen._screening import (
     Score,
     Screen,
     Stand,
+    best_of_each_kind,
     best_size,
     by_effect,
     screen,
@@ -23,6 +24,7 @@ __all__ = [
     "Score",
     "Screen",
     "Stand",
+    "best_of_each_kind",
     "best_size",
     "by_effect",
     "inclusion",

@@ -36,7 +36,16 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
 
-__all__ = ["Score", "Screen", "Stand", "best_size", "by_effect", "screen", "stand_of"]
+__all__ = [
+    "Score",
+    "Screen",
+    "Stand",
+    "best_of_each_kind",
+    "best_size",
+    "by_effect",
+    "screen",
+    "stand_of",
+]
 
 Array = NDArray[np.float64]
 Signature = tuple[str, Start, Array]
@@ -68,6 +77,11 @@ class Score:
     gain: float
     size: float
     signature: Array
+
+    @property
+    def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
+        """The form that its start has, and what is chosen in it."""
+        return self.start.form, frozenset(self.start.held.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,6 +189,14 @@ def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
     for score in scores:
         found.setdefault(score.effect, []).append(score)
     return found
+
+
+def best_of_each_kind(scores: list[Score]) -> list[Score]:
+    """Of an effect's scores, the best ones first, the first of each form and choice in it."""
+    best: dict[tuple[str, frozenset[tuple[str, float]]], Score] = {}
+    for score in scores:
+        best.setdefault(score.kind, score)
+    return list(best.values())
 
 
 def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stand:

@@ -43,7 +43,15 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.screen import Score, Screen, by_effect, inclusion, left_out, screen
+from pamrs.diagnosis.screen import (
+    Score,
+    Screen,
+    best_of_each_kind,
+    by_effect,
+    inclusion,
+    left_out,
+    screen,
+)
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
@@ -51,6 +59,7 @@ from pamrs.diagnosis.search._considered import considered
 from pamrs.diagnosis.search._sets import (
     Weight,
     beside_wrong,
+    in_best_forms,
     left_everywhere,
     no_room_beside,
     settles,
@@ -283,7 +292,7 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
         visited(trial.inner),
     )
     candidates = _hypotheses(refit, screened, mistaken, transient, terms, tell)
-    candidates, weighed = _weighed(trial, candidates, terms, tell)
+    candidates, weighed = _weighed(trial, screened, candidates, terms, tell)
     return _Mismatch(refit, mismatch, screened, terms, marginal, candidates, weighed, tell)
 
 
@@ -350,7 +359,7 @@ class _Mismatch:
                 own = [trial.start_of(best.fit, e) for e in best.effects]
                 found.append(trial.together([*own, one], best.fit, best.wrong))
         candidates = _one_of_each([*self.candidates, *(c for c in found if c is not None)])
-        candidates, weighed = _weighed(trial, candidates, self.terms, self.tell)
+        candidates, weighed = _weighed(trial, self.screened, candidates, self.terms, self.tell)
         return replace(self, candidates=candidates, weighed=weighed)
 
     def groups(self, say: Say) -> list[Group]:
@@ -462,9 +471,11 @@ def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Ca
 
 
 def _weighed(
-    trial: Attempts, candidates: list[Candidate], terms: _Terms, tell: Say
+    trial: Attempts, screened: Screen, candidates: list[Candidate], terms: _Terms, tell: Say
 ) -> tuple[list[Candidate], dict[str, float]]:
-    """Hypotheses with their probabilities, those that are close fitted to the end first."""
+    """Hypotheses with their probabilities, those that are close fitted to the end first, each
+    effect in its best form.
+    """
     start, settings = candidates[0], trial.settings
 
     def weights(sets: list[Candidate]) -> dict[str, float]:
@@ -477,7 +488,10 @@ def _weighed(
         close and not explains(close[0], start, trial.compared, settings.evidence)
     ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
-        ended = [trial.polished(c) if c in close else c for c in candidates]
+        ended = [
+            trial.polished(in_best_forms(trial, screened, c, tell)) if c in close else c
+            for c in candidates
+        ]
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in ended if c.is_wrong(settings.fit.most_tolerances)]
         found = weights(candidates)
@@ -703,7 +717,7 @@ def _shortlisted(
     def most(effect: str) -> float:
         return weight(short[effect][0]) if short.get(effect) else -math.inf
 
-    best_of = {places[0]: _best_of_each_kind(ranked[places[0]]) for places in worth}
+    best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
     begin({effect: _begun(best) for effect, best in best_of.items()})
     first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
@@ -731,19 +745,6 @@ def _shortlisted(
     return best, starts
 
 
-def _kind(score: Score) -> tuple[str, frozenset[tuple[str, float]]]:
-    """The form that a start has, and what is chosen in it."""
-    return score.start.form, frozenset(score.start.held.items())
-
-
-def _best_of_each_kind(scores: list[Score]) -> list[Score]:
-    """The best start of each form and choice; the best of all comes first in ``scores``."""
-    best: dict[tuple[str, frozenset[tuple[str, float]]], Score] = {}
-    for score in scores:
-        best.setdefault(_kind(score), score)
-    return list(best.values())
-
-
 def _by_family(terms: list[str]) -> list[list[str]]:
     """The places of each effect, in the order in which they come."""
     found: dict[str, list[str]] = {}
@@ -769,10 +770,10 @@ def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
 
     A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
     """
-    best = _best_of_each_kind(scores)
+    best = best_of_each_kind(scores)
     forms = [s for s in best if s.gain > settings.near_form * scores[0].gain]
     forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
-    alike = [s for s in scores if _kind(s) == _kind(scores[0])]
+    alike = [s for s in scores if s.kind == scores[0].kind]
     near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
     return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
 

@@ -20,7 +20,7 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.screen import Score, Screen, by_effect, stand_of
+from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
 from pamrs.effects import exclude, id_of
 
@@ -28,6 +28,7 @@ __all__ = [
     "Say",
     "Weight",
     "beside_wrong",
+    "in_best_forms",
     "left_everywhere",
     "no_room_beside",
     "settles",
@@ -160,6 +161,8 @@ class _Growing:
         best = max(sets, key=self.weight, default=None)
         found: list[Candidate] = []
         while best is not None and len(best.names) < self.trial.settings.search.most_terms:
+            best = in_best_forms(self.trial, self.screened, best, self.tell)
+            found.append(best)
             tried = self.widened(best)
             further = max(tried, key=self.weight, default=None)
             if further is None or not _predicts_better(further, best, self.trial):
@@ -316,6 +319,72 @@ def _beside(
         if partner is not None and (single.effects[0], partner) not in found:
             found.append((single.effects[0], partner))
     return found
+
+
+def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say) -> Candidate:
+    """A set with each of its effects in the form that leaves least beside the others.
+
+    The form that an effect had alone is the one that did best for everything that was missing.
+
+    Parameters
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels.
+    screened : Screen
+        Signatures of the effects, from which other forms begin.
+    base : Candidate
+        A set of lasting effects and values that are wrong, fitted.
+    tell : callable
+        Receives progress.
+
+    Returns
+    -------
+    Candidate
+        The set itself where it leaves noise, and where no other form leaves less.
+    """
+    if base.forms_tried or len(base.names) < 2 or base.fit.events is not None:
+        return base
+    ranked = by_effect(screened.scores())
+    best = base
+    for effect in base.effects:
+        if not any(significant(best.fitted[b.name]) for b in trial.suspects):
+            break
+        other = _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
+        best = best if other is None else other
+    return replace(best, forms_tried=True)
+
+
+def _in_another_form(
+    trial: Attempts, base: Candidate, effect: str, scores: list[Score], tell: Say
+) -> Candidate | None:
+    """A set with one effect in another form, where one leaves clearly less."""
+    now = trial.start_of(base.fit, effect)
+    others = [
+        score.start.scaled(score.size)
+        for score in best_of_each_kind(scores)
+        if score.start.form != now.form or not score.start.held.items() <= now.held.items()
+    ]
+    if not others:
+        return None
+    tell(f"trying other forms of {effect} in {base.key}")
+    rest = [trial.start_of(base.fit, e) for e in base.effects if e != effect]
+
+    def begin(start: Start) -> Candidate | None:
+        # parameters that both forms have go on from where they are
+        own = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
+        begun = [*rest, replace(start, free=own)]
+        return trial.fitted_shortly(begun, base.fit, base.wrong)
+
+    short = [c for c in two_at_a_time(begin, others) if c is not None]
+    best = min(short, key=lambda c: c.misfit, default=None)
+    if best is None or best.misfit > base.misfit / trial.settings.search.near_place:
+        return None
+    begun = [trial.start_of(best.fit, e) for e in base.effects]
+    found = trial.together(begun, best.fit, base.wrong)
+    alike = trial.settings.evidence.form_share_alike
+    if found is None or left_everywhere(found) > left_everywhere(base) - alike:
+        return None
+    return replace(found, gain=base.gain)
 
 
 def without_needless(

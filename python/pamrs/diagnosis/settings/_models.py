@@ -130,6 +130,14 @@ class FitSettings(SettingsGroup):
         reason="the same for the last stretch of a fit",
         origin="docs/decisions/0022",
     )
+    most_weightings: int = setting(
+        4,
+        unit="count",
+        least=1,
+        reason="how often a set is fitted on, weighted by what it leaves, as long as that falls by "
+        "noise.correlated_variance",
+        origin="docs/decisions/0119-forms-in-their-sets.md",
+    )
     predicted_gain_evaluations: int = setting(
         50,
         unit="count",
