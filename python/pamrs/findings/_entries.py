@@ -100,7 +100,8 @@ class EffectParameterFound(Entry):
     value : float
         Its value.
     std : float or None
-        Standard deviation; None where the value was chosen of a few.
+        Standard deviation; None where the value was chosen of a few, and where no recording
+        depends on it.
     unit : str
         SI unit.
     interval : list of two floats, optional

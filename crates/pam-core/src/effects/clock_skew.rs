@@ -39,7 +39,7 @@ pub const INFO: EffectInfo = EffectInfo {
         name: "offset_and_drift",
         parameters: &[
             EffectParameter::new("offset", "s", -10.0, 10.0, 0.01).starts(&[0.005, 0.03]).off(0.0),
-            EffectParameter::new("rate", "1", -0.01, 0.01, 0.0001).starts(&[0.0, 0.0003]).off(0.0),
+            EffectParameter::new("rate", "1", -0.1, 0.1, 0.0001).starts(&[0.0, 0.0003]).off(0.0),
             EffectParameter::new("angle_share", "1", 0.0, 1.0, 1.0)
                 .starts(&[0.0, 1.0])
                 .role(Use::Choice),

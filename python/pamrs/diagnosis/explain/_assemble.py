@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -33,6 +33,7 @@ from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
 from pamrs.diagnosis.explain._free_run import free_run, said_of_constants
 from pamrs.diagnosis.explain._next import next_experiment
+from pamrs.diagnosis.explain._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Events,
@@ -46,7 +47,6 @@ from pamrs.diagnosis.fit import (
     known_parameters,
     residuals,
     spread_over_pieces,
-    with_effects_of,
     with_known,
 )
 from pamrs.diagnosis.noise import NoiseLevel
@@ -108,7 +108,11 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    known = (models.chosen, models.owners) if named else (models.starts, _owners(models.starts))
+    known = (
+        (models.chosen, models.owners)
+        if named
+        else (models.starts, owners_of_parameters(models.starts))
+    )
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
@@ -233,7 +237,9 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     starts = _widened(fitted, judged, begun)
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
-        return _Models(judged, starts, starts, _owners(begun), nominal, baseline, final)
+        return _Models(
+            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final
+        )
     wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
     ended = _settled(nominal, fitted, judged, wanted)
     chosen = _widened(fitted, judged, ended)
@@ -242,7 +248,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
         for j, c in zip(judged, chosen, strict=True)
     ]
     final = _merged(nominal, ended)
-    return _Models(judged, starts, chosen, _owners(ended), nominal, baseline, final)
+    return _Models(judged, starts, chosen, owners_of_parameters(ended), nominal, baseline, final)
 
 
 def _warnings(
@@ -300,7 +306,9 @@ def _tried(groups: list[Group]) -> list[Tried]:
             std={
                 n: s
                 for n, s in candidate.fit.std.items()
-                if n not in candidate.fit.moved and is_effect(n.partition(".")[0])
+                if n not in candidate.fit.moved
+                and is_effect(n.partition(".")[0])
+                and math.isfinite(s)
             },
             prior=sum(v * v for v in candidate.fit.moved.values()),
             suspects=[b.name for b in group.suspects],
@@ -371,7 +379,7 @@ def _hypotheses(
 
     def model(chosen: list[Candidate]) -> Rig:
         stated = _widened(problem, judged, chosen)
-        return _with_std(_merged(nominal, chosen), nominal, stated, _owners(chosen))
+        return _with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
 
     likeliest = max(healthy, key=lambda key: healthy[key], default="")
     if sum(healthy.values()) >= least:
@@ -399,26 +407,6 @@ def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
     )
 
 
-def _owners(candidates: list[Candidate]) -> dict[str, int]:
-    """The group that tells most of each parameter that several have (sensors' zeros): the one with
-    the least standard deviation.
-
-    What a group leaves without a name is in its autocorrelation, and so in its standard deviations.
-    Events are fitted with the values beside them, which stay.
-    """
-
-    def spread(k: int, name: str) -> float:
-        own = candidates[k].fit
-        return own.std.get(name, math.inf) if own.events is None else 0.0
-
-    found: dict[str, int] = {}
-    for k, candidate in enumerate(candidates):
-        for name in candidate.fit.moved:
-            if spread(k, name) <= spread(found.get(name, k), name):
-                found[name] = k
-    return found
-
-
 def _settled(
     nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
 ) -> list[Candidate]:
@@ -427,7 +415,7 @@ def _settled(
 
     A rig has one zero of a sensor; the other values of a fit are right beside its own only.
     """
-    owners = _owners(chosen)
+    owners = owners_of_parameters(chosen)
     found = list(chosen)
     for k, candidate in enumerate(chosen):
         own = replace(problem, blocks=judged[k].group.blocks)
@@ -492,10 +480,22 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     knows it best.
     """
     rig = nominal
-    for candidate in candidates:
-        rig = with_effects_of(rig, candidate.fit.rig, _ids(nominal))
-    owners = _owners(candidates).items()
+    for _, entry in _added(nominal, candidates):
+        form, at = entry.get("form", ""), entry.get("at", "")
+        rig = rig.with_effect(entry["id"], entry["parameters"], at=at, form=form)
+    owners = owners_of_parameters(candidates).items()
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
+
+
+def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidate, dict[str, Any]]]:
+    """Effects that the fits have and the nominal model has not, each from the fit that knows it
+    best.
+    """
+    owners = owners_of_effects(candidates)
+    for k, candidate in enumerate(candidates):
+        for entry in candidate.fit.rig.effects:
+            if entry["id"] not in _ids(nominal) and owners.get(term_in(entry), k) == k:
+                yield candidate, entry
 
 
 def _ids(rig: Rig) -> set[str]:
@@ -509,18 +509,15 @@ def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[
     """
     spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
     rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
-    for candidate in candidates:
-        for effect in candidate.fit.rig.effects:
-            if effect["id"] in _ids(nominal):
-                continue
-            own = term_in(effect) + "."
-            std = {
-                n.removeprefix(own): s
-                for n, s in candidate.fit.std.items()
-                if n.startswith(own) and math.isfinite(s)
-            }
-            form, at = effect.get("form", ""), effect.get("at", "")
-            rig = rig.with_effect(effect["id"], effect["parameters"], std=std, at=at, form=form)
+    for candidate, effect in _added(nominal, candidates):
+        own = term_in(effect) + "."
+        std = {
+            n.removeprefix(own): s
+            for n, s in candidate.fit.std.items()
+            if n.startswith(own) and math.isfinite(s)
+        }
+        form, at = effect.get("form", ""), effect.get("at", "")
+        rig = rig.with_effect(effect["id"], effect["parameters"], std=std, at=at, form=form)
     return rig
 
 
@@ -584,6 +581,8 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     closest.
     """
     found: dict[str, tuple[float, Candidate]] = {}
+    chosen = [j.chosen for j in judged]
+    owners = owners_of_effects(chosen)
     in_set = problem.settings.verdict.in_set
     for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
@@ -591,9 +590,8 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
         for effect in j.named if verdict == "effects" else listed:
             p = j.probability(effect)
             if verdict == "effects":
-                # of one effect in two groups the model has the parameters of the group that comes
-                # last
-                found[effect] = max(p, found[effect][0] if effect in found else 0.0), j.chosen
+                first = max(p, found[effect][0] if effect in found else 0.0)
+                found[effect] = first, chosen[owners[effect]]
             elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
                 best = max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
@@ -731,7 +729,11 @@ def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFou
 def _entry(
     value: float, std: float, unit: str, identifiable: bool, lower: float = 0.0
 ) -> EffectParameterFound:
-    """A fitted parameter with its interval of 95 %."""
+    """A fitted parameter with its interval of 95 %; without one, where the recordings do not depend
+    on it.
+    """
+    if not math.isfinite(std):
+        return EffectParameterFound(value, None, unit, identifiable=False)
     return EffectParameterFound(value, std, unit, _interval(value, std, lower), identifiable)
 
 

@@ -5,6 +5,7 @@ takes, and what stays unexplained.
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, is_parameter, significant
+from pamrs.diagnosis.explain._owners import owners_of_effects
 from pamrs.diagnosis.fit import Events, Key, Problem, acts_in, form_in, residuals, without_term
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
@@ -80,8 +82,8 @@ def budget(
         of a block add up to 1.
     """
     terms: list[BudgetTerm] = []
-    # of one effect in two groups the model has the parameters of the group that comes last
-    owners = {name: one for one in judged for name in one.named}
+    best = owners_of_effects([one.chosen for one in judged])
+    owners = {name: judged[k] for name, k in best.items() if name in judged[k].named}
     bare = _without_held(problem, nominal, found["before"])
     for one in judged:
         steps = _steps(one, problem, found, nominal, final, events)
@@ -282,7 +284,8 @@ def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
             key, unit = full, found.rig.parameter(full).unit
         else:
             continue
-        out[key] = EffectParameterFound(value, found.std.get(full), unit)
+        std = found.std.get(full, math.inf)
+        out[key] = EffectParameterFound(value, std if math.isfinite(std) else None, unit)
     return out
 
 

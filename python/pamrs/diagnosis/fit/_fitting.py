@@ -613,6 +613,9 @@ def fit(
     named = {n: scaling.value(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
     scales = {n: scaling.slope(n, float(v)) for n, v in zip(scaling.names, x, strict=True)}
     std = {n: float(s) * scales[n] for n, s in zip(scaling.names, spread, strict=True)}
+    # what no residual depends on is not known, although the inverse calls it zero
+    untold = zip(scaling.names, np.any(jacobian, axis=0).tolist(), strict=True)
+    std |= {n: math.inf for n, told in untold if not told}
     moved = {n: float(v) for n, v in zip(baseline, x[:count], strict=True)}
     rig = scaling.rig(x, fixed or {})
     loose = tuple(name for name in baseline if name in freed)

@@ -352,13 +352,17 @@ class _Mismatch:
         self.tell("trying " + ", ".join(s.effect for s in acting) + ", which other blocks have")
         named = [c for c in self.candidates if c.effects and c.fit.events is None]
         best = max(named, key=lambda c: _odds(self.weighed, c), default=None)
-        found: list[Candidate | None] = []
+        found: list[Candidate] = []
         for one in acting:
-            found.append(trial.fitted([one], start.fit, trial.white))
+            alone = trial.fitted([one], start.fit, trial.white)
+            if alone is None or not _told(alone, one):
+                continue  # a clock that is late by the same for all that a block sees
+            found.append(alone)
             if best is not None and not exclude(one.effect, best.effects):
                 own = [trial.start_of(best.fit, e) for e in best.effects]
-                found.append(trial.together([*own, one], best.fit, best.wrong))
-        candidates = _one_of_each([*self.candidates, *(c for c in found if c is not None)])
+                both = trial.together([*own, one], best.fit, best.wrong)
+                found += [] if both is None else [both]
+        candidates = _one_of_each([*self.candidates, *found])
         candidates, weighed = _weighed(trial, self.screened, candidates, self.terms, self.tell)
         return replace(self, candidates=candidates, weighed=weighed)
 
@@ -468,6 +472,11 @@ def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Ca
     near = [c for c in lasting[1:] if math.exp(weight(c) - top) > settings.polish_from]
     near.sort(key=weight, reverse=True)
     return [*lasting[:1], *near[: max(settings.most_paired - 1, 0)]]
+
+
+def _told(candidate: Candidate, start: Start) -> bool:
+    """Whether recordings depend on any parameter of an effect that was fitted."""
+    return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
 
 
 def _weighed(
