@@ -33,8 +33,11 @@ def considered(
     found = []
     for names in trial.inner.considered:
         acting = [n for n in names if any(depends(b, n) for b in trial.suspects)]
-        # what happens at times of its own is looked for beside what lasts
-        effects = sorted((n for n in acting if is_effect(n)), key=lambda n: not info_of(n).lasting)
+        # what may happen at times of its own is looked for beside what lasts
+        effects = sorted(
+            (n for n in acting if is_effect(n)),
+            key=lambda n: (info_of(n).transient, not info_of(n).lasting),
+        )
         wrong = tuple(n for n in acting if n in start.fit.moved)
         if not effects and not wrong:
             continue
@@ -70,6 +73,8 @@ def _added(
     steps.
     """
     info = info_of(effect)
+    if beside.fit.events is not None:
+        return None  # beside events nothing else is fitted
     if not info.lasting:
         return trial.transient(id_of(effect), beside)
     begun = [trial.start_of(beside.fit, e) for e in beside.effects]

@@ -59,6 +59,7 @@ from pamrs.diagnosis.search._considered import considered
 from pamrs.diagnosis.search._sets import (
     Weight,
     beside_wrong,
+    far_above_noise,
     in_best_forms,
     left_everywhere,
     no_room_beside,
@@ -266,7 +267,7 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
 def _explained(refit: _Refit, tell: Say) -> _Mismatch:
     """A mismatch with every hypothesis that was tried for it."""
     trial, start = refit.trial, refit.start
-    suspects, now, settings = trial.suspects, start.fitted, trial.settings
+    suspects, now = trial.suspects, start.fitted
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
     tell(
         f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} "
@@ -280,11 +281,7 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
     mistaken = freed(trial, start.fit, refit.first, tell)
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
-    strong = any(
-        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > settings.search.strong_ratio
-        for b in suspects
-        for kept in (now, trial.out)
-    )
+    strong = far_above_noise(trial, start)
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed, strong=strong)
     terms = _Terms(
         probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),

@@ -18,7 +18,7 @@ from pamrs.diagnosis.evidence import (
     share_left,
     significant,
 )
-from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
+from pamrs.diagnosis.fit import Start, acts_in, form_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
@@ -28,6 +28,7 @@ __all__ = [
     "Say",
     "Weight",
     "beside_wrong",
+    "far_above_noise",
     "in_best_forms",
     "left_everywhere",
     "no_room_beside",
@@ -161,8 +162,9 @@ class _Growing:
         best = max(sets, key=self.weight, default=None)
         found: list[Candidate] = []
         while best is not None and len(best.names) < self.trial.settings.search.most_terms:
-            best = in_best_forms(self.trial, self.screened, best, self.tell)
-            found.append(best)
+            formed = self._in_best_forms(best, [*sets, *found])
+            found += formed
+            best = max(formed, key=self.weight)
             tried = self.widened(best)
             further = max(tried, key=self.weight, default=None)
             if further is None or not _predicts_better(further, best, self.trial):
@@ -170,6 +172,25 @@ class _Growing:
             found += tried
             best = further
         return found
+
+    def _in_best_forms(self, base: Candidate, others: list[Candidate]) -> list[Candidate]:
+        """A set with its effects in their best forms, and its rivals in the forms that it has then:
+        which of them leaves least must not depend on whose forms were looked at.
+        """
+        trial = self.trial
+        best = in_best_forms(trial, self.screened, base, self.tell)
+        mended = {e for e in base.effects if _form(base, e) != _form(best, e)}
+        rivals = [c for c in others if mended & set(c.effects) and c.fit.events is None]
+        rivals.sort(key=self.weight, reverse=True)
+
+        def formed(rival: Candidate) -> Candidate | None:
+            starts = [
+                trial.start_of((best if e in mended else rival).fit, e) for e in rival.effects
+            ]
+            return trial.together(starts, rival.fit, rival.wrong)
+
+        tried = two_at_a_time(formed, rivals[: trial.settings.search.most_polished])
+        return [best, *(c for c in tried if c is not None)]
 
     def widened(self, base: Candidate) -> list[Candidate]:
         """A set with each of its likely partners, fitted from where both stand."""
@@ -196,12 +217,42 @@ class _Growing:
         """What may be missing beside a set: effects whose signature is in what it leaves, what
         tells by itself, and parameters that it moves far.
         """
-        for scores in self._signatures(base):
-            if not self._was_tried(base, (scores[0].effect,)):
-                yield self._begun_best(base, begun, scores)
+        if far_above_noise(self.trial, base):
+            yield from self._shortlisted(base, begun)
+        else:
+            for scores in self._signatures(base):
+                if not self._was_tried(base, (scores[0].effect,)):
+                    yield self._begun_best(base, begun, scores)
         yield from self._telling(base)
         strained = strained_parameters(self.trial, base.fit) if base.effects else []
         yield from (_Partner((name,), [], (name,)) for name in strained if name not in base.wrong)
+
+    def _shortlisted(self, base: Candidate, begun: list[Start]) -> list[_Partner]:
+        """The effects that leave least beside a set after a few steps, of all that act.
+
+        Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
+        """
+        trial = self.trial
+        stand = stand_of(base.fit, trial.inner, trial.white)
+        ranked = by_effect(self.screened.scores(stand, without=base.effects))
+        starts = [
+            score.start.scaled(score.size)
+            for effect in _one_place_each(list(ranked))
+            if not self._was_tried(base, (effect,))
+            for score in best_of_each_kind(ranked[effect])
+        ]
+
+        def begin(start: Start) -> Candidate | None:
+            return trial.fitted_shortly([*begun, start], base.fit, base.wrong)
+
+        tried = zip(two_at_a_time(begin, starts), starts, strict=True)
+        short = [(c, start) for c, start in tried if c is not None]
+        short.sort(key=lambda one: self.weight(one[0]), reverse=True)
+        best: dict[str, _Partner] = {}
+        for found, start in short:
+            own = trial.start_of(found.fit, start.effect)
+            best.setdefault(start.effect, _Partner((start.effect,), [own]))
+        return list(best.values())[: trial.settings.search.most_partners]
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
         """An effect beside a set, from the start that leaves least after a few steps."""
@@ -222,11 +273,9 @@ class _Growing:
         trial, settings = self.trial, self.trial.settings.search
         stand = stand_of(base.fit, trial.inner, trial.white)
         ranked = by_effect(self.screened.scores(stand, without=base.effects))
-        own = self.screened.stand.rows
         alone = len(base.names) == 1
-        # what a wrong value leaves is a mismatch of its own
-        mismatch = float(own @ own) if alone and not base.wrong else stand.power_left
-        least = max(settings.least_gain, settings.partner_share * mismatch)
+        # what a term leaves is a mismatch of its own, however large what it takes is
+        least = max(settings.least_gain, settings.partner_share * stand.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[: settings.most_partners]
         # what is left in one block may be little beside what another one had: an effect of that
@@ -354,6 +403,11 @@ def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say)
     return replace(best, forms_tried=True)
 
 
+def _form(candidate: Candidate, effect: str) -> str:
+    """The form that an effect has in a set."""
+    return form_in(candidate.fit.rig, effect)
+
+
 def _in_another_form(
     trial: Attempts, base: Candidate, effect: str, scores: list[Score], tell: Say
 ) -> Candidate | None:
@@ -462,17 +516,19 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
     return gained > settings.further_errors * error and gained > settings.further_share * left
 
 
-def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether a hypothesis leaves so little that no pair can be called for.
+def far_above_noise(trial: Attempts, found: Candidate) -> bool:
+    """Whether what a hypothesis leaves is so far above the noise that signatures say little."""
+    strong = trial.settings.search.strong_ratio
+    return any(
+        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > strong
+        for b in trial.suspects
+        for kept in (found.fitted, found.held_out)
+    )
 
-    What a single effect leaves may be no more than the difference between its equation and the
-    truth; a value of the rig file that was wrong leaves noise.
-    """
-    if explains(candidate, start, trial.compared, trial.settings.evidence):
-        return True
-    if not candidate.effects:
-        return False  # another value leaves nothing to the form of an equation
-    return no_room_beside(candidate, trial, start) and not _untouched(candidate, start, trial)
+
+def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+    """Whether a hypothesis leaves noise, so that no pair can be called for."""
+    return explains(candidate, start, trial.compared, trial.settings.evidence)
 
 
 def no_room_beside(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
