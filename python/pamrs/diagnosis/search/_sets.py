@@ -147,6 +147,8 @@ class _Growing:
         Receives progress.
     done : set
         Names of the sets that were fitted.
+    likely : list of _Partner
+        What leaves least beside the single hypothesis that weighs most, which the others get too.
     """
 
     trial: Attempts
@@ -156,6 +158,7 @@ class _Growing:
     weight: Weight
     tell: Say
     done: set[frozenset[str]] = field(default_factory=set)
+    likely: list[_Partner] = field(default_factory=list)
 
     def grown(self, sets: list[Candidate]) -> list[Candidate]:
         """The best set with one term after the other."""
@@ -218,7 +221,10 @@ class _Growing:
         tells by itself, and parameters that it moves far.
         """
         if far_above_noise(self.trial, base):
-            yield from self._shortlisted(base, begun)
+            known = self.likely if len(base.names) == 1 else []
+            for partner in known or self._shortlisted(base, begun):
+                if not set(partner.names) & set(base.names):
+                    yield partner
         else:
             for scores in self._signatures(base):
                 if not self._was_tried(base, (scores[0].effect,)):
@@ -252,7 +258,10 @@ class _Growing:
         for found, start in short:
             own = trial.start_of(found.fit, start.effect)
             best.setdefault(start.effect, _Partner((start.effect,), [own]))
-        return list(best.values())[: trial.settings.search.most_partners]
+        partners = list(best.values())[: trial.settings.search.most_partners]
+        if len(base.names) == 1:
+            self.likely.extend(partners)
+        return partners
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
         """An effect beside a set, from the start that leaves least after a few steps."""
