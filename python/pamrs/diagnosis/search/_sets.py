@@ -223,7 +223,7 @@ class _Growing:
         if far_above_noise(self.trial, base):
             known = self.likely if len(base.names) == 1 else []
             for partner in known or self._shortlisted(base, begun):
-                if not set(partner.names) & set(base.names):
+                if not any(exclude(name, base.effects) for name in partner.names):
                     yield partner
         else:
             for scores in self._signatures(base):
@@ -405,10 +405,15 @@ def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say)
     ranked = by_effect(screened.scores())
     best = base
     for effect in base.effects:
-        if not any(significant(best.fitted[b.name]) for b in trial.suspects):
-            break
-        other = _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
-        best = best if other is None else other
+        other: Candidate | None = best
+        while other is not None:
+            best = other
+            noise = not any(significant(best.fitted[b.name]) for b in trial.suspects)
+            other = (
+                None
+                if noise
+                else _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
+            )
     return replace(best, forms_tried=True)
 
 
