@@ -28,8 +28,9 @@ use crate::scalar::{constant, Scalar};
 
 const STICTION: EffectParameter =
     EffectParameter::new("stiction", "N m", 0.0, 1e6, 1.0).starts(&[0.5, 3.0]).off(0.0);
-const SPEED: EffectParameter =
-    EffectParameter::new("stribeck_speed", "rad/s", 0.001, 1000.0, 0.05).starts(&[0.02, 0.1]);
+const SPEED: EffectParameter = EffectParameter::new("stribeck_speed", "rad/s", 0.001, 1000.0, 0.05)
+    .starts(&[0.02, 0.1])
+    .usually(0.01, 0.1);
 
 const EXPONENTIAL: Form = Form {
     name: "exponential",

@@ -610,7 +610,9 @@ def _rare(candidate: Candidate, name: str, settings: EvidenceSettings) -> float:
     expected = find_parameter(name).expected
     if expected is not None:
         (low, high), wide = expected, 2.0 * candidate.fit.std.get(name, 0.0)
-        times = max(low / max(value + wide, 1e-300), (value - wide) / high, 1.0)
+        # what is large and hardly determined may be a part of its value, not nothing
+        least = value * math.exp(-wide / value) if value > 0.0 else 0.0
+        times = max(low / max(value + wide, 1e-300), least / high, 1.0)
         outside = math.log(times) / math.log(settings.range_factor)
         lost += min(0.5 * outside**2, settings.most_range_price)
     return lost
