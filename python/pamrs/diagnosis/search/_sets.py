@@ -18,7 +18,7 @@ from pamrs.diagnosis.evidence import (
     share_left,
     significant,
 )
-from pamrs.diagnosis.fit import Start, acts_in, form_in, two_at_a_time
+from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, stand_of
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
@@ -182,7 +182,7 @@ class _Growing:
         """
         trial = self.trial
         best = in_best_forms(trial, self.screened, base, self.tell)
-        mended = {e for e in base.effects if _form(base, e) != _form(best, e)}
+        mended = {e for e in base.effects if _kind(trial, base, e) != _kind(trial, best, e)}
         rivals = [c for c in others if mended & set(c.effects) and c.fit.events is None]
         rivals.sort(key=self.weight, reverse=True)
 
@@ -405,21 +405,21 @@ def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say)
     ranked = by_effect(screened.scores())
     best = base
     for effect in base.effects:
-        other: Candidate | None = best
-        while other is not None:
+        scores = ranked.get(effect, [])
+        while any(significant(best.fitted[b.name]) for b in trial.suspects):
+            other = _in_another_form(trial, best, effect, scores, tell)
+            if other is None:
+                break
             best = other
-            noise = not any(significant(best.fitted[b.name]) for b in trial.suspects)
-            other = (
-                None
-                if noise
-                else _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
-            )
     return replace(best, forms_tried=True)
 
 
-def _form(candidate: Candidate, effect: str) -> str:
-    """The form that an effect has in a set."""
-    return form_in(candidate.fit.rig, effect)
+def _kind(
+    trial: Attempts, candidate: Candidate, effect: str
+) -> tuple[str, frozenset[tuple[str, float]]]:
+    """The form that an effect has in a set, and what is chosen in it."""
+    start = trial.start_of(candidate.fit, effect)
+    return start.form, frozenset(start.held.items())
 
 
 def _in_another_form(
