@@ -9,6 +9,7 @@ sensitivities apart, and its tolerances are relative: it took four times as long
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TypeVar
 
@@ -71,9 +72,19 @@ def levenberg_marquardt(
     Marquardt (1963); active bounds as in Kanzow, Yamashita & Fukushima (2004).
     """
     low, high = bounds
+
+    def finite(x: Array) -> tuple[Array, Array, T]:
+        found = evaluate(x)
+        # squares that overflow are outside the range as much as what is no number
+        with np.errstate(over="ignore", invalid="ignore"):
+            known = math.isfinite(float(np.vdot(found[1], found[1]) + found[0] @ found[0]))
+        if not known:
+            raise SimulationError("the model's sensitivities are too large to be fitted")
+        return found
+
     least, hardest = settings.step_share if share is None else share, settings.most_damping
     x = np.clip(start, low, high)
-    best = evaluate(x)
+    best = finite(x)
     spent, damping = 1, settings.first_damping
     reached = [float(best[0] @ best[0])]  # by each evaluation
     while x.size and spent < evaluations:
@@ -93,7 +104,7 @@ def levenberg_marquardt(
         tried = np.clip(x + step, low, high)
         spent += 1
         try:
-            found = evaluate(tried)
+            found = finite(tried)
         except SimulationError:
             damping = max(10.0 * hard, 1e-2)
             continue
