@@ -224,7 +224,9 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
     leak = found.probabilities.get("leak_muscle", 0.0)
     if leaks:
         assert found.verdict == "effects"
-        assert leak > 0.85
+        # in whatever set: heat of the wall or a late gauge may stand beside it
+        assert [e.id for e in found.effects] == ["leak_muscle"]
+        assert found.effects[0].probability > 0.85
         time_constant = found.effects[0]["parameters"]["time_constant"]["value"]
         assert 4.0 < time_constant < 30.0
     else:

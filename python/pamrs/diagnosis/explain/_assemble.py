@@ -108,11 +108,8 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
     named = any(j.named or j.wrong for j in judged)
-    known = (
-        (models.chosen, models.owners)
-        if named
-        else (models.starts, owners_of_parameters(models.starts))
-    )
+    known = models.chosen if named else models.starts
+    owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
@@ -129,7 +126,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         effects=effects,
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, *known, settings.fit),
+        parameters=_parameters(nominal, known, owners, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=next_experiment(
             verdict,
