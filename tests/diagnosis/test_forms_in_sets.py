@@ -8,25 +8,21 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, significant
 from pamrs.diagnosis.explain._owners import owners_of_effects
-from pamrs.diagnosis.fit import Problem, fit, form_in, residuals, starts_of
-from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.fit import Problem, fit, form_in, starts_of
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import screen
 from pamrs.diagnosis.search._sets import far_above_noise, in_best_forms
 from pamrs.simulation import core_rig
 from tests.diagnosis.again import case
-from tests.diagnosis.noisy import noisy
+from tests.diagnosis.held import RIG, SETTINGS, attempts
 
-SETTINGS = DiagnosisSettings()
-RIG = pamrs.rigs.sealed_chamber()
 SHOULDER = pamrs.rigs.shoulder()
 LEAKY = RIG.with_effect("leak_muscle", {"conductance": 5e-12, "exponent": 1.6}, form="power")
 
@@ -36,23 +32,7 @@ def trial() -> Attempts:
     """A chamber with a leak in its second form, held from three pressures, the last one held
     out.
     """
-    kept = []
-    for seed, pressure in enumerate((8e5, 5e5, 3e5)):
-        made = pamrs.simulate(
-            LEAKY, duration=60.0, sample_time=0.1, initial={"muscle_pressure": pressure}
-        )
-        channels = {"muscle_pressure": made["muscle_pressure"]}
-        recording = noisy(f"hold{seed}", "fit", 0.1, channels, {"muscle_pressure": 60.0}, [7, seed])
-        kept.append(prepare(recording, RIG, SETTINGS))
-    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
-    core = core_rig(RIG)
-    inner, outer = (
-        Problem(blocks, kept[:2], core, SETTINGS),
-        Problem(blocks, kept[2:], core, SETTINGS),
-    )
-    levels = noise_levels(inner, core_rig(LEAKY, core)) | noise_levels(outer, core_rig(LEAKY, core))
-    out = {block.name: SimpleNamespace(ratio=9.0) for block in blocks}
-    return Attempts(inner, outer, RIG, levels, cast("Any", out), blocks)
+    return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
 
 
 def hurried(trial: Attempts, evaluations: int) -> Candidate:
@@ -79,7 +59,6 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Atte
     base = hurried(trial, 20)
     assert any(significant(kept) for kept in base.fitted.values())
     start = fit(trial.inner, RIG, (), {}, trial.white)
-    start = replace(start, residuals=residuals(trial.inner, start.rig, list(start.values)))
     screened = screen(
         trial.inner, start, ["leak_muscle", "heat_transfer"], trial.white, sealed=True
     )

@@ -6,50 +6,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import cast
 
 import pytest
 
-import pamrs
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate
-from pamrs.diagnosis.fit import Problem, fit, starts_of
-from pamrs.diagnosis.noise import NoiseLevel, noise_levels
-from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.diagnosis.fit import fit, starts_of
+from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.screen import Stand
 from pamrs.diagnosis.search._below_noise import _by_chance
 from pamrs.diagnosis.search._sets import without_needless
 from pamrs.diagnosis.search._wrong_parameters import _needless
-from pamrs.simulation import core_rig
-from tests.diagnosis.noisy import noisy
-
-SETTINGS = DiagnosisSettings()
-RIG = pamrs.rigs.sealed_chamber()
-
-
-def attempts() -> Attempts:
-    """Two holds of a chamber that leaks, the second one held out."""
-    leaky = RIG.with_effect("leak_muscle", {"conductance": 3e-11})
-    kept = []
-    for seed, pressure in enumerate((7e5, 5e5)):
-        made = pamrs.simulate(
-            leaky, duration=60.0, sample_time=0.1, initial={"muscle_pressure": pressure}
-        )
-        channels = {"muscle_pressure": made["muscle_pressure"]}
-        recording = noisy("hold", "fit", 0.1, channels, {"muscle_pressure": 150.0}, [7, seed])
-        kept.append(prepare(recording, RIG, SETTINGS))
-    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
-    core = core_rig(RIG)
-    inner, outer = (Problem(blocks, [one], core, SETTINGS) for one in kept)
-    levels = noise_levels(inner, core_rig(leaky, core)) | noise_levels(outer, core_rig(leaky, core))
-    out = {
-        block.name: SimpleNamespace(ratio=9.0) for block in blocks
-    }  # what the baseline leaves: it only scales the gap that is closed
-    return Attempts(inner, outer, RIG, levels, cast("Any", out), blocks)
+from tests.diagnosis.held import RIG, SETTINGS, attempts
 
 
 def test_an_effect_that_does_nothing_is_taken_out_from_where_the_set_stands() -> None:
-    trial = attempts()
+    leaky = RIG.with_effect("leak_muscle", {"conductance": 3e-11})
+    trial = attempts(leaky, (7e5, 5e5), 150.0)
     starts = [starts_of(effect, sealed=True)[0] for effect in ("leak_muscle", "heat_transfer")]
     start = fit(trial.inner, RIG, (), {}, trial.white)
     both = trial.fitted(starts, start, trial.white)

@@ -5,12 +5,13 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
+    Events,
     Fit,
     Key,
     Problem,
@@ -316,21 +317,15 @@ class Attempts:
         """
         assert found.events is not None
         effect = found.events.effect
-        own, kept, forms = parts_of([self.start_of(beside.fit, e) for e in beside.effects])
         warm = replace(
             beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved}
         )
-        again = fit(
-            self.inner,
-            self.nominal,
-            beside.effects,
-            own,
+        again = self._fit(
+            [self.start_of(beside.fit, e) for e in beside.effects],
             autocorrelation,
-            fixed=kept,
-            warm=warm,
+            warm,
             events=found.events,
             evaluations=self.settings.transients.evaluations_beside,
-            forms=forms,
         )
         happened = next(iter(found.events.values.values()))
         parts = {
@@ -418,39 +413,14 @@ class Attempts:
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(id_of(e) for e in effects):
             return None  # it would replace what the model holds
-        free, held, forms = parts_of(starts)
         settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
         limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
         try:
-            best = fit(
-                self.inner,
-                self.nominal,
-                effects,
-                free,
-                autocorrelation,
-                fixed=held,
-                warm=warm,
-                evaluations=limit,
-                share=share,
-                forms=forms,
-            )
+            best = self._fit(starts, autocorrelation, warm, evaluations=limit, share=share)
             autocorrelation = self.autocorrelation(best)
             if max(autocorrelation.values()) > self.settings.noise.correlated_variance:
-                again = {
-                    n: _off_zero(n, v, settings.least_start) for n, v in best.effect_values.items()
-                }
-                best = fit(
-                    self.inner,
-                    self.nominal,
-                    effects,
-                    again,
-                    autocorrelation,
-                    fixed=held,
-                    warm=best,
-                    evaluations=limit,
-                    share=share,
-                    forms=forms,
-                )
+                again = [self.start_of(best, effect) for effect in effects]
+                best = self._fit(again, autocorrelation, best, evaluations=limit, share=share)
             return self.judged(effects, best)
         except SimulationError:
             return None  # it leaves the range in which the model holds
@@ -464,23 +434,42 @@ class Attempts:
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(id_of(e) for e in effects):
             return None
-        free, held, forms = parts_of(starts)
+        limit = self.settings.search.first_evaluations
         try:
-            found = fit(
-                self.inner,
-                self.nominal,
-                effects,
-                free,
-                self.white,
-                fixed=held,
-                warm=warm,
-                freed=wrong,
-                evaluations=self.settings.search.first_evaluations,
-                forms=forms,
-            )
+            found = self._fit(starts, self.white, warm, wrong=wrong, evaluations=limit)
             return replace(self.judged(effects, found), wrong=wrong)
         except SimulationError:
             return None  # it leaves the range in which the model holds
+
+    def _fit(
+        self,
+        starts: list[Start],
+        weights: dict[str, float],
+        warm: Fit,
+        *,
+        wrong: Collection[str] = (),
+        events: Events | None = None,
+        evaluations: int | None = None,
+        share: float | None = None,
+    ) -> Fit:
+        """Effects fitted from a start of each, with the baseline from where another fit left it and
+        some parameters freed; the rest as in :func:`pamrs.diagnosis.fit.fit`.
+        """
+        free, held, forms = parts_of(starts)
+        return fit(
+            self.inner,
+            self.nominal,
+            tuple(start.effect for start in starts),
+            free,
+            weights,
+            fixed=held,
+            warm=warm,
+            events=events,
+            evaluations=evaluations,
+            share=share,
+            freed=wrong,
+            forms=forms,
+        )
 
     def _moved_alone(self, names: tuple[str, ...]) -> Fit:
         """Some parameters freed and fitted in a few steps with the others at their nominal values,
@@ -603,19 +592,8 @@ class Attempts:
         effects = tuple(start.effect for start in starts)
         weights, found = self.autocorrelation(warm), warm
         for _ in range(self.settings.fit.most_weightings):
-            free, held, forms = parts_of(starts)
-            found = fit(
-                self.inner,
-                self.nominal,
-                effects,
-                free,
-                weights,
-                fixed=held,
-                warm=found,
-                freed=wrong,
-                evaluations=evaluations,
-                share=share,
-                forms=forms,
+            found = self._fit(
+                starts, weights, found, wrong=wrong, evaluations=evaluations, share=share
             )
             left = self.autocorrelation(found)
             if not self._lighter(left, weights):
@@ -636,10 +614,7 @@ class Attempts:
         """
         if any(c.fit.events is not None for c in candidates):
             return None
-        effects = tuple(effect for c in candidates for effect in c.effects)
-        free, held, forms = parts_of(
-            self.start_of(c.fit, effect) for c in candidates for effect in c.effects
-        )
+        starts = [self.start_of(c.fit, effect) for c in candidates for effect in c.effects]
         wrong = [name for c in candidates for name in c.wrong]
         warm = replace(
             candidates[0].fit,
@@ -648,18 +623,7 @@ class Attempts:
         )
         share = self.settings.fit.final_step_share
         try:
-            return fit(
-                self.inner,
-                self.nominal,
-                effects,
-                free,
-                self.white,
-                fixed=held,
-                warm=warm,
-                freed=wrong,
-                share=share,
-                forms=forms,
-            )
+            return self._fit(starts, self.white, warm, wrong=wrong, share=share)
         except SimulationError:
             return None
 

@@ -47,6 +47,7 @@ from pamrs.diagnosis.fit import (
     known_parameters,
     residuals,
     spread_over_pieces,
+    with_entry,
     with_known,
 )
 from pamrs.diagnosis.noise import NoiseLevel
@@ -478,8 +479,7 @@ def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
     """
     rig = nominal
     for _, entry in _added(nominal, candidates):
-        form, at = entry.get("form", ""), entry.get("at", "")
-        rig = rig.with_effect(entry["id"], entry["parameters"], at=at, form=form)
+        rig = with_entry(rig, entry)
     owners = owners_of_parameters(candidates).items()
     return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
 
@@ -513,8 +513,7 @@ def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[
             for n, s in candidate.fit.std.items()
             if n.startswith(own) and math.isfinite(s)
         }
-        form, at = effect.get("form", ""), effect.get("at", "")
-        rig = rig.with_effect(effect["id"], effect["parameters"], std=std, at=at, form=form)
+        rig = with_entry(rig, effect, std)
     return rig
 
 

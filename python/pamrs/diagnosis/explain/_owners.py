@@ -51,7 +51,8 @@ def _doubt(candidate: Candidate, effect: str) -> float:
     logs = []
     for name in candidate.fit.values:
         if name.startswith(effect + "."):
-            size = max(abs(s) for s in (find_parameter(name).default, *find_parameter(name).starts))
+            parameter = find_parameter(name)
+            size = max(abs(s) for s in (parameter.default, *parameter.starts))
             spread = std[name] / size if size > 0.0 else std[name]
             logs.append(math.log(spread) if spread > 0.0 else math.inf)
     return sum(logs) / len(logs) if logs else -math.inf

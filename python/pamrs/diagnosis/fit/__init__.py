@@ -4,7 +4,7 @@ from several starts.
 Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `with_priors`,
 `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`,
 `starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
-`with_effects_of`, `without_term` (effects of a rig and their forms);
+`with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
 `depends`, `fits`, `places_of` (where effects act); `holdable`, `without_passing`, `named_entries`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
@@ -46,6 +46,7 @@ from pamrs.diagnosis.fit._starts import (
     form_in,
     starts_of,
     with_effects_of,
+    with_entry,
     without_term,
 )
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
@@ -83,6 +84,7 @@ __all__ = [
     "starts_of",
     "two_at_a_time",
     "with_effects_of",
+    "with_entry",
     "with_known",
     "with_priors",
     "without_passing",

@@ -73,24 +73,25 @@ def levenberg_marquardt(
     """
     low, high = bounds
 
-    def finite(x: Array) -> tuple[Array, Array, T]:
+    def evaluated(x: Array) -> tuple[tuple[Array, Array, T], Array, Array]:
+        """What there is at a point, and its normal equations."""
         found = evaluate(x)
+        rows, jacobian, _ = found
         # squares that overflow are outside the range as much as what is no number
         with np.errstate(over="ignore", invalid="ignore"):
-            known = math.isfinite(float(np.vdot(found[1], found[1]) + found[0] @ found[0]))
+            gradient, normal = jacobian.T @ rows, jacobian.T @ jacobian
+            known = math.isfinite(float(np.trace(normal) + rows @ rows))
         if not known:
             raise SimulationError("the model's sensitivities are too large to be fitted")
-        return found
+        return found, gradient, normal
 
     least, hardest = settings.step_share if share is None else share, settings.most_damping
     x = np.clip(start, low, high)
-    best = finite(x)
+    best, gradient, normal = evaluated(x)
     spent, damping = 1, settings.first_damping
     reached = [float(best[0] @ best[0])]  # by each evaluation
     while x.size and spent < evaluations:
-        rows, jacobian, _ = best
-        gradient = jacobian.T @ rows
-        normal = jacobian.T @ jacobian
+        rows = best[0]
         worth = max(settings.step_gain, least * float(rows @ rows))
         hard = damping
         step = _step(x, gradient, normal, hard, low, high)
@@ -104,7 +105,7 @@ def levenberg_marquardt(
         tried = np.clip(x + step, low, high)
         spent += 1
         try:
-            found = finite(tried)
+            found, *equations = evaluated(tried)
         except SimulationError:
             damping = max(10.0 * hard, 1e-2)
             continue
@@ -112,6 +113,7 @@ def levenberg_marquardt(
         gained = float(rows @ rows - found[0] @ found[0])
         if gained > 0.0:
             x, best, reached[-1] = tried, found, reached[-1] - gained
+            gradient, normal = equations
             damping = (
                 damping * 0.1
                 if gained > 0.5 * gain

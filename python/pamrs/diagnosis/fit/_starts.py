@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,6 +20,7 @@ __all__ = [
     "form_in",
     "starts_of",
     "with_effects_of",
+    "with_entry",
     "without_term",
 ]
 
@@ -58,6 +59,11 @@ class Start:
     def scalable(self) -> bool:
         """Whether a number scales the effect."""
         return bool(self.sizes)
+
+    @property
+    def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
+        """Its form, and what is chosen in it."""
+        return self.form, frozenset(self.held.items())
 
     def applied(self, rig: Rig) -> Rig:
         """The rig with the effect as it starts."""
@@ -120,9 +126,14 @@ def with_effects_of(rig: Rig, other: Rig, but: Collection[str] = ()) -> Rig:
     """A rig with the effects of another one as well, in their forms, but for some ids."""
     for entry in other.effects:
         if entry["id"] not in but:
-            form, at = entry.get("form", ""), entry.get("at", "")
-            rig = rig.with_effect(entry["id"], entry["parameters"], at=at, form=form)
+            rig = with_entry(rig, entry)
     return rig
+
+
+def with_entry(rig: Rig, entry: Mapping[str, Any], std: Mapping[str, float] | None = None) -> Rig:
+    """A rig with an effect of another one as well, and standard deviations of its parameters."""
+    form, at = entry.get("form", ""), entry.get("at", "")
+    return rig.with_effect(entry["id"], entry["parameters"], std=std, at=at, form=form)
 
 
 def starts_of(effect: str, *, sealed: bool) -> list[Start]:

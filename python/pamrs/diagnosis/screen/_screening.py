@@ -78,11 +78,6 @@ class Score:
     size: float
     signature: Array
 
-    @property
-    def kind(self) -> tuple[str, frozenset[tuple[str, float]]]:
-        """The form that its start has, and what is chosen in it."""
-        return self.start.form, frozenset(self.start.held.items())
-
 
 @dataclass(frozen=True, eq=False)
 class Stand:
@@ -195,7 +190,7 @@ def best_of_each_kind(scores: list[Score]) -> list[Score]:
     """Of an effect's scores, the best ones first, the first of each form and choice in it."""
     best: dict[tuple[str, frozenset[tuple[str, float]]], Score] = {}
     for score in scores:
-        best.setdefault(score.kind, score)
+        best.setdefault(score.start.kind, score)
     return list(best.values())
 
 

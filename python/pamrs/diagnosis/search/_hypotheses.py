@@ -779,7 +779,7 @@ def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
     best = best_of_each_kind(scores)
     forms = [s for s in best if s.gain > settings.near_form * scores[0].gain]
     forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
-    alike = [s for s in scores if s.kind == scores[0].kind]
+    alike = [s for s in scores if s.start.kind == scores[0].start.kind]
     near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
     return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
 

@@ -20,7 +20,14 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.screen import Score, Screen, best_of_each_kind, by_effect, stand_of
+from pamrs.diagnosis.screen import (
+    Score,
+    Screen,
+    Stand,
+    best_of_each_kind,
+    by_effect,
+    stand_of,
+)
 from pamrs.diagnosis.search._wrong_parameters import strained_parameters
 from pamrs.effects import exclude, id_of
 
@@ -182,7 +189,10 @@ class _Growing:
         """
         trial = self.trial
         best = in_best_forms(trial, self.screened, base, self.tell)
-        mended = {e for e in base.effects if _kind(trial, base, e) != _kind(trial, best, e)}
+        before, after = (
+            {e: trial.start_of(c.fit, e).kind for e in base.effects} for c in (base, best)
+        )
+        mended = {e for e in base.effects if before[e] != after[e]}
         rivals = [c for c in others if mended & set(c.effects) and c.fit.events is None]
         rivals.sort(key=self.weight, reverse=True)
 
@@ -221,8 +231,11 @@ class _Growing:
         tells by itself, and parameters that it moves far.
         """
         if far_above_noise(self.trial, base):
-            known = self.likely if len(base.names) == 1 else []
-            for partner in known or self._shortlisted(base, begun):
+            alone = len(base.names) == 1
+            found = (alone and self.likely) or self._shortlisted(base, begun)
+            if alone:
+                self.likely[:] = found
+            for partner in found:
                 if not any(exclude(name, base.effects) for name in partner.names):
                     yield partner
         else:
@@ -238,50 +251,51 @@ class _Growing:
 
         Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
         """
-        trial = self.trial
-        stand = stand_of(base.fit, trial.inner, trial.white)
-        ranked = by_effect(self.screened.scores(stand, without=base.effects))
+        _, ranked = self._ranked(base)
         starts = [
             score.start.scaled(score.size)
             for effect in _one_place_each(list(ranked))
             if not self._was_tried(base, (effect,))
             for score in best_of_each_kind(ranked[effect])
         ]
+        best: dict[str, _Partner] = {}
+        for found, start in self._shortly(base, begun, starts):
+            own = self.trial.start_of(found.fit, start.effect)
+            best.setdefault(start.effect, _Partner((start.effect,), [own]))
+        return list(best.values())[: self.trial.settings.search.most_partners]
+
+    def _ranked(self, base: Candidate) -> tuple[Stand, dict[str, list[Score]]]:
+        """Where a set stands, and the starts of each effect by what they would take of what it
+        leaves.
+        """
+        stand = stand_of(base.fit, self.trial.inner, self.trial.white)
+        return stand, by_effect(self.screened.scores(stand, without=base.effects))
+
+    def _shortly(
+        self, base: Candidate, begun: list[Start], starts: list[Start]
+    ) -> list[tuple[Candidate, Start]]:
+        """A set with an effect more, fitted in a few steps from each of its starts, with the start;
+        what weighs most comes first.
+        """
 
         def begin(start: Start) -> Candidate | None:
-            return trial.fitted_shortly([*begun, start], base.fit, base.wrong)
+            return self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)
 
         tried = zip(two_at_a_time(begin, starts), starts, strict=True)
-        short = [(c, start) for c, start in tried if c is not None]
-        short.sort(key=lambda one: self.weight(one[0]), reverse=True)
-        best: dict[str, _Partner] = {}
-        for found, start in short:
-            own = trial.start_of(found.fit, start.effect)
-            best.setdefault(start.effect, _Partner((start.effect,), [own]))
-        partners = list(best.values())[: trial.settings.search.most_partners]
-        if len(base.names) == 1:
-            self.likely.extend(partners)
-        return partners
+        found = [(c, start) for c, start in tried if c is not None]
+        return sorted(found, key=lambda one: self.weight(one[0]), reverse=True)
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
         """An effect beside a set, from the start that leaves least after a few steps."""
         most = self.trial.settings.search.most_starts
         starts = [s.start.scaled(s.size) for s in scores[:most]]
-
-        def begin(start: Start) -> Candidate | None:
-            return self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)
-
-        many = starts if len(starts) > 1 else []
-        tried = zip(two_at_a_time(begin, many), many, strict=True)
-        short = [(c, start) for c, start in tried if c is not None]
-        best = max(short, key=lambda one: self.weight(one[0]), default=(base, starts[0]))
-        return _Partner((scores[0].effect,), [best[1]])
+        short = self._shortly(base, begun, starts if len(starts) > 1 else [])
+        return _Partner((scores[0].effect,), [short[0][1] if short else starts[0]])
 
     def _signatures(self, base: Candidate) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
         trial, settings = self.trial, self.trial.settings.search
-        stand = stand_of(base.fit, trial.inner, trial.white)
-        ranked = by_effect(self.screened.scores(stand, without=base.effects))
+        stand, ranked = self._ranked(base)
         alone = len(base.names) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
         least = max(settings.least_gain, settings.partner_share * stand.power_left)
@@ -402,24 +416,19 @@ def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say)
     """
     if base.forms_tried or len(base.names) < 2 or base.fit.events is not None:
         return base
-    ranked = by_effect(screened.scores())
+
+    def leaves_more() -> bool:
+        return any(significant(best.fitted[b.name]) for b in trial.suspects)
+
     best = base
+    ranked = by_effect(screened.scores()) if leaves_more() else {}
     for effect in base.effects:
-        scores = ranked.get(effect, [])
-        while any(significant(best.fitted[b.name]) for b in trial.suspects):
-            other = _in_another_form(trial, best, effect, scores, tell)
+        while leaves_more():
+            other = _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
             if other is None:
                 break
             best = other
     return replace(best, forms_tried=True)
-
-
-def _kind(
-    trial: Attempts, candidate: Candidate, effect: str
-) -> tuple[str, frozenset[tuple[str, float]]]:
-    """The form that an effect has in a set, and what is chosen in it."""
-    start = trial.start_of(candidate.fit, effect)
-    return start.form, frozenset(start.held.items())
 
 
 def _in_another_form(

@@ -1,0 +1,42 @@
+"""A chamber that was filled, shut and held, with all that an attempt at an explanation needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Attempts
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.noise import noise_levels
+from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import noisy
+
+SETTINGS = DiagnosisSettings()
+RIG = pamrs.rigs.sealed_chamber()
+
+
+def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Attempts:
+    """A minute from each gauge pressure [Pa] at 10 Hz with so much noise [Pa], the last hold held
+    out.
+    """
+    kept = []
+    for seed, pressure in enumerate(pressures):
+        made = pamrs.simulate(
+            plant, duration=60.0, sample_time=0.1, initial={"muscle_pressure": pressure}
+        )
+        channels = {"muscle_pressure": made["muscle_pressure"]}
+        recording = noisy(
+            f"hold{seed}", "fit", 0.1, channels, {"muscle_pressure": noise}, [7, seed]
+        )
+        kept.append(prepare(recording, RIG, SETTINGS))
+    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
+    core = core_rig(RIG)
+    inner, outer = (Problem(blocks, some, core, SETTINGS) for some in (kept[:-1], kept[-1:]))
+    levels = noise_levels(inner, core_rig(plant, core)) | noise_levels(outer, core_rig(plant, core))
+    # what the baseline leaves: it only scales the gap that is closed
+    out = {block.name: SimpleNamespace(ratio=9.0) for block in blocks}
+    return Attempts(inner, outer, RIG, levels, cast("Any", out), blocks)
