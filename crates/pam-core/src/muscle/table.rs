@@ -94,6 +94,15 @@ struct Continuation {
     slope: [f64; COLUMNS],
 }
 
+/// Where the slope of the volume jumps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Kink {
+    /// Contraction ratio.
+    pub at: f64,
+    /// `dV/de` [m3] of one muscle above it less that below it.
+    pub jump: f64,
+}
+
 /// What came of one choice of pieces.
 enum Assembled {
     Table(Box<Table>),
@@ -113,6 +122,7 @@ pub struct Table {
     below: Continuation,
     above: Continuation,
     errors: [f64; COLUMNS],
+    kinks: Vec<Kink>,
 }
 
 impl Table {
@@ -178,8 +188,15 @@ impl Table {
             });
             cells.extend(fitted);
         }
+        let kinks = pieces.windows(2).map(|pair: &[Piece]| {
+            let (above, below) = (&cells[pair[0].first], &cells[pair[1].first + pair[1].last]);
+            let jump = evaluate(above, -1.0_f64)[SLOPE] - evaluate(below, 1.0_f64)[SLOPE];
+            Kink { at: pair[0].start, jump }
+        });
+        let kinks = kinks.collect();
         let idle = Continuation { value: [0.0; COLUMNS], slope: [0.0; COLUMNS] };
-        let mut table = Self { e_min, e_max, pieces, cells, below: idle, above: idle, errors };
+        let mut table =
+            Self { e_min, e_max, pieces, cells, below: idle, above: idle, errors, kinks };
         table.below = table.continuation(e_min);
         table.above = table.continuation(e_max);
         Ok(Assembled::Table(Box::new(table)))
@@ -226,6 +243,12 @@ impl Table {
     #[must_use]
     pub fn breakpoints(&self) -> Vec<f64> {
         self.pieces.iter().rev().map(|p| p.start).chain([self.e_max]).collect()
+    }
+
+    /// Where the slope of the volume jumps, inside the table.
+    #[must_use]
+    pub fn volume_kinks(&self) -> &[Kink] {
+        &self.kinks
     }
 
     /// Number of cells.

@@ -4,6 +4,7 @@ mod air;
 mod body;
 mod discrete;
 mod encoder;
+mod kinks;
 pub mod layout;
 pub mod linear;
 pub mod memory;

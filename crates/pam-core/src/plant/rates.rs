@@ -87,6 +87,11 @@ impl Simulated {
         self.forces || self.volumes
     }
 
+    /// Whether some gas, or what asks for its volume, is integrated.
+    pub(super) fn volumes(&self) -> bool {
+        self.volumes
+    }
+
     /// Whether the state at a place is integrated.
     pub(crate) fn moves(&self, place: usize) -> bool {
         !self.driven[place]
@@ -506,7 +511,7 @@ impl<'a, S: Scalar> Plant<'a, S> {
     }
 
     /// Volume of a gas [m3] for a state.
-    fn volume(&self, gas: usize, state: &[S]) -> S {
+    pub(super) fn volume(&self, gas: usize, state: &[S]) -> S {
         let mut volume = self.fixed_volume[gas];
         for group in self.wiring.groups.iter().filter(|g| g.chamber == gas) {
             let point = group.joint.eval(state[self.layout.angle(group.coordinate)]);

@@ -93,6 +93,8 @@ pub(crate) struct Stepper<'a, S> {
     before: Option<Vec<S>>,
     /// Instants within a step at which valves switch, where they do.
     switches: Option<Switches<S>>,
+    /// Contraction ratios of the muscles before a step, where kinks of their volume are asked for.
+    from: Vec<f64>,
     /// Whether anybody asks what the sensors read.
     pub reads: bool,
 }
@@ -113,6 +115,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             method: Rk4::new(plant.states()),
             start: zeros(),
             end: zeros(),
+            from: Vec::with_capacity(groups),
             remembers: plant.remembers(),
             plant,
         }
@@ -148,8 +151,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if self.switches.is_some() {
             return self.step_in_pieces(state, memory, controls, (time, dt), simulated, &mut drive);
         }
-        let Self { plant, scratch, method, start, end, remembers, stages, before, reads, .. } =
-            self;
+        let Self {
+            plant, scratch, method, start, end, from, remembers, stages, before, reads, ..
+        } = self;
         let layout = plant.rig().layout();
         if let Some(stages) = stages {
             for (k, stage) in stages.iter_mut().enumerate() {
@@ -167,6 +171,11 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             drive(plant, at(0), 0.0, state);
             before.copy_from_slice(state);
         }
+        let kinks = plant.asks_for_kinks(simulated);
+        if kinks {
+            drive(plant, at(0), 0.0, state);
+            plant.where_muscles_are(state, from);
+        }
         let kept = layout.states()..state.len();
         let runs = simulated.runs().iter().cloned().chain([kept]);
         method.step_in(state, runs, dt, |fraction, y, out| {
@@ -175,6 +184,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             plant.rates(y, controls, memory, start, simulated, scratch, out);
         });
         drive(plant, at(2), 1.0, state);
+        if kinks {
+            plant.pass_kinks(from, simulated, state);
+        }
         if let Some(before) = before {
             plant.discrete_update(before, state, held, dt);
             if *reads {
@@ -249,16 +261,24 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         drive: Drives<'_, 'a, S>,
     ) {
         self.set_stages(step, (from, until), now);
-        let Self { plant, scratch, method, start, stages, .. } = self;
+        let Self { plant, scratch, method, start, from: muscles, stages, .. } = self;
         let runs = step.runs(plant, state.len());
         let at = |stage: usize| stages.as_ref().map_or(step.held, |stages| &stages[stage]);
         let length = until - from;
+        let kinks = plant.asks_for_kinks(step.simulated);
+        if kinks {
+            drive(plant, at(0), from / step.dt, state);
+            plant.where_muscles_are(state, muscles);
+        }
         method.step_in(state, runs, length, |fraction, y, out| {
             let controls = at((2.0 * fraction) as usize);
             drive(plant, controls, (from + fraction * length) / step.dt, y);
             plant.rates(y, controls, memory, start, step.simulated, scratch, out);
         });
         drive(plant, at(2), until / step.dt, state);
+        if kinks {
+            plant.pass_kinks(muscles, step.simulated, state);
+        }
     }
 
     /// A valve takes another position. Where its instant has slopes, so has the state: until then
