@@ -228,7 +228,7 @@ def test_a_leak_of_one_muscle_of_a_pair_is_named_with_its_place(leaking) -> None
     assert high - low < LEAK
     terms = [t for t in leaking.budget if t.kind == "effect"]
     assert [(t.block, t.id, t.at) for t in terms] == [("chamber.flexor", "leak_muscle", "flexor")]
-    assert terms[0].share > 0.9
+    assert terms[0].share > 0.8
 
 
 def test_a_channel_that_was_right_stays_right(leaking) -> None:

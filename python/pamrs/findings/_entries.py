@@ -338,9 +338,10 @@ class BudgetTerm(Entry):
         Form of the effect where it is not the usual one.
     share : float
         Share of the excess variance over the noise (of the nominal model, without the effects that
-        it holds) that the term takes with its values in the final model: the mean of what it takes
-        after all terms before it and of what it takes before them; negative where it makes the
-        prediction worse.
+        it holds): of parameters inside their tolerances what they take by themselves with their
+        values in the final model, of names what the final model takes beyond that, divided by what
+        each takes: the mean of what it takes alone, and of what is left without it, the others
+        fitted again. Negative where held-out recordings are predicted worse.
     interval : list of two floats
         95 % interval of the share.
     probability : float or None
@@ -361,8 +362,8 @@ class BudgetTerm(Entry):
     form: str
     share: float = field(
         metadata=told(
-            "of the nominal model's excess variance over the noise, taken with and without the "
-            "other terms"
+            "of the nominal model's excess variance over the noise: what parameters "
+            "take by themselves, then what each name takes beyond them"
         )
     )
     interval: list[float] = field(metadata=told("95 % interval of the share", kind="pair"))

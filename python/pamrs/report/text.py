@@ -81,10 +81,10 @@ SETTLED = 0.75
 settled, `VerdictSettings.settled`)."""
 
 BUDGET_NOTE = (
-    "A share is of the variance beyond the noise that the nominal model leaves: what a term takes, "
-    "averaged over two orders of adding them, with the values of the final model, so that "
-    "parameters refitted by themselves take another share. Below 0 % a term makes it worse by "
-    "itself, and others then take more than 100 %."
+    "A share is of the variance beyond the noise that the nominal model leaves: of parameters what "
+    "they take by themselves, with their values in the final model, of names what that takes "
+    "beyond; several names divide it by what each takes, alone and beside the others. Below 0 % "
+    "a term predicts worse by itself, and others then take more than 100 %."
 )
 """What the shares of a budget are."""
 

@@ -4,18 +4,29 @@ takes, and what stays unexplained.
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import Judged, is_parameter, significant
+from pamrs.diagnosis.evidence import Judged, is_parameter, parts_of, significant, start_of
 from pamrs.diagnosis.explain._owners import owners_of_effects
-from pamrs.diagnosis.fit import Events, Key, Problem, acts_in, form_in, residuals, without_term
+from pamrs.diagnosis.fit import (
+    Events,
+    Key,
+    Problem,
+    acts_in,
+    depends,
+    fit,
+    form_in,
+    known_parameters,
+    residuals,
+    without_term,
+)
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -33,18 +44,21 @@ Residuals = dict[Key, Residual]
 
 @dataclass(frozen=True)
 class _Step:
-    """A term of a group: its kind and id, what the blocks keep with it and all terms before it; and
-    what they keep without and with it, after the terms before it, and after those behind it.
+    """A term of a group: its kind and name, what the blocks keep with it and all terms before it,
+    and with refitted parameters, of what is named, what they keep with no other name and with all
+    others but it.
     """
 
     kind: str
     name: str
     now: Residuals
-    drops: tuple[tuple[Residuals, Residuals], ...]
+    alone: Residuals | None = None
+    without: Residuals | None = None
 
 
 def budget(
     judged: list[Judged],
+    fitted: Problem,
     problem: Problem,
     found: Stages,
     noise_level: dict[Key, NoiseLevel],
@@ -54,17 +68,17 @@ def budget(
 ) -> list[BudgetTerm]:
     """The budget of every block whose nominal model leaves more than noise.
 
-    All terms have the values of the final model, those of the parameters as well: parameters that
-    were fitted without an effect take up what is the effect's. What a term takes depends on what
-    is there already; a share is the mean of what it takes after all terms before it, and of what
-    it takes after all those behind it.
+    Parameters inside their tolerances take what they take by themselves with their values in the
+    final model: fitted without a name they bend towards what is missing. What is named takes what
+    the final model takes beyond that. Several names divide it by what each takes, the mean of what
+    it takes alone and of what is left without it, parameters and the others fitted again.
 
     Parameters
     ----------
     judged : list of Judged
         The groups with their verdicts.
-    problem : Problem
-        Held-out recordings (those that were fitted, where there are no others).
+    fitted, problem : Problem
+        The recordings that were fitted, and held-out ones (the same, where there are no others).
     found : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
@@ -86,7 +100,7 @@ def budget(
     owners = {name: judged[k] for name, k in best.items() if name in judged[k].named}
     bare = _without_held(problem, nominal, found["before"])
     for one in judged:
-        steps = _steps(one, problem, found, nominal, final, events)
+        steps = _steps(one, fitted, problem, found, nominal, final, events)
         for block in one.group.blocks:
 
             def kept(residual: Residuals, block: Block = block) -> Excess:
@@ -98,12 +112,19 @@ def budget(
             before = kept(acting[0][1])
             if not significant(before):
                 continue
-            held = [
-                _Step("held", name, now, ((was, now),))
-                for (_, was), (name, now) in itertools.pairwise(acting)
-            ]
+            held = [_Step("held", name, now) for name, now in acting[1:]]
             stages = [
-                _Stage(s.kind, s.name, kept(s.now), [(kept(a), kept(b)) for a, b in s.drops])
+                _Stage(
+                    s.kind,
+                    s.name,
+                    kept(s.now),
+                    *(
+                        kept(r)
+                        if r is not None and (not s.name or _concerns(s.name, block))
+                        else None
+                        for r in (s.alone, s.without)
+                    ),
+                )
                 for s in (*held, *steps)
             ]
             terms += _terms(block, before, stages, one, owners, final, problem.settings)
@@ -117,11 +138,20 @@ class _Stage:
     kind: str
     name: str
     now: Excess
-    drops: list[tuple[Excess, Excess]]
+    alone: Excess | None
+    without: Excess | None
+
+
+def _concerns(name: str, block: Block) -> bool:
+    """Whether the output of a block depends on what is named."""
+    if is_effect(name):
+        return acts_in(name, block)
+    return any(depends(block, one) for one in name.split("+"))
 
 
 def _steps(
     judged: Judged,
+    fitted: Problem,
     problem: Problem,
     found: Stages,
     nominal: Rig,
@@ -131,53 +161,91 @@ def _steps(
     """The terms of a group beside what the nominal model holds."""
     names = _in_order(judged)
     if not names:
-        refit = _Step("parameters", "", found["refit"], ((found["before"], found["refit"]),))
+        refit = _Step("parameters", "", found["refit"])
         if judged.verdict != "unlisted" or judged.group.closure is None:
             return [refit]
-        after = found["after"]
-        return [refit, _Step("form", "", after, ((found["refit"], after),))]
+        return [refit, _Step("form", "", found["after"])]
     own = replace(problem, blocks=judged.group.blocks)
-    every = ("", *names)
 
+    @cache
     def kept(present: tuple[str, ...]) -> Residuals:
-        if not present or present == every:
-            return found["after" if present else "before"]
+        if present == names:
+            return found["after"]
+        if not present and not judged.wrong:
+            return found["refit"]
+        again = _fitted_again(judged, replace(fitted, blocks=own.blocks), nominal, present)
+        if again is None:
+            return found["after" if present else "refit"]
         happened = events if events is not None and events.effect in present else None
-        return residuals(own, _with_only(present, every, nominal, final), (), happened)
+        try:
+            return residuals(own, again, (), happened)
+        except SimulationError:  # without the others the model leaves its range
+            return found["after" if present else "refit"]
 
+    refitted = kept(()) if len(names) > 1 else None
     try:
-        forward = [kept(every[:n]) for n in range(len(every) + 1)]
-    except SimulationError:  # a part of the model leaves its range: it is said as a whole
-        now = found["after"]
-        return [_Step(_kind(names[0]), names[0], now, ((found["before"], now),))]
-    try:
-        backward = [kept(every[n:]) for n in range(len(every) + 1)]
+        first = residuals(own, _without_names(names, nominal, final))
     except SimulationError:
-        backward = []
-    steps = []
-    for n, name in enumerate(every):
-        drops = [(forward[n], forward[n + 1])]
-        if backward:
-            drops.append((backward[n + 1], backward[n]))
-        kind = _kind(name) if name else "parameters"
-        steps.append(_Step(kind, name, forward[n + 1], tuple(drops)))
+        first = found["refit"]
+    steps = [_Step("parameters", "", first, refitted)]
+    for n, name in enumerate(names):
+        alone = without = None
+        if refitted is not None:
+            alone, without = kept((name,)), kept((*names[:n], *names[n + 1 :]))
+        steps.append(_Step(_kind(name), name, kept(names[: n + 1]), alone, without))
     return steps
 
 
-def _with_only(present: tuple[str, ...], every: tuple[str, ...], nominal: Rig, final: Rig) -> Rig:
-    """The final model with some of its terms: parameters inside their tolerances under an empty
-    name, wrong ones joined by ``+``, effects.
+def _fitted_again(
+    judged: Judged, fitted: Problem, nominal: Rig, present: tuple[str, ...]
+) -> Rig | None:
+    """The model of a group with some of its names, fitted; a parameter that is wrong stays at its
+    nominal value where it is not among them. None where it leaves its range.
     """
-    rig = final
-    wrong: dict[str, bool] = {}
-    for name in every:
-        if name and is_parameter(name):
-            wrong |= dict.fromkeys(name.split("+"), name in present)
-        elif name and name not in present:
-            rig = without_term(rig, name)
-    there = "" in present
-    back = {n: p.value for n, p in nominal.parameters.items() if not wrong.get(n, there)}
-    return rig.with_parameters(back)
+    chosen = judged.chosen
+    wrong = [one for name in present if is_parameter(name) for one in name.split("+")]
+    effects = [name for name in present if is_effect(name)]
+    if len(wrong) == len(chosen.wrong):
+        for other in judged.group.candidates:
+            if set(other.effects) == set(effects) and set(other.wrong) == set(wrong):
+                return other.fit.rig
+    happened = chosen.fit.events
+    if happened is not None and happened.effect not in effects:
+        happened = None
+    lasting = [e for e in effects if happened is None or e != happened.effect]
+    settings = fitted.settings.fit
+    free, held, forms = parts_of(
+        [start_of(chosen.fit, effect, settings.least_start) for effect in lasting]
+    )
+    known = known_parameters(nominal, settings)
+    try:
+        return fit(
+            fitted,
+            nominal,
+            tuple(lasting),
+            free,
+            chosen.fit.inflation,
+            fixed=held,
+            warm=chosen.fit,
+            events=happened,
+            evaluations=settings.polish_evaluations,
+            settled={n: known[n].value for n in chosen.wrong if n not in wrong},
+            freed=wrong,
+            forms=forms,
+        ).rig
+    except SimulationError:
+        return None
+
+
+def _without_names(names: tuple[str, ...], nominal: Rig, final: Rig) -> Rig:
+    """The final model without what is named: effects, wrong parameters joined by ``+``."""
+    back: dict[str, float] = {}
+    for name in names:
+        if is_parameter(name):
+            back |= {n: nominal.parameter(n).value for n in name.split("+")}
+        else:
+            final = without_term(final, name)
+    return final.with_parameters(back)
 
 
 def _without_held(
@@ -204,7 +272,7 @@ def _kind(name: str) -> str:
     return "wrong_parameter" if is_parameter(name) else "effect"
 
 
-def _in_order(judged: Judged) -> list[str]:
+def _in_order(judged: Judged) -> tuple[str, ...]:
     """Names of a group: wrong parameters in one, then effects, the one that leaves least by itself
     first.
     """
@@ -215,7 +283,7 @@ def _in_order(judged: Judged) -> list[str]:
     }
     wrong = ["+".join(judged.wrong)] if judged.wrong else []
     effects = [name for name in judged.named if is_effect(name)]
-    return [*wrong, *sorted(effects, key=lambda name: alone.get(name, np.inf))]
+    return (*wrong, *sorted(effects, key=lambda name: alone.get(name, np.inf)))
 
 
 def _terms(
@@ -230,13 +298,11 @@ def _terms(
     """The terms of one block, and what is left; ``owners`` are the groups whose values of an effect
     the final model has.
     """
-    counts = np.array([n for _, n in before.pieces], dtype=np.float64)
-    rng = np.random.default_rng(settings.seed)
-    draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
+    shares = _Shares(before, stages, settings)
     was = before
-    for stage in stages:
+    for k, stage in enumerate(stages):
         name, now = stage.name, stage.now
-        share, interval = _share(before, stage.drops, counts, draws)
+        share, interval = shares.of(k)
         named = name and stage.kind != "held"
         chance = judged.probabilities.get(name, judged.probability(name)) if named else None
         yield BudgetTerm(
@@ -255,7 +321,7 @@ def _terms(
             parameters=_values(name, owners.get(name, judged)),
         )
         was = now
-    share, interval = _share(before, [(was, None)], counts, draws)
+    share, interval = shares.unexplained()
     yield BudgetTerm(
         block=block.name,
         kind="unexplained",
@@ -289,21 +355,64 @@ def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
     return out
 
 
-def _share(
-    before: Excess, drops: Sequence[tuple[Excess, Excess | None]], counts: Array, draws: Array
-) -> tuple[float, list[float]]:
-    """Share of the nominal model's excess variance that a step takes, the mean of several drops (to
-    the noise, where there is no next step), and its interval of 95 % by a Bayesian bootstrap over
-    the pieces of the recordings: ``counts`` are the bins in each, ``draws`` as many weighted anew.
+class _Shares:
+    """Shares of a block's terms in the nominal model's excess variance, each with an interval of
+    95 % by a Bayesian bootstrap over the pieces of the recordings.
+
+    Parameters
+    ----------
+    before : Excess
+        Of the nominal model.
+    stages : list of _Stage
+        The terms in their order.
+    settings : DiagnosisSettings
+        Seed and number of draws.
     """
 
-    def ratios(one: Excess | None) -> Array:
-        return np.array([r for r, _ in one.pieces]) if one is not None else np.ones(counts.size)
+    def __init__(self, before: Excess, stages: list[_Stage], settings: DiagnosisSettings) -> None:
+        counts = np.array([n for _, n in before.pieces], dtype=np.float64)
+        rng = np.random.default_rng(settings.seed)
+        draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
+        # the first row is the share itself, the others are drawn
+        self._weights = np.vstack([counts, draws])
+        self._whole = np.maximum(self._excess(before), 1e-12)
+        self._kept = [self._excess(one) for one in (before, *(stage.now for stage in stages))]
+        self._first = next((k for k, stage in enumerate(stages) if stage.without), len(stages))
+        refitted = next((s.alone for s in stages if s.kind == "parameters" and s.alone), None)
+        whole = (self._excess(refitted) if refitted else self._kept[self._first]) - self._kept[-1]
+        none = np.zeros(len(self._weights))
+        takes = [
+            np.maximum(whole + self._excess(stage.without) - self._excess(stage.alone), 0.0)
+            if stage.alone and stage.without
+            else none
+            for stage in stages[self._first :]
+        ]
+        total = sum(takes, none)
+        # names of which none takes anything have equal parts
+        alike = 1.0 / max(1, sum(stage.without is not None for stage in stages))
+        self._parts = [
+            np.where(total > 1e-12, one / np.maximum(total, 1e-12), alike * bool(stage.without))
+            for one, stage in zip(takes, stages[self._first :], strict=True)
+        ]
 
-    first = ratios(before)
-    taken = np.mean([ratios(upper) - ratios(lower) for upper, lower in drops], axis=0)
-    excess_of = np.maximum(draws @ (first - 1.0), 1e-12)
-    shares = draws @ taken / excess_of
-    whole = max(float(counts @ (first - 1.0)), 1e-12)
-    low, high = np.quantile(shares, [0.025, 0.975])
-    return float(counts @ taken) / whole, [float(low), float(high)]
+    def _excess(self, one: Excess) -> Array:
+        """Excess variance beyond the noise, as it is and in each draw."""
+        return np.asarray(self._weights @ np.array([ratio - 1.0 for ratio, _ in one.pieces]))
+
+    def of(self, k: int) -> tuple[float, list[float]]:
+        """Share of a term: what it takes after the one before it; several names divide what all of
+        them take.
+        """
+        if k < self._first:
+            return self._told(self._kept[k] - self._kept[k + 1])
+        taken = self._kept[self._first] - self._kept[-1]
+        return self._told(taken * self._parts[k - self._first])
+
+    def unexplained(self) -> tuple[float, list[float]]:
+        """Share of what no term takes."""
+        return self._told(self._kept[-1])
+
+    def _told(self, taken: Array) -> tuple[float, list[float]]:
+        shares = taken / self._whole
+        low, high = np.quantile(shares[1:], [0.025, 0.975])
+        return float(shares[0]), [float(low), float(high)]
