@@ -29,8 +29,12 @@ NOISE = {"valve_command": 0.0, "supply_pressure": 300.0, "muscle_pressure": 300.
 DT = 0.005
 
 
-def recording(rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 10.0) -> Recording:
-    """Lifts and lowerings at two speeds; steps where it is held out."""
+def recording(
+    rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 10.0, pressure: float = 2.5e5
+) -> Recording:
+    """Lifts and lowerings at two speeds, steps where it is held out; from a pressure [Pa], and from
+    none at all by a lift.
+    """
     rest = round(4.0 / DT)  # it settles before it is recorded
     time = np.arange(0.0, seconds, DT)
     wave = {
@@ -38,17 +42,19 @@ def recording(rig: pamrs.Rig, name: str, role: str, seed: int, seconds: float = 
         "fast": 0.05 * np.sin(2.3 * time + 0.4) + 0.04 * np.sin(5.1 * time),
         "steps": 0.06 * np.sign(np.sin(1.5 * time)),
     }[name]
-    command = np.concatenate([np.full(rest, 5.0), 5.02 + wave])
-    run = pamrs.simulate(rig, command, sample_time=DT, initial={"muscle_pressure": 2.5e5})
+    lift = (time < 0.4) & (pressure == 0.0)
+    command = np.concatenate([np.full(rest, 5.0), np.where(lift, 5.3, 5.02 + wave)])
+    run = pamrs.simulate(rig, command, sample_time=DT, initial={"muscle_pressure": pressure})
     channels = {n: run[n][rest:] for n in NOISE}
     return noisy(name, role, DT, channels, NOISE, [seed])
 
 
-def case(rig: pamrs.Rig) -> pamrs.Case:
+def case(rig: pamrs.Rig, pressure: float = 2.5e5) -> pamrs.Case:
     roles = {"slow": "fit", "fast": "fit", "steps": "held_out"}
-    return pamrs.Case(
-        "lift", RIG, [recording(rig, n, r, k) for k, (n, r) in enumerate(roles.items())], Path()
-    )
+    recordings = [
+        recording(rig, n, r, k, pressure=pressure) for k, (n, r) in enumerate(roles.items())
+    ]
+    return pamrs.Case("lift", RIG, recordings, Path())
 
 
 def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
@@ -100,6 +106,18 @@ def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
         "muscle.rest_length" in true
     ):  # what is read as a longer muscle is the zero of its length, near enough
         assert found.parameters["sensors.length_zero"]["value"] == pytest.approx(1e-3, abs=2e-4)
+
+
+def test_a_muscle_that_begins_longer_than_at_rest_misses_nothing() -> None:
+    # its volume has a kink at the rest length, through which each recording lifts it
+    true = RIG.with_parameters({"sensors.length_zero": -5e-4, "chamber.alpha": 1.17})
+    lifted = case(true, pressure=0.0)
+    length = lifted.recordings[0].channels["length"]
+    assert length[0] > 0.2763
+    assert length[-1] < 0.276
+    found = pamrs.diagnose(lifted)
+    assert found.verdict in ("none", "parameters")
+    assert found.parameters["sensors.length_zero"]["value"] == pytest.approx(-5e-4, abs=5e-5)
 
 
 def test_the_zero_of_the_length_is_what_is_read_beside_the_true_one() -> None:
