@@ -3,6 +3,7 @@
 use pam_core::cut_chain::{predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::description::EffectSpec;
+use pam_core::effects::EFFECTS;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Error, Rig, RigSpec};
 use std::collections::BTreeMap;
@@ -238,7 +239,18 @@ fn sensitivities_hold_over_the_kinks_of_a_volume() {
     let mut warm = spec();
     let gas = &mut warm.chambers[0];
     (gas.gas, gas.heat_transfer_coefficient) = ("energy_balance".into(), 60.0);
-    for spec in [spec(), heated, warm] {
+    // a flow that follows the rate of the volume
+    let mut drawing = spec();
+    let terms = EFFECTS.iter().find(|info| info.id == "closure_flow").unwrap().forms[0].parameters;
+    let terms: Vec<_> = (terms.iter())
+        .map(|term| match term.name {
+            "volume_rate" => (term.name, 2e-3),
+            "memory_time" => (term.name, 1.0),
+            name => (name, 0.0),
+        })
+        .collect();
+    drawing.effects = vec![effect("closure_flow", &terms)];
+    for spec in [spec(), heated, warm, drawing] {
         kinked(&spec, swings(-0.04));
         kinked(&spec, swings(-0.1));
     }

@@ -338,16 +338,18 @@ class BudgetTerm(Entry):
         Form of the effect where it is not the usual one.
     share : float
         Share of the excess variance over the noise (of the nominal model, without the effects that
-        it holds): of parameters inside their tolerances what they take by themselves with their
-        values in the final model, of names what the final model takes beyond that, divided by what
-        each takes: the mean of what it takes alone, and of what is left without it, the others
-        fitted again. Negative where held-out recordings are predicted worse.
+        it holds). Parameters inside their tolerances take what they take by themselves with their
+        values in the final model, names what the final model takes beyond that. Several names
+        divide it by what each takes: the mean of what it takes alone, and of what is left without
+        it, the others fitted again. Negative where a step predicts worse.
     interval : list of two floats
         95 % interval of the share.
     probability : float or None
         Of the name.
     noises, size : float
-        What the block keeps after it, in units of the noise and in the channel's unit.
+        What the block keeps with it and all terms before it, in units of the noise and in the
+        channel's unit; parameters are as in the final model where they stand alone, else fitted
+        beside the names that are there.
     unit : str
         SI unit.
     at : str
@@ -363,7 +365,7 @@ class BudgetTerm(Entry):
     share: float = field(
         metadata=told(
             "of the nominal model's excess variance over the noise: what parameters "
-            "take by themselves, then what each name takes beyond them"
+            "take by themselves, then what names take beyond them, divided among these"
         )
     )
     interval: list[float] = field(metadata=told("95 % interval of the share", kind="pair"))

@@ -82,9 +82,9 @@ settled, `VerdictSettings.settled`)."""
 
 BUDGET_NOTE = (
     "A share is of the variance beyond the noise that the nominal model leaves: of parameters what "
-    "they take by themselves, with their values in the final model, of names what that takes "
-    "beyond; several names divide it by what each takes, alone and beside the others. Below 0 % "
-    "a term predicts worse by itself, and others then take more than 100 %."
+    "they take by themselves, with their values in the final model, of names what the final model "
+    "takes beyond them. Several names divide it by what each takes, alone and beside the others. "
+    "Below 0 % a step predicts worse, and others then take more than 100 %."
 )
 """What the shares of a budget are."""
 

@@ -33,6 +33,8 @@ const COLUMNS: usize = 5;
 const NAMES: [&str; COLUMNS] = ["a_gas", "a_elastic", "b_elastic", "volume", "volume_slope"];
 const VOLUME: usize = 3;
 const SLOPE: usize = 4;
+/// Of the largest slope: a smaller jump is rounding where two pieces of a smooth volume meet.
+const SMOOTH: f64 = 1e-6;
 /// Refinement goes on to this error where the cells allow it.
 const AIM: f64 = 1e-10;
 /// Cells of one piece at most.
@@ -193,7 +195,7 @@ impl Table {
             let jump = evaluate(above, -1.0_f64)[SLOPE] - evaluate(below, 1.0_f64)[SLOPE];
             Kink { at: pair[0].start, jump }
         });
-        let kinks = kinks.collect();
+        let kinks = kinks.filter(|kink| kink.jump.abs() > SMOOTH * scales[SLOPE]).collect();
         let idle = Continuation { value: [0.0; COLUMNS], slope: [0.0; COLUMNS] };
         let mut table =
             Self { e_min, e_max, pieces, cells, below: idle, above: idle, errors, kinks };

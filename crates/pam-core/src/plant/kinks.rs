@@ -7,17 +7,21 @@
 //! *Parametric sensitivity functions for hybrid discrete/continuous systems*, Applied Numerical
 //! Mathematics 31 (1999).
 
-use super::rates::{Plant, Simulated};
-use crate::blocks::chamber::{pressure_rate, ChamberState};
+use super::ports::Flow;
+use super::rates::{Controls, Plant, Scratch, Simulated};
+use super::units::Node;
+use crate::blocks::chamber::{energy_rate, pressure_rate, ChamberState};
 use crate::scalar::{constant, Scalar};
 
 impl<S: Scalar> Plant<'_, S> {
-    /// Whether a step has to ask: sensitivities are wanted of a gas, and the volume of some muscle
-    /// has a kink.
+    /// Whether a step has to ask: sensitivities are wanted of a gas that is integrated, and the
+    /// volume of one of its muscles has a kink.
     pub fn asks_for_kinks(&self, simulated: &Simulated) -> bool {
         S::DERIVATIVES > 0
-            && simulated.volumes()
-            && self.wiring.groups.iter().any(|g| !g.muscle.table.volume_kinks().is_empty())
+            && self.wiring.groups.iter().any(|group| {
+                !group.muscle.table.volume_kinks().is_empty()
+                    && simulated.moves(self.layout.pressure(group.chamber))
+            })
     }
 
     /// Contraction ratios of the muscles, without their derivatives.
@@ -31,7 +35,14 @@ impl<S: Scalar> Plant<'_, S> {
 
     /// What the sensitivities of the gases gain by the kinks between the contraction ratios at which
     /// a step found the muscles and those at which it leaves them.
-    pub fn pass_kinks(&self, from: &[f64], simulated: &Simulated, state: &mut [S]) {
+    pub fn pass_kinks(
+        &self,
+        from: &[f64],
+        simulated: &Simulated,
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+        state: &mut [S],
+    ) {
         for (was, group) in from.iter().zip(&self.wiring.groups) {
             let angle = state[self.layout.angle(group.coordinate)];
             let now = group.joint.eval(angle.re()).shortening / group.rest_length;
@@ -44,7 +55,8 @@ impl<S: Scalar> Plant<'_, S> {
                 continue;
             }
             let later = group.joint.eval(angle).shortening / group.rest_length - now;
-            let (pressure, mass) = self.swollen(gas, later * (jump * group.count), state);
+            let change = later * (jump * group.count);
+            let (pressure, mass) = self.swollen(gas, change, state, controls, here);
             state[place] += pressure;
             if simulated.moves(self.layout.mass(gas)) {
                 state[self.layout.mass(gas)] += mass;
@@ -53,26 +65,67 @@ impl<S: Scalar> Plant<'_, S> {
     }
 
     /// Changes of a gas's pressure [Pa] and mass [kg] with a small change of its volume [m3].
-    fn swollen(&self, gas: usize, change: S, state: &[S]) -> (S, S) {
-        let zero = constant(0.0);
-        let pressure = state[self.layout.pressure(gas)];
+    fn swollen(
+        &self,
+        gas: usize,
+        change: S,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+    ) -> (S, S) {
+        let (zero, rest) = (constant(0.0), self.rig.gas.temperature);
+        let [inflow, outflow] = self.drawn_by_volume(gas, change, state, controls, here);
         let chamber = ChamberState {
-            pressure,
+            pressure: state[self.layout.pressure(gas)],
             volume: self.volume(gas, state),
             volume_rate: change,
-            inflow: zero,
-            outflow: zero,
+            inflow,
+            outflow,
         };
+        let mass = inflow - outflow;
         if self.walls[gas].is_some() {
-            return (pressure * change * -self.rig.gas.gamma / chamber.volume, zero);
+            let temperature = self.temperature(gas, state);
+            let carried = inflow * rest;
+            return (energy_rate(&self.rig.gas, &chamber, carried, temperature, zero), mass);
         }
-        let fixed = pressure_rate(&chamber, &self.alphas[gas], 0.0);
+        let fixed = pressure_rate(&chamber, &self.alphas[gas], self.rig.gas.gas_constant * rest);
         match &self.wiring.ports.balance[gas] {
             Some(acting) if self.altered.balances => {
-                let mass = state[self.layout.mass(gas)];
-                self.effect(acting).balance(&self.rig.gas, &chamber, zero, mass, fixed)
+                let own = state[self.layout.mass(gas)];
+                let effect = self.effect(acting);
+                let (pressure, more) = effect.balance(&self.rig.gas, &chamber, zero, own, fixed);
+                (pressure, mass + more)
             }
-            _ => (fixed, zero),
+            _ => (fixed, mass),
         }
+    }
+
+    /// What flows of effects that follow the rate of the volume bring into a gas and take out of it
+    /// [kg], with a small change of its volume [m3].
+    fn drawn_by_volume(
+        &self,
+        gas: usize,
+        change: S,
+        state: &[S],
+        controls: &Controls<S>,
+        here: &Scratch<S>,
+    ) -> [S; 2] {
+        let mut drawn = [constant(0.0); 2];
+        for (flow, acting) in &self.wiring.ports.flows {
+            if !matches!(flow, Flow::Inflow(Node::Gas(k)) if *k == gas) {
+                continue;
+            }
+            let rate = here.volume_rate[gas];
+            let [now, then] = [rate, rate + change].map(|rate| {
+                let at = self.at_chamber(gas, state, &controls.spool, rate);
+                self.effect(acting).inflow(&at, self.own(acting, state))
+            });
+            let more = then - now;
+            match now.re() < 0.0 {
+                false => drawn[0] += more,
+                true => drawn[1] -= more,
+            }
+        }
+        drawn
     }
 }

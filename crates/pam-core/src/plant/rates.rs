@@ -87,11 +87,6 @@ impl Simulated {
         self.forces || self.volumes
     }
 
-    /// Whether some gas, or what asks for its volume, is integrated.
-    pub(super) fn volumes(&self) -> bool {
-        self.volumes
-    }
-
     /// Whether the state at a place is integrated.
     pub(crate) fn moves(&self, place: usize) -> bool {
         !self.driven[place]

@@ -34,7 +34,7 @@ impl<S: Scalar> Plant<'_, S> {
         At::Supply { pressure: state[self.layout.supply(supply)], opening }
     }
 
-    fn at_chamber(&self, gas: usize, state: &[S], spool: &[S], volume_rate: S) -> At<S> {
+    pub(super) fn at_chamber(&self, gas: usize, state: &[S], spool: &[S], volume_rate: S) -> At<S> {
         let (layout, wiring) = (&self.layout, &self.wiring);
         let pressure = state[layout.pressure(gas)];
         let (mut opening, mut supply) = (constant::<S>(0.0), pressure);

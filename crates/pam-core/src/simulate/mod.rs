@@ -163,17 +163,17 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let held = controls;
         let remembers = *remembers && plant.pulls(simulated);
         let at = |stage: usize| stages.as_ref().map_or(held, |stages| &stages[stage]);
-        if remembers {
+        let kinks = plant.asks_for_kinks(simulated);
+        if remembers || before.is_some() || kinks {
             drive(plant, at(0), 0.0, state);
+        }
+        if remembers {
             plant.contractions(state, start);
         }
         if let Some(before) = before {
-            drive(plant, at(0), 0.0, state);
             before.copy_from_slice(state);
         }
-        let kinks = plant.asks_for_kinks(simulated);
         if kinks {
-            drive(plant, at(0), 0.0, state);
             plant.where_muscles_are(state, from);
         }
         let kept = layout.states()..state.len();
@@ -185,7 +185,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         });
         drive(plant, at(2), 1.0, state);
         if kinks {
-            plant.pass_kinks(from, simulated, state);
+            plant.pass_kinks(from, simulated, at(2), scratch, state);
         }
         if let Some(before) = before {
             plant.discrete_update(before, state, held, dt);
@@ -277,7 +277,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         });
         drive(plant, at(2), until / step.dt, state);
         if kinks {
-            plant.pass_kinks(muscles, step.simulated, state);
+            plant.pass_kinks(muscles, step.simulated, at(2), scratch, state);
         }
     }
 
