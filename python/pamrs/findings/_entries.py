@@ -338,18 +338,17 @@ class BudgetTerm(Entry):
         Form of the effect where it is not the usual one.
     share : float
         Share of the excess variance over the noise (of the nominal model, without the effects that
-        it holds). Parameters inside their tolerances take what they take by themselves with their
-        values in the final model, names what the final model takes beyond that. Several names
-        divide it by what each takes: the mean of what it takes alone, and of what is left without
-        it, the others fitted again. Negative where a step predicts worse.
+        it holds), with all values as in the final model. Parameters inside their tolerances take
+        what they take by themselves, names what the final model takes beyond that. Several names
+        divide it in proportion to the squares of what each changes in the prediction. Negative
+        where a step predicts worse.
     interval : list of two floats
         95 % interval of the share.
     probability : float or None
-        Of the name.
+        Of the name, whatever else acts in the blocks that are judged with this one.
     noises, size : float
         What the block keeps with it and all terms before it, in units of the noise and in the
-        channel's unit; parameters are as in the final model where they stand alone, else fitted
-        beside the names that are there.
+        channel's unit, with all values as in the final model.
     unit : str
         SI unit.
     at : str

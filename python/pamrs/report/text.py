@@ -81,9 +81,9 @@ SETTLED = 0.75
 settled, `VerdictSettings.settled`)."""
 
 BUDGET_NOTE = (
-    "A share is of the variance beyond the noise that the nominal model leaves: of parameters what "
-    "they take by themselves, with their values in the final model, of names what the final model "
-    "takes beyond them. Several names divide it by what each takes, alone and beside the others. "
+    "A share is of the variance beyond the noise that the nominal model leaves, with all values as "
+    "in the final model. Parameters come first, by themselves; what they leave goes to the names. "
+    "Several names share it in proportion to the squares of what each changes in the prediction. "
     "Below 0 % a step predicts worse, and others then take more than 100 %."
 )
 """What the shares of a budget are."""

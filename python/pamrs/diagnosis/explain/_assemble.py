@@ -114,8 +114,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
-    rigs = nominal, models.final
-    terms = budget(judged, fitted, held, out_found, noise_level, *rigs, models.events)
+    terms = budget(judged, held, out_found, noise_level, nominal, models.final, models.events)
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
     runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)

@@ -5,20 +5,18 @@ takes, and what stays unexplained.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
-    Candidate,
     Judged,
     is_parameter,
-    parts_of,
     significant,
-    start_of,
 )
 from pamrs.diagnosis.explain._owners import owners_of_effects
 from pamrs.diagnosis.fit import (
@@ -27,11 +25,9 @@ from pamrs.diagnosis.fit import (
     Problem,
     acts_in,
     depends,
-    fit,
     form_in,
     known_parameters,
     residuals,
-    with_effects_of,
     with_known,
     without_term,
 )
@@ -63,24 +59,19 @@ class _Step:
         Kind and name of the term.
     now : dict
         What the blocks keep with it and all terms before it.
-    named : bool
-        Whether it divides what several names take together.
-    alone, without : dict or None
-        What they keep with no other name, and with all others but it; None where no such model
-        holds.
+    change : dict or None
+        Of a name, what the final model predicts with it beyond what it predicts without it; None
+        where that model leaves its range.
     """
 
     kind: str
     name: str
     now: Residuals
-    named: bool = False
-    alone: Residuals | None = None
-    without: Residuals | None = None
+    change: Residuals | None = None
 
 
 def budget(
     judged: list[Judged],
-    fitted: Problem,
     problem: Problem,
     found: Stages,
     noise_level: dict[Key, NoiseLevel],
@@ -90,17 +81,17 @@ def budget(
 ) -> list[BudgetTerm]:
     """The budget of every block whose nominal model leaves more than noise.
 
-    Parameters inside their tolerances take what they take by themselves with their values in the
-    final model: fitted without a name they bend towards what is missing. What is named takes what
-    the final model takes beyond that. Several names divide it by what each takes, the mean of what
-    it takes alone and of what is left without it, parameters and the others fitted again.
+    All terms have the values of the final model, those of the parameters as well: parameters that
+    are fitted without a name bend towards what is missing. Parameters inside their tolerances take
+    what they take by themselves, what is named takes what the final model takes beyond that.
+    Several names divide it in proportion to the squares of what each changes in the prediction.
 
     Parameters
     ----------
     judged : list of Judged
         The groups with their verdicts.
-    fitted, problem : Problem
-        The recordings that were fitted, and held-out ones (the same, where there are no others).
+    problem : Problem
+        Held-out recordings (those that were fitted, where there are no others).
     found : dict of str to dict
         Their residuals by stage (``before``, ``refit``, ``after``), block and recording.
     noise_level : dict
@@ -122,60 +113,37 @@ def budget(
     owners = {name: judged[k] for name, k in best.items() if name in judged[k].named}
     bare = _without_held(problem, nominal, found["before"])
     for one in judged:
-        shown = []
+        steps = _steps(one, problem, found, nominal, final, events)
         for block in one.group.blocks:
 
-            def kept(residual: Residuals | None, block: Block = block) -> Excess | None:
-                if residual is None:
-                    return None
+            def kept(residual: Residuals, block: Block = block) -> Excess:
                 return excess(
                     block, problem.recordings, residual, noise_level, problem.settings.noise
                 )
 
             acting = [(name, r) for name, r in bare if not name or acts_in(name, block)]
-            before = _there(kept(acting[0][1]))
-            if significant(before):
-                shown.append((block, before, acting, kept))
-        if not shown:
-            continue
-        others = [name for other in judged if other is not one for name in _in_order(other)]
-        parts = _Parts(one, fitted, problem, found, nominal, final, events, others)
-        steps, refitted = parts.steps()
-        for block, before, acting, kept in shown:
-            held = [_Step("held", name, now) for name, now in acting[1:]]
-            stages = [
-                _Stage(
-                    s.kind,
-                    s.name,
-                    _there(kept(s.now)),
-                    s.named and _concerns(s.name, block),
-                    kept(s.alone),
-                    kept(s.without),
-                )
-                for s in (*held, *steps)
-            ]
-            shares = _Shares(before, stages, kept(refitted), problem.settings)
+            before = kept(acting[0][1])
+            if not significant(before):
+                continue
+            stages = [_Stage("held", name, kept(now)) for name, now in acting[1:]]
+            for step in steps:
+                acts = not step.name or _concerns(step.name, block)
+                change = kept(step.change) if step.change and acts else None
+                stages.append(_Stage(step.kind, step.name, kept(step.now), acts, change))
+            shares = _Shares(before, stages, problem.settings)
             terms += _terms(block, shares, stages, one, owners, final)
     return terms
 
 
-def _there(one: Excess | None) -> Excess:
-    """What is known to be there."""
-    if one is None:
-        raise AssertionError("every term has residuals")
-    return one
-
-
 @dataclass(frozen=True)
 class _Stage:
-    """A term of one block: as in `_Step`, against its noise."""
+    """A term of one block: as in `_Step`, against its noise; and whether it acts there."""
 
     kind: str
     name: str
     now: Excess
-    named: bool = False
-    alone: Excess | None = None
-    without: Excess | None = None
+    acts: bool = True
+    change: Excess | None = None
 
 
 def _concerns(name: str, block: Block) -> bool:
@@ -185,149 +153,55 @@ def _concerns(name: str, block: Block) -> bool:
     return any(depends(block, one) for one in name.split("+"))
 
 
-class _Parts:
-    """What the blocks of a group keep with parts of what it names.
+def _steps(
+    judged: Judged,
+    problem: Problem,
+    found: Stages,
+    nominal: Rig,
+    final: Rig,
+    events: Events | None,
+) -> list[_Step]:
+    """The terms of a group beside what the nominal model holds."""
+    names = _in_order(judged)
+    if not names:
+        refit = _Step("parameters", "", found["refit"])
+        if judged.verdict != "unlisted" or judged.group.closure is None:
+            return [refit]
+        return [refit, _Step("form", "", found["after"])]
+    own = replace(problem, blocks=judged.group.blocks)
+    known = known_parameters(nominal, problem.settings.fit)
 
-    Parameters
-    ----------
-    judged : Judged
-        The group.
-    fitted, problem : Problem
-        The recordings that were fitted, and those that are judged.
-    found : dict
-        Residuals of the whole models, by stage.
-    nominal, final : Rig
-        The nominal model, and that with everything that was found.
-    events : Events, optional
-        What happened in single recordings.
-    others : list of str
-        What other groups name.
-    """
-
-    def __init__(
-        self,
-        judged: Judged,
-        fitted: Problem,
-        problem: Problem,
-        found: Stages,
-        nominal: Rig,
-        final: Rig,
-        events: Events | None,
-        others: list[str],
-    ) -> None:
-        self.judged, self.found = judged, found
-        self.names = _in_order(judged)
-        self.blocks = judged.group.blocks
-        self.fitted = replace(fitted, blocks=self.blocks)
-        self.problem = replace(problem, blocks=self.blocks)
-        self.nominal, self.final, self.events = nominal, final, events
-        # what other groups found acts here too, whichever of the own names are there
-        acting = [n for n in others if any(_concerns(n, block) for block in self.blocks)]
-        self.others = [n for n in acting if n not in self.names]
-        self._kept: dict[tuple[str, ...], Residuals | None] = {}
-
-    def steps(self) -> tuple[list[_Step], Residuals | None]:
-        """The terms beside what the nominal model holds; and, where several names are to be told
-        apart, what parameters leave that are fitted without any of them.
-        """
-        found, names = self.found, self.names
-        if not names:
-            refit = _Step("parameters", "", found["refit"])
-            if self.judged.verdict != "unlisted" or self.judged.group.closure is None:
-                return [refit], None
-            return [refit, _Step("form", "", found["after"])], None
-        several = len(names) > 1
-        steps = [_Step("parameters", "", self._by_themselves())]
-        for n, name in enumerate(names):
-            alone = without = None
-            if several:
-                alone = self.kept((name,))
-                without = self.kept((*names[:n], *names[n + 1 :]))
-            now = self.kept(names[: n + 1]) or steps[-1].now
-            steps.append(_Step(_kind(name), name, now, several, alone, without))
-        return steps, self.kept(()) if several else None
-
-    def _by_themselves(self) -> Residuals:
-        """What parameters leave with their values in the final model, without any name."""
-        known = known_parameters(self.nominal, self.fitted.settings.fit)
+    @cache
+    def kept(present: tuple[str, ...]) -> Residuals | None:
+        if present == names:
+            return found["after"]
+        happened = events if events is not None and events.effect in present else None
+        rig = _without_names([name for name in names if name not in present], known, final)
         try:
-            return residuals(self.problem, _without_names(self.names, known, self.final))
-        except SimulationError:  # without the names the model leaves its range
-            return self.found["refit"]
+            return residuals(own, rig, (), happened)
+        except SimulationError:  # without the others the model leaves its range
+            return None
 
-    def kept(self, present: tuple[str, ...]) -> Residuals | None:
-        """What the blocks keep with some of the names, all else fitted again; None where no such
-        model holds.
-        """
-        if present == self.names:
-            return self.found["after"]
-        if not present and not self.judged.wrong and not self.others:
-            return self.found["refit"]
-        if present not in self._kept:
-            try:
-                rig, happened = self._model(present)
-                if happened is not None:
-                    rig = rig.without_effect(happened.effect)
-                self._kept[present] = residuals(self.problem, rig, (), happened)
-            except SimulationError:
-                self._kept[present] = None
-        return self._kept[present]
-
-    def _model(self, present: tuple[str, ...]) -> tuple[Rig, Events | None]:
-        """The model with some of the names, fitted; a parameter that is wrong stays at its nominal
-        value where it is not among them.
-        """
-        chosen = self.judged.chosen
-        wrong = [one for name in present if is_parameter(name) for one in name.split("+")]
-        effects = [name for name in present if is_effect(name)]
-        happened = self.events if self.events and self.events.effect in effects else None
-        if len(wrong) == len(chosen.wrong) and not self.others and happened is None:
-            alike = [c for c in self.judged.group.candidates if self._is(c, effects, wrong)]
-            if alike:
-                return min(alike, key=lambda c: c.fit.cost).fit.rig, None
-        settings = self.fitted.settings.fit
-        lasting = [e for e in effects if happened is None or e != happened.effect]
-        free, held, forms = parts_of(
-            [start_of(chosen.fit, effect, settings.least_start) for effect in lasting]
-        )
-        known = known_parameters(self.nominal, settings)
-        own = {id_of(name) for name in self.names if is_effect(name)}
-        own |= {self.events.effect} if self.events else set()
-        base = with_effects_of(self.nominal, self.final, own) if self.others else self.nominal
-        there = known_parameters(self.final, settings)
-        elsewhere = [n for name in self.others if is_parameter(name) for n in name.split("+")]
-        found = fit(
-            self.fitted,
-            base,
-            tuple(lasting),
-            free,
-            chosen.fit.inflation,
-            fixed=held,
-            warm=chosen.fit,
-            events=happened,
-            evaluations=settings.polish_evaluations,
-            settled={n: known[n].value for n in chosen.wrong if n not in wrong}
-            | {n: there[n].value for n in elsewhere},
-            freed=wrong,
-            forms=forms,
-        )
-        return found.rig, happened
-
-    def _is(self, candidate: Candidate, effects: list[str], wrong: list[str]) -> bool:
-        """Whether a candidate has these names, in the forms of the one that was chosen."""
-        return (
-            set(candidate.effects) == set(effects)
-            and set(candidate.wrong) == set(wrong)
-            and candidate.fit.events is None
-            and all(
-                form_in(candidate.fit.rig, e) == form_in(self.judged.chosen.fit.rig, e)
-                for e in effects
-            )
-        )
+    steps = [_Step("parameters", "", kept(()) or found["refit"])]
+    for n, name in enumerate(names):
+        now = kept(names[: n + 1]) or steps[-1].now
+        without = kept((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
+        change = _difference(found["after"], without) if without else None
+        steps.append(_Step(_kind(name), name, now, change))
+    return steps
 
 
-def _without_names(names: tuple[str, ...], known: Mapping[str, Parameter], final: Rig) -> Rig:
-    """The final model without what is named: effects, wrong parameters joined by ``+``."""
+def _difference(one: Residuals, other: Residuals) -> Residuals:
+    """By how much two models' predictions differ."""
+    return {
+        key: replace(r, value=np.where(r.rows, other[key].value - r.value, 0.0))
+        for key, r in one.items()
+        if key in other
+    }
+
+
+def _without_names(names: Sequence[str], known: Mapping[str, Parameter], final: Rig) -> Rig:
+    """The final model without some names: effects, wrong parameters joined by ``+``."""
     back: dict[str, float] = {}
     for name in names:
         if is_parameter(name):
@@ -389,8 +263,10 @@ def _terms(
     for k, stage in enumerate(stages):
         name, now = stage.name, stage.now
         share, interval = shares.of(k)
+        if not stage.acts and share == 0.0:
+            continue
         named = name and stage.kind != "held"
-        chance = judged.probabilities.get(name, judged.probability(name)) if named else None
+        chance = min(judged.probability(n) for n in name.split("+")) if named else None
         yield BudgetTerm(
             block=block.name,
             kind=stage.kind,
@@ -452,19 +328,11 @@ class _Shares:
         Of the nominal model.
     stages : list of _Stage
         The terms in their order.
-    refitted : Excess or None
-        What parameters leave that are fitted without a name, where several names are told apart.
     settings : DiagnosisSettings
         Seed and number of draws.
     """
 
-    def __init__(
-        self,
-        before: Excess,
-        stages: list[_Stage],
-        refitted: Excess | None,
-        settings: DiagnosisSettings,
-    ) -> None:
+    def __init__(self, before: Excess, stages: list[_Stage], settings: DiagnosisSettings) -> None:
         counts = np.array([n for _, n in before.pieces], dtype=np.float64)
         rng = np.random.default_rng(settings.seed)
         draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
@@ -472,43 +340,38 @@ class _Shares:
         self._weights = np.vstack([counts, draws])
         self._whole = np.maximum(self._excess(before), 1e-12)
         self._kept = [self._excess(one) for one in (before, *(stage.now for stage in stages))]
-        # names divide what they take together; where none of them acts here, each takes its own
         names = [k for k, stage in enumerate(stages) if stage.kind in _NAMED]
-        divided = any(stage.named for stage in stages)
-        self._first = names[0] if names and divided else len(stages)
-        self._parts = self._divided(stages[self._first :], refitted)
+        acting = any(stages[k].acts for k in names)
+        self._first = names[0] if acting else len(stages)
+        self._parts = self._divided(stages[self._first :])
 
     def _excess(self, one: Excess) -> Array:
         """Excess variance beyond the noise, as it is and in each draw."""
         return np.asarray(self._weights @ np.array([ratio - 1.0 for ratio, _ in one.pieces]))
 
-    def _divided(self, stages: list[_Stage], refitted: Excess | None) -> list[Array]:
-        """Parts of names in what they take together, by the mean of what each takes alone and of
-        what is left without it, as far as models of both hold; names that do not act here have
-        none.
+    def _divided(self, names: list[_Stage]) -> list[Array]:
+        """Parts of names in what they take together, in proportion to the squares of what each
+        changes in the prediction; a name that does not act here has none.
         """
-        after, none = self._kept[-1], np.zeros(len(self._weights))
-        takes = []
-        for stage in stages:
-            each = []
-            if stage.named and stage.alone is not None and refitted is not None:
-                each.append(self._excess(refitted) - self._excess(stage.alone))
-            if stage.named and stage.without is not None:
-                each.append(self._excess(stage.without) - after)
-            takes.append(np.maximum(np.mean(each, axis=0), 0.0) if each else none)
-        total = np.sum([none, *takes], axis=0)
-        together = self._kept[self._first] - after
-        # where no name takes anything, or they predict worse together, all have equal parts
-        told = (total > 1e-12) & (together > 0.0)
-        alike = 1.0 / max(1, sum(stage.named for stage in stages))
+        none = np.zeros(len(self._weights))
+        changes = [
+            none
+            if one.change is None
+            else self._weights @ np.array([r for r, _ in one.change.pieces])
+            for one in names
+        ]
+        total = np.sum([none, *changes], axis=0)
+        # a single name, and names of which one cannot be taken away, have equal parts
+        told = all(one.change is not None for one in names if one.acts) & (total > 1e-12)
+        alike = 1.0 / max(1, sum(one.acts for one in names))
         return [
-            np.where(told, one / np.maximum(total, 1e-12), alike * stage.named)
-            for one, stage in zip(takes, stages, strict=True)
+            np.where(told, change / np.maximum(total, 1e-12), alike * one.acts)
+            for change, one in zip(changes, names, strict=True)
         ]
 
     def of(self, k: int) -> tuple[float, list[float]]:
-        """Share of a term: what it takes after the one before it; several names divide what all of
-        them take.
+        """Share of a term: what it takes after the one before it; names divide what all of them
+        take.
         """
         if k < self._first:
             return self._told(self._kept[k] - self._kept[k + 1])

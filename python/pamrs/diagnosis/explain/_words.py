@@ -220,6 +220,9 @@ def _proof(case: Case) -> str:
 def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
+    # the error is that of the model with everything that was found
+    beside = " with all that was found" if len(diagnosis.wrong_parameters) > 1 else ""
+    beside = " with all that was found" if diagnosis.effects else beside
     for wrong in diagnosis.wrong_parameters:
         mended = {
             channel: e
@@ -228,7 +231,7 @@ def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str
         }
         told_by = mended or wrong.held_out
         errors = "; ".join(
-            f"the {spoken_name(channel)} is then missed by "
+            f"the {spoken_name(channel)} is then missed{beside} by "
             f"{_instead(e.after, e.refit, unit_of(channel))}, which values inside the tolerances "
             "leave"
             for channel, e in told_by.items()
