@@ -973,6 +973,8 @@ def simulate(
                 "rtol": rtol,
                 "atol": atol,
                 "first_step": min(first, end - begin),
+                # a valve that opens for a moment is not stepped over
+                "max_step": 0.05 * sample_time if spools else np.inf,
                 "dense_output": True,
             }
             solution = solve_ivp(slope, (begin, end), state, method=method, **settings)
