@@ -345,9 +345,9 @@ class _Shares:
         self._first = names[0] if acting else len(stages)
         self._parts = self._divided(stages[self._first :])
 
-    def _excess(self, one: Excess) -> Array:
-        """Excess variance beyond the noise, as it is and in each draw."""
-        return np.asarray(self._weights @ np.array([ratio - 1.0 for ratio, _ in one.pieces]))
+    def _excess(self, one: Excess, noise: float = 1.0) -> Array:
+        """Excess variance beyond a variance of noise, as it is and in each draw."""
+        return np.asarray(self._weights @ np.array([ratio - noise for ratio, _ in one.pieces]))
 
     def _divided(self, names: list[_Stage]) -> list[Array]:
         """Parts of names in what they take together, in proportion to the squares of what each
@@ -355,10 +355,7 @@ class _Shares:
         """
         none = np.zeros(len(self._weights))
         changes = [
-            none
-            if one.change is None
-            else self._weights @ np.array([r for r, _ in one.change.pieces])
-            for one in names
+            none if one.change is None else self._excess(one.change, noise=0.0) for one in names
         ]
         total = np.sum([none, *changes], axis=0)
         # a single name, and names of which one cannot be taken away, have equal parts

@@ -221,8 +221,8 @@ def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     # the error is that of the model with everything that was found
-    beside = " with all that was found" if len(diagnosis.wrong_parameters) > 1 else ""
-    beside = " with all that was found" if diagnosis.effects else beside
+    several = len(diagnosis.wrong_parameters) > 1 or diagnosis.effects
+    beside = " with all that was found" if several else ""
     for wrong in diagnosis.wrong_parameters:
         mended = {
             channel: e
