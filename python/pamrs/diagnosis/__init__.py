@@ -42,6 +42,7 @@ from pamrs.diagnosis.prepare import (
     without_copies,
     without_impossible,
     without_poor_thermometers,
+    without_rails,
 )
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine
@@ -218,6 +219,7 @@ def diagnose(
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
     sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
+    sound, clipped = without_rails(sound, chosen.plausibility)
     kept, copies = without_copies(sound, chosen.overlap)
     kept, unread = without_poor_thermometers(kept, case.rig, chosen.prepare)
     case = replace(case, recordings=kept)
@@ -239,7 +241,7 @@ def diagnose(
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
     begun = said_of_beginnings(blocks, [*inner.recordings, *outer.recordings])
-    warnings = [*suspected, *copies, *masked, *unread, *held, *left_out, *begun]
+    warnings = [*clipped, *suspected, *copies, *masked, *unread, *held, *left_out, *begun]
     warnings += diagnosis.warnings
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"

@@ -38,13 +38,16 @@ CLIPPING: Final = frozenset(
 
 
 class Fault(NamedTuple):
-    """A faulty stretch, ``rows[start:stop]`` of the channel as it was read."""
+    """A faulty stretch, ``rows[start:stop]`` of the channel as it was read; of one that is
+    saturated by running into it, the end of its sensor's range.
+    """
 
     kind: str
     start: int
     stop: int
     text: str
     masked: bool = True
+    rail: float | None = None
 
 
 def find_faults(channel: str, values: Array) -> list[Fault]:
@@ -88,9 +91,10 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     for kind, start, stop in stretches.suspects():
         length = stop - start
         where = "its extreme value" if kind == "saturated" else "exactly one value"
-        faults.append(
-            Fault(kind, int(good[start]), int(good[stop - 1]) + 1, f"{length} samples at {where}")
-        )
+        text, rail = f"{length} samples at {where}", None
+        if kind == "saturated":
+            rail = float(data[start])
+        faults.append(Fault(kind, int(good[start]), int(good[stop - 1]) + 1, text, rail=rail))
     return faults
 
 

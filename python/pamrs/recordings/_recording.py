@@ -23,7 +23,7 @@ from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._clock import Grid, lay_grid
-from pamrs.recordings._faults import find_faults
+from pamrs.recordings._faults import Fault, find_faults
 from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.table import Table, read_table, thousands_of
 from pamrs.units import parse_unit, to_si
@@ -95,6 +95,8 @@ class Issue:
         From when to when [s].
     text : str
         What it is and what was done.
+    rail : float or None
+        The end of its sensor's range at which a channel is cut off, SI.
     """
 
     kind: str
@@ -102,6 +104,7 @@ class Issue:
     start: float
     stop: float
     text: str
+    rail: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +294,7 @@ class Recording:
             )
         offset = float(self.time[keep][0])
         issues = [
-            Issue(i.kind, i.channel, max(0.0, i.start - offset), i.stop - offset, i.text)
+            replace(i, start=max(0.0, i.start - offset), stop=i.stop - offset)
             for i in self.issues
             if i.stop >= low and i.start <= high
         ]
@@ -627,29 +630,29 @@ def judged(
             f"are not possible ({limits.lower:g} to {limits.upper:g} {limits.unit}); right column "
             f"and unit?{likely}"
         )
-    found: list[tuple[str, int, int, str]] = _runs(~usable, "nan", "no value")
+    found = _runs(~usable, "nan", "no value")
     found += _runs(impossible, "outlier", "an impossible value")
     usable &= ~impossible
     values[~usable] = np.nan
     for fault in [] if held else find_faults(channel_of(channel), values):
-        found.append((fault.kind, fault.start, fault.stop, fault.text))
+        found.append(fault)
         if fault.masked:
             usable[fault.start : fault.stop] = False
-    for kind in dict.fromkeys(item[0] for item in found):
-        same = [item for item in found if item[0] == kind]
+    for kind, rail in dict.fromkeys((fault.kind, fault.rail) for fault in found):
+        same = [fault for fault in found if (fault.kind, fault.rail) == (kind, rail)]
         if len(same) > _FEW:
-            total = sum(stop - start for _, start, stop, _ in same)
-            start, _ = grid.when(same[0][1], same[0][2])
-            _, stop = grid.when(same[-1][1], same[-1][2])
-            issues.append(
-                Issue(kind, channel, start, stop, f"{len(same)} stretches, {total} samples in all")
-            )
+            total = sum(fault.stop - fault.start for fault in same)
+            start, _ = grid.when(same[0].start, same[0].stop)
+            _, stop = grid.when(same[-1].start, same[-1].stop)
+            text = f"{len(same)} stretches, {total} samples in all"
+            issues.append(Issue(kind, channel, start, stop, text, rail))
         else:
             issues += [
-                Issue(kind, channel, *grid.when(first, last), text) for _, first, last, text in same
+                Issue(kind, channel, *grid.when(one.start, one.stop), one.text, rail)
+                for one in same
             ]
     return grid.lay(values, usable)
 
 
-def _runs(flags: Mask, kind: str, text: str) -> list[tuple[str, int, int, str]]:
-    return [(kind, a, b, f"{text} ({b - a} samples)") for a, b in stretches(flags)]
+def _runs(flags: Mask, kind: str, text: str) -> list[Fault]:
+    return [Fault(kind, a, b, f"{text} ({b - a} samples)") for a, b in stretches(flags)]

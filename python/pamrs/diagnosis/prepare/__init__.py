@@ -4,8 +4,8 @@ from their measured neighbours.
 Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible`, `without_impossible`, `suspected_units` (what
-recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
+`check_plausible`, `check_sense`, `implausible`, `without_impossible`, `without_rails`,
+`suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`, `smoothed`,
 `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`, `available_blocks`, `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
 (beginnings that nobody measured).
@@ -32,6 +32,7 @@ from pamrs.diagnosis.prepare._plausible import (
     implausible,
     without_impossible,
 )
+from pamrs.diagnosis.prepare._rails import without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
@@ -74,4 +75,5 @@ __all__ = [
     "without_copies",
     "without_impossible",
     "without_poor_thermometers",
+    "without_rails",
 ]

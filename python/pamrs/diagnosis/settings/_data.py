@@ -644,6 +644,15 @@ class PlausibilitySettings(SettingsGroup):
         "controller is",
         origin="judgement",
     )
+    rail_samples: int = setting(
+        3,
+        unit="1",
+        least=0,
+        most=1000,
+        reason="samples to both sides of one at the end of its sensor's range that are masked as "
+        "well: near the end its noise is cut off on one side, which a model would follow",
+        origin="judgement",
+    )
     command_quantile: float = setting(
         0.995,
         unit="1",

@@ -1,0 +1,111 @@
+"""Ends of a sensor's range: what one recording shows of them is masked in all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation
+
+from pamrs.diagnosis.settings import PlausibilitySettings
+from pamrs.recordings import Recording
+from pamrs.units import parse_unit
+
+__all__ = ["without_rails"]
+
+Array = NDArray[np.float64]
+
+
+def without_rails(
+    recordings: Sequence[Recording], settings: PlausibilitySettings
+) -> tuple[list[Recording], list[str]]:
+    """Recordings without the samples that a sensor reads at the end of its range.
+
+    A sensor ends where it ends: the end that one recording shows, by staying there for long, is
+    that of all of them, and a sample there may be of anything beyond. Samples beside one are those
+    of which the noise let through the lower half, and go with it.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        Those of a case.
+    settings : PlausibilitySettings
+        How many samples beside one at the end are not trusted.
+
+    Returns
+    -------
+    recordings : list of Recording
+    said : list of str
+        A line for each channel with such an end.
+    """
+    ends: dict[str, set[float]] = {}
+    for recording in recordings:
+        for issue in recording.issues:
+            if issue.rail is not None:
+                ends.setdefault(issue.channel, set()).add(issue.rail)
+    found, said = list(recordings), []
+    for channel, rails in ends.items():
+        for rail in sorted(rails):
+            counts: dict[str, int] = {}
+            own = [r.channels[channel][r.mask[channel]] for r in found if channel in r.channels]
+            seen = np.concatenate(own)
+            if seen.min() < rail < seen.max():
+                continue  # it stayed there, and reads more elsewhere
+            for k, recording in enumerate(found):
+                if channel not in recording.channels:
+                    continue
+                bad = _beyond(recording, channel, rail, settings.rail_samples)
+                if bad.any():
+                    counts[recording.name] = int(bad.sum())
+                    found[k] = _masked(recording, channel, bad)
+            said.append(_told(found, channel, rail, counts))
+    return found, said
+
+
+def _beyond(recording: Recording, channel: str, rail: float, beside: int) -> NDArray[np.bool_]:
+    """Samples of a channel at the end of its range, and those beside them; those that are masked
+    because they stay there included.
+    """
+    values, mask = recording.channels[channel], recording.mask[channel]
+    inside = values[mask]
+    if not inside.size:
+        return np.zeros_like(mask)
+    upper = rail >= float(np.median(inside))
+    slack = 1e-9 * max(1.0, abs(rail))
+    there = mask & (values >= rail - slack if upper else values <= rail + slack)
+    for issue in recording.issues:
+        if issue.channel == channel and issue.rail == rail:
+            # what is reported of several stretches together lies anywhere between its ends
+            between = (recording.time >= issue.start) & (recording.time <= issue.stop)
+            there |= between & ~mask
+    bad: NDArray[np.bool_] = binary_dilation(there, iterations=beside) if there.any() else there
+    return bad
+
+
+def _masked(recording: Recording, channel: str, bad: NDArray[np.bool_]) -> Recording:
+    values = np.where(bad, np.nan, recording.channels[channel])
+    mask = recording.mask[channel] & ~bad
+    return replace(
+        recording,
+        channels=recording.channels | {channel: values},
+        mask=recording.mask | {channel: mask},
+    )
+
+
+def _told(
+    recordings: Sequence[Recording], channel: str, rail: float, counts: dict[str, int]
+) -> str:
+    """Where a sensor's range ends and what of each recording was masked for it, in words."""
+    unit = next((u for r in recordings if (u := r.said.get(channel))), "")
+    if unit:
+        parsed = parse_unit(unit)
+        value = f"{(rail - parsed.offset) / parsed.scale:.6g} {unit}"
+    else:
+        value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
+    told = ", ".join(f"{count} in {name}" for name, count in counts.items())
+    return (
+        f"{channel} is clipped: its sensor's range ends at {value}; samples there, and those "
+        f"beside them, were masked in all recordings ({told})"
+    )
