@@ -218,11 +218,7 @@ def diagnose(
         check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
-    sound, masked = without_impossible(case.recordings, case.rig, chosen.plausibility)
-    sound, clipped = without_rails(sound, chosen.plausibility)
-    kept, copies = without_copies(sound, chosen.overlap)
-    kept, unread = without_poor_thermometers(kept, case.rig, chosen.prepare)
-    case = replace(case, recordings=kept)
+    case, clipped, masked = _sound(case, chosen)
     seen = available_blocks(case.rig, case.channels, chosen.prepare)
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
     case = replace(case, recordings=shortened)
@@ -241,7 +237,7 @@ def diagnose(
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
     begun = said_of_beginnings(blocks, [*inner.recordings, *outer.recordings])
-    warnings = [*clipped, *suspected, *copies, *masked, *unread, *held, *left_out, *begun]
+    warnings = [*clipped, *suspected, *masked, *held, *left_out, *begun]
     warnings += diagnosis.warnings
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
@@ -286,6 +282,17 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     rig, said = at_ambient(case.rig, case.recordings, settings.plausibility)
     told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
     return case.with_rig(without_passing(rig)), told
+
+
+def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str], list[str]]:
+    """The case with what its recordings cannot have measured masked or left out; what is said of
+    sensors whose range ends, and of the rest.
+    """
+    kept, clipped = without_rails(case.recordings, settings.plausibility)
+    kept, masked = without_impossible(kept, case.rig, settings.plausibility)
+    kept, copies = without_copies(kept, settings.overlap)
+    kept, unread = without_poor_thermometers(kept, case.rig, settings.prepare)
+    return replace(case, recordings=kept), clipped, [*copies, *masked, *unread]
 
 
 def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
