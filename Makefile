@@ -24,10 +24,10 @@ PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
 
-# A blinded trial: where it is, which cases, and where its page goes (a trial of a few cases does not replace the published page).
+# A blinded trial: where it is, which cases, and where its page goes.
 FOLDER ?= prove_out
 JOBS ?= 2
-PAGE ?= $(if $(CASES),$(FOLDER)/proof,docs/proof)
+PAGE ?= $(FOLDER)/proof
 PROVE_SEED := $(or $(SEED),7)
 PROVE_COMMAND := make prove SEED=$(PROVE_SEED)$(if $(CASES), CASES=$(CASES)) JOBS=$(JOBS) FOLDER=$(FOLDER)
 
@@ -87,7 +87,7 @@ demo: build  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle S
 	@$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
 
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
-prove: build  ## blinded trial from cases to docs/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)
+prove: build  ## blinded trial from cases to prove_out/proof/trial.md, hours (SEED=7 CASES=12 JOBS=2 FOLDER=prove_out to choose)
 	$(BIN)/python -m trial write $(FOLDER) --plan full --measure left --seed $(PROVE_SEED) $(if $(CASES),--cases $(CASES)) --jobs $(JOBS)
 	$(BIN)/pamrs prove $(FOLDER) --jobs $(JOBS) || test $$? -eq 3
 	$(BIN)/python -m benchmarks.baselines $(FOLDER) --jobs $(JOBS) || test $$? -eq 3

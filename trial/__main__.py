@@ -27,8 +27,8 @@ from .second.design import specs as second_specs
 from .second.inserted import all_inserted
 from .second.inserted import table as insertion_table
 from .second.marks import is_second, marks, plan_of
+from .second.pooled import CASES, pooled, table_of_cases
 from .second.pooled import page as pooled_page
-from .second.pooled import pooled
 from .second.tables import markdown as second_markdown
 from .second.tables import scores as second_scores
 from .second.tables import to_json
@@ -269,14 +269,24 @@ def _score(args: argparse.Namespace) -> None:
 def _add_pool(add: Add) -> None:
     several = add("pool", help=f"tables of several scored trials of plans {_STRATA} together")
     several.add_argument(
-        "scores", type=Path, nargs="+", help="what `score --json` wrote, one file for each trial"
+        "scores",
+        type=Path,
+        nargs="+",
+        help="what `score --json` wrote, one file for each trial, and tables of cases",
     )
+    several.add_argument("--only", default="", help="trials whose name begins with these letters")
+    several.add_argument("--cases", type=Path, help=f"write all cases as one table here ({CASES})")
     several.add_argument("--markdown", type=Path, help="write the tables here")
     several.set_defaults(run=_pool)
 
 
 def _pool(args: argparse.Namespace) -> None:
-    text = pooled_page(pooled(args.scores))
+    trials = pooled(args.scores, args.only)
+    if args.cases is not None:
+        if not args.cases.name.endswith(CASES):
+            raise ValueError(f"--cases {args.cases}: the name must end in {CASES}")
+        args.cases.write_bytes(table_of_cases(trials))
+    text = pooled_page(trials)
     print(text)
     if args.markdown is not None:
         write(args.markdown, text)

@@ -1,9 +1,14 @@
-"""Scores of several trials of the second plan together: more cases in each stratum."""
+"""Scores of several trials of the second plan together: more cases in each stratum.
+
+A trial comes from the JSON of ``python -m trial score`` or, beside others, from a compressed table
+of scored cases, one JSON object a line with the name of its trial (``docs/proof/cases.jsonl.gz``).
+"""
 
 from __future__ import annotations
 
+import gzip
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -12,16 +17,22 @@ from ..summary import percent, table
 from .marks import BlockMark, Mark
 from .tables import SCHEMA, SHARES, scores, share_of, tables
 
-__all__ = ["page", "pooled"]
+__all__ = ["CASES", "page", "pooled", "table_of_cases"]
+
+#: ending of a table of scored cases
+CASES = ".jsonl.gz"
 
 
-def pooled(files: Iterable[Path]) -> dict[str, list[Mark]]:
-    """Marks of trials that were scored, by the name of each file.
+def pooled(files: Iterable[Path], only: str = "") -> dict[str, list[Mark]]:
+    """Marks of scored trials, by the name of each trial.
 
     Parameters
     ----------
     files : iterable of path
-        What ``python -m trial score --json`` wrote.
+        Scores as ``python -m trial score --json`` writes them, each named after its trial, and
+        tables of cases (``.jsonl.gz``).
+    only : str, optional
+        Trials whose name begins with these letters; all by default.
 
     Returns
     -------
@@ -30,19 +41,45 @@ def pooled(files: Iterable[Path]) -> dict[str, list[Mark]]:
     Raises
     ------
     ValueError
-        If a file has another schema, or two of them have the same name.
+        If a file has another schema, two files hold a trial of the same name, or no trial is left.
     """
     found: dict[str, list[Mark]] = {}
     for file in files:
-        told = json.loads(file.read_text(encoding="utf-8"))
-        if told.get("schema") != SCHEMA:
-            raise ValueError(f"{file}: its schema is {told.get('schema')!r}, not {SCHEMA!r}")
-        if file.stem in found:
-            raise ValueError(f"{file}: a file of the name {file.stem} is there already")
-        found[file.stem] = [_mark(case) for case in told["cases"]]
+        for name, cases in _trials(file):
+            if name in found:
+                raise ValueError(f"{file}: a trial of the name {name} is there already")
+            if name.startswith(only):
+                found[name] = [_mark(case) for case in cases]
     if not found:
-        raise ValueError("no file of scores was given")
+        raise ValueError(
+            "no scored trial was given" + (f" whose name begins {only!r}" if only else "")
+        )
     return found
+
+
+def _trials(file: Path) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Name and scored cases of each trial of a file."""
+    if file.name.endswith(CASES):
+        rows: dict[str, list[dict[str, Any]]] = {}
+        for line in gzip.decompress(file.read_bytes()).decode().splitlines():
+            row = json.loads(line)
+            rows.setdefault(row.pop("trial"), []).append(row)
+        yield from rows.items()
+        return
+    told = json.loads(file.read_text(encoding="utf-8"))
+    if told.get("schema") != SCHEMA:
+        raise ValueError(f"{file}: its schema is {told.get('schema')!r}, not {SCHEMA!r}")
+    yield file.stem, told["cases"]
+
+
+def table_of_cases(trials: dict[str, list[Mark]]) -> bytes:
+    """Every case of every trial as one compressed table, the same bytes for the same cases."""
+    rows = (
+        json.dumps({"trial": name} | mark.to_dict(), separators=(",", ":"))
+        for name, marks in trials.items()
+        for mark in marks
+    )
+    return gzip.compress("".join(f"{row}\n" for row in rows).encode(), 9, mtime=0)
 
 
 def _mark(told: dict[str, Any]) -> Mark:
