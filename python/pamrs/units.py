@@ -80,6 +80,7 @@ _SYMBOLS: Final[dict[str, tuple[float, _Vector]]] = {
     "ns": (1e-9, _S),
     "min": (60.0, _S),
     "h": (3600.0, _S),
+    "d": (86400.0, _S),
     "Hz": (1.0, _HZ),
     "kHz": (1e3, _HZ),
     "m": (1.0, _M),

@@ -78,11 +78,11 @@ def test_dates_times_of_day_texts_and_thousands(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.series["clock"].values, 60.0 * np.arange(20))
 
 
-def test_a_cell_that_is_no_number_is_told_where_it_matters(tmp_path: Path) -> None:
+def test_a_cell_that_is_no_number_is_a_missing_sample_and_told(tmp_path: Path) -> None:
     rows = "".join(f"{i},{'oops' if i == 7 else i}\n" for i in range(40))
     log = text_log(tmp_path, "t,p\n" + rows)
-    with pytest.raises(RecordingError, match="'p' cannot be used: in row 8 .*'oops'"):
-        log.find("p")
+    assert np.flatnonzero(np.isnan(log.find("p").values)).tolist() == [7]
+    assert log.remarks == ["p: 1 cell is no number ('oops'): taken as missing"]
 
 
 def test_names_that_are_not_there(tmp_path: Path) -> None:

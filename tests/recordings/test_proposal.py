@@ -65,7 +65,7 @@ def test_named_blocks_several_clocks_events_and_parts(tmp_path: Path) -> None:
     assert found["muscle_pressure.flexor"] == "p_flexor"
     assert found["muscle_pressure.extensor"] == "p_extensor"
     assert found["joint_angle.elbow"] == "hinge_angle"
-    assert (item.split, item.parts) == ({"gap": 8.0}, 3)
+    assert (item.split, len(item.pieces)) == ({"gap": 8.0}, 3)
     assert any("not found in this log: valve_command.flexor" in text for text in item.remarks)
     rig.to_toml(tmp_path / "rig.toml")
     (tmp_path / "case.toml").write_text(proposal.case_toml(tmp_path), encoding="utf-8")

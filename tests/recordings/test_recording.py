@@ -358,8 +358,12 @@ def test_empty_cells_and_cut_last_row(tmp_path: Path) -> None:
     lines[12] = ",".join([*lines[12].split(",")[:-1], "NaN"])
     lines[-1] = lines[-1][:20]
     recording = load(tmp_path, "\n".join(lines))
-    assert not recording.mask["joint_angle"][[10, 11, -1]].any()
-    assert "nan" in kinds(recording)
+    assert not recording.mask["joint_angle"][[10, 11]].any()
+    assert len(recording) == N - 1
+    assert kinds(recording) == {"nan", "log"}
+    assert f"rows that do not have 5 cells: 1 (first: row {N + 1}), left out" in {
+        issue.text for issue in recording.issues
+    }
 
 
 def test_missing_samples_leave_masked_holes(tmp_path: Path) -> None:
@@ -417,21 +421,24 @@ def test_clock_jumping_a_little_forward_is_a_hole(tmp_path: Path) -> None:
     assert not recording.valid()[2000:2399].any()
 
 
-def test_repeated_times_are_left_out(tmp_path: Path) -> None:
+def test_rows_of_one_time_are_spread_over_it(tmp_path: Path) -> None:
     data = lively()
     data["time"][1500:1504] = data["time"][1500]
     recording = load(tmp_path, data)
-    assert kinds(recording) == {"clock_jump", "gap"}
-    assert "3 rows" in next(issue.text for issue in recording.issues if issue.kind == "clock_jump")
-    assert not recording.valid()[1501:1504].any()
-    assert recording.valid()[1504:].all()
+    assert kinds(recording) == {"log"}
+    assert "up to 4 rows of one" in recording.issues[0].text
+    assert recording.valid().all()
+    np.testing.assert_allclose(
+        recording.channels["muscle_pressure"], data["muscle_pressure"], atol=0.1
+    )
 
 
 def test_every_row_twice(tmp_path: Path) -> None:
     recording = load(tmp_path, text(lively(), rows=np.repeat(np.arange(N), 2)))
     assert len(recording) == N
     assert recording.valid().all()
-    assert kinds(recording) == {"clock_jump"}
+    (issue,) = recording.issues
+    assert issue.text == f"rows that stand there twice: {N}, left out once"
 
 
 def test_jitter_is_interpolated_between_neighbours(tmp_path: Path) -> None:

@@ -98,6 +98,8 @@ def import_command(
 def _show(item: LogProposal) -> None:
     """The channels of a log as a table, and what to look at."""
     typer.echo(f"{item.log.path}: {len(item.listed)} channels")
+    for text in item.log.remarks:
+        typer.echo(f"  read: {text}")
     rows = [("channel", "samples", "rate", "unit", "from", "to", "proposed as")]
     for each in item.listed:
         rate = f"{each.rate:.4g} Hz" if math.isfinite(each.rate) else "-"
@@ -109,8 +111,9 @@ def _show(item: LogProposal) -> None:
         typer.echo("  " + "  ".join(cell.ljust(width) for cell, width in cells).rstrip())
     for name, reason in item.log.unread.items():
         typer.echo(f"  {name}: not read, {reason}")
-    if item.parts > 1:
-        typer.echo(f"  {item.parts} recordings: split = {item.split!r}")
+    if item.split is not None:
+        count = len(item.pieces)
+        typer.echo(f"  {count} recording{'s' * (count > 1)}: split = {item.split!r}")
     for text in item.remarks:
         typer.echo(f"  look: {text}")
     typer.echo("")

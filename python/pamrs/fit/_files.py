@@ -139,14 +139,9 @@ def read_map(
 
 
 def _left_over(table: Table, strange: Sequence[str]) -> list[str]:
-    """Notes on what of a table is not used: columns of unknown meaning, and rows with a wrong
-    number of cells.
-    """
+    """Notes on what of a table is not used: columns of unknown meaning, and rows."""
     notes = [f"columns not used: {', '.join(strange)}"] if strange else []
-    if table.ragged:
-        rows = "1 row has" if len(table.ragged) == 1 else f"{len(table.ragged)} rows have"
-        notes.append(f"{rows} too few or too many cells (first: row {table.ragged[0]})")
-    return notes
+    return [*notes, *table.remarks]
 
 
 def _one_character(delimiter: str | None, decimal: str | None, source: str) -> None:

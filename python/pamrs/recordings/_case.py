@@ -14,7 +14,8 @@ from typing import Any, Final
 from pamrs._files import found_outside, parse_toml, read_toml
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
-from pamrs.recordings._recording import OwnValue, Recording, load_recording
+from pamrs.recordings._headed import load_recording
+from pamrs.recordings._recording import OwnValue, Recording
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
 from pamrs.units import to_si

@@ -16,13 +16,14 @@ from pamrs.channels import channel_of
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._clock import Array
 from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
-from pamrs.recordings._recording import CHANNELS, Recording, assemble
-from pamrs.recordings._several_clocks import Sampled, on_one_clock
+from pamrs.recordings._recording import CHANNELS, Issue, Recording
+from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
-from pamrs.recordings.logs import Log, TextFormat, read_log, understood_unit
+from pamrs.recordings._stamps import Ticks, ticks, unit_of_stamps
+from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.units import parse_unit, same_dimension, to_si
 
-__all__ = ["load_recordings", "recordings_of"]
+__all__ = ["Clocks", "load_recordings", "recordings_of"]
 
 _ROLES: Final = ("fit", "held_out")
 
@@ -142,44 +143,47 @@ def recordings_of(
         If a channel cannot be understood.
     """
     source = str(log.path)
-    channels = [_sampled(log, item, item.clock or clock, sample_time) for item in sources]
+    clocks = Clocks(log, sample_time)
+    channels = [_sampled(log, item, clocks, item.clock or clock) for item in sources]
     said = {item.channel: item.unit for item in sources}
     if cut is None:
         if pieces is not None:
             raise RecordingError(f"{source}: pieces = {list(pieces)!r} needs split")
-        return [_recording(name, role, channels, source, sample_time, said)]
+        made = [recording_of(name, role, channels, source, sample_time, said)]
+        return _told(made, log, channels, [])
     column = None
     if cut.column is not None:
         series = log.find(cut.column)
-        times = _times(log, series.name, clock, sample_time)
-        column = Split(series.values, times, series.labels)
-    found: list[Recording] = []
-    for part in parts(channels, cut, column, pieces, source):
-        label = f"{name}_{part.label}"
-        found.append(_recording(label, role, part.channels, source, sample_time, said))
-    return found
+        ticks = clocks.of(series, clock)
+        column = Split(series.values[ticks.rows], ticks, series.labels)
+    found, remarks = parts(channels, cut, column, pieces, source)
+    made = [
+        recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
+        for part in found
+    ]
+    return _told(made, log, channels, remarks)
 
 
-def _recording(
-    name: str,
-    role: str,
-    channels: Sequence[Sampled],
-    source: str,
-    sample_time: float | None,
-    said: Mapping[str, str],
-) -> Recording:
-    first = channels[0].time
-    alike = all(
-        channel.time is first or np.array_equal(channel.time, first) for channel in channels
-    )
-    if not alike or any(channel.hold for channel in channels):
-        return on_one_clock(name, role, channels, source, sample_time)
-    raw = {channel.name: channel.values for channel in channels}
-    units = {channel.name: channel.unit for channel in channels}
-    return assemble(name, role, {"time": first, **raw}, units, [], source, sample_time, said)
+def _told(
+    made: list[Recording], log: Log, channels: Sequence[Sampled], remarks: Sequence[str]
+) -> list[Recording]:
+    """The recordings, the first of them with what was done to the log as it was read."""
+    if not made:
+        return made
+    said = [("time", text) for text in [*log.remarks, *remarks]]
+    seen: list[Ticks] = []
+    for item in channels:
+        if item.clock is not None and not any(item.clock is clock for clock in seen):
+            seen.append(item.clock)
+            said += [("time", text) for text in item.clock.remarks]
+            said += [("time", item.clock.spread[1])] if item.clock.spread[1] else []
+        said += [(item.name, text) for text in item.remarks]
+    first = made[0]
+    issues = [Issue("log", channel, 0.0, first.duration, text) for channel, text in said]
+    return [replace(first, issues=[*issues, *first.issues]), *made[1:]]
 
 
-def _sampled(log: Log, item: Source, clock: Clock, sample_time: float | None) -> Sampled:
+def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
     """Values and times of one channel in SI; rows without a time are left out."""
     series = log.find(item.column)
     if series.labels:
@@ -192,40 +196,85 @@ def _sampled(log: Log, item: Source, clock: Clock, sample_time: float | None) ->
     unit = CHANNELS[channel_of(item.channel)].unit
     if channel_of(item.channel) == "reference" and not same_dimension(item.unit, "rad"):
         unit = "Pa"
-    time = _times(log, series.name, clock, sample_time)
-    stamped = np.isfinite(time)
-    if not stamped.any():
-        raise RecordingError(f"{log.path}: {item.column!r} has no time at all")
-    if not stamped.all():
-        values, time = values[stamped], time[stamped]
-    return Sampled(item.channel, values, time, unit, item.hold)
+    return sampled(item.channel, values, clocks.of(series, clock), unit, item.hold)
 
 
-def _times(log: Log, name: str, clock: Clock, sample_time: float | None) -> Array:
-    """Times of a series [s]."""
-    series = log.series[name]
-    if clock.column is None:
-        time = series.time
-        if time is None and sample_time is not None:
-            time = np.arange(len(series.values), dtype=np.float64) * sample_time
-        if time is None:
-            raise RecordingError(
-                f"{log.path}: the log has no clock for {name!r}: say which channel holds the times "
-                '(time = { column = "...", unit = "s" }), or sample_time if they are evenly spaced'
-            )
-        return time + clock.offset if clock.offset else time
-    stamps = log.find(clock.column)
-    if len(stamps.values) != len(series.values):
-        raise RecordingError(
-            f"{log.path}: {name!r} has {len(series.values)} values, but its times "
-            f"{stamps.name!r} are {len(stamps.values)}"
-        )
-    known = understood_unit(stamps.unit)
-    unit = clock.unit or (known.unit if known else "s")
-    try:
-        factor = to_si(1.0, unit, "time")
-    except ParameterError as error:
-        raise RecordingError(f"{log.path}: the times {stamps.name!r}: {error}") from error
-    if factor == 1.0 and not clock.offset:
-        return stamps.values
-    return stamps.values * factor + clock.offset
+class Clocks:
+    """The clocks of a log, each put in order once."""
+
+    def __init__(self, log: Log, sample_time: float | None) -> None:
+        self.log = log
+        self.sample_time = sample_time
+        self._made: dict[tuple[str | int, str | None, float], Ticks] = {}
+
+    def of(self, series: Series, clock: Clock) -> Ticks:
+        """When the rows of a series were taken.
+
+        Parameters
+        ----------
+        series : Series
+            Of the log.
+        clock : Clock
+            Where its times are.
+
+        Returns
+        -------
+        Ticks
+
+        Raises
+        ------
+        RecordingError
+            If there are none, or they are not as many.
+        """
+        if clock.column is not None:
+            stamps = self.log.find(clock.column)
+            if len(stamps.values) != len(series.values):
+                raise RecordingError(
+                    f"{self.log.path}: {series.name!r} has {len(series.values)} values, but its "
+                    f"times {stamps.name!r} are {len(stamps.values)}"
+                )
+        column: str | int | None = clock.column
+        if column is None:
+            column = len(series.values) if series.time is None else id(series.time)
+        key = (column, clock.unit, clock.offset)
+        if key not in self._made:
+            found, others = self._stamps(series, clock)
+            if not np.isfinite(found).any():
+                raise RecordingError(f"{self.log.path}: {series.name!r} has no time at all")
+            self._made[key] = ticks(found, others)
+        return self._made[key]
+
+    def _stamps(self, series: Series, clock: Clock) -> tuple[Array, list[Array]]:
+        """Times of a series [s], and what else stands in the rows."""
+        if clock.column is None:
+            time = series.time
+            if time is None and self.sample_time is not None:
+                return np.arange(len(series.values), dtype=np.float64) * self.sample_time, []
+            if time is None:
+                raise RecordingError(
+                    f"{self.log.path}: the log has no clock for {series.name!r}: say which channel "
+                    'holds the times (time = { column = "...", unit = "s" }), or sample_time if '
+                    "they are evenly spaced"
+                )
+            others = [each.values for each in self.log.series.values() if each.time is time]
+            return time + clock.offset if clock.offset else time, others
+        stamps = self.log.find(clock.column)
+        unit = self._unit(stamps, clock)
+        others = [
+            each.values
+            for each in self.log.series.values()
+            if each is not stamps and len(each.values) == len(stamps.values)
+        ]
+        return stamps.values * to_si(1.0, unit, "time") + clock.offset, others
+
+    def _unit(self, stamps: Series, clock: Clock) -> str:
+        known = understood_unit(stamps.unit)
+        unit = clock.unit or (known.unit if known else "s")
+        try:
+            to_si(1.0, unit, "time")
+        except ParameterError as error:
+            raise RecordingError(f"{self.log.path}: the times {stamps.name!r}: {error}") from error
+        fits, why = unit_of_stamps(stamps.values, stamps.name, unit)
+        if fits != unit:
+            raise RecordingError(f"{self.log.path}: {why}; time = {{ unit = {fits!r} }} says so")
+        return unit

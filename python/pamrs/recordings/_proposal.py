@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -15,8 +15,12 @@ from pamrs._checks import positive
 from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
+from pamrs.recordings._from_log import Clocks
+from pamrs.recordings._mapping import Clock
 from pamrs.recordings._matching import Match, channels_of, matched, words_of
-from pamrs.recordings._several_clocks import SLOW, UNTOLD
+from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
+from pamrs.recordings._splitting import Cut, Split, stretches_of
+from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
 from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.rig import Rig
@@ -24,20 +28,10 @@ from pamrs.units import parse_unit, same_dimension
 
 __all__ = ["Listed", "LogProposal", "Proposal", "propose"]
 
-_TIMES: Final = (
-    "t",
-    "time",
-    "zeit",
-    "timestamp",
-    "stamp",
-    "seconds",
-    "sec",
-    "clock",
-    "when",
-    "tijd",
-    "tiempo",
+_TRIALS: Final = (
+    ("trial", "run", "test", "segment", "cycle", "versuch", "experiment", "lift")
+    + ("part",)  # of logs that begin again with their headings
 )
-_TRIALS: Final = ("trial", "run", "test", "segment", "cycle", "versuch", "experiment", "lift")
 _LONG: Final = 50.0  # usual intervals: a longer pause, of a second at least, parts recordings
 _MOST_PARTS: Final = 200
 _SHORTEST: Final = 32  # samples of a part that is worth a recording
@@ -88,8 +82,10 @@ class LogProposal:
         The key ``time``; empty where the log has clocks.
     split : str or dict, optional
         The key ``split``.
-    parts : int
-        How many recordings that makes.
+    pieces : list of int
+        The numbers of the parts that are long enough for a recording; empty without a split.
+    short : int
+        How many are not.
     remarks : list of str
         What to look at.
     """
@@ -99,7 +95,8 @@ class LogProposal:
     matches: list[Match]
     time: dict[str, Any] = field(default_factory=dict)
     split: str | dict[str, Any] | None = None
-    parts: int = 1
+    pieces: list[int] = field(default_factory=list)
+    short: int = 0
     remarks: list[str] = field(default_factory=list)
 
 
@@ -154,12 +151,12 @@ class Proposal:
         usable = [item for item in self.logs if item.matches]
         for place, item in enumerate(usable):
             last = place == len(usable) - 1
-            if item.parts > 2 and last:
-                lines += self._entry(item, folder, "fit", list(range(1, item.parts)))
-                lines += self._entry(item, folder, "held_out", [item.parts])
+            if len(item.pieces) > 2 and last:
+                lines += self._entry(item, folder, "fit", item.pieces[:-1])
+                lines += self._entry(item, folder, "held_out", item.pieces[-1:])
             else:
                 role = "held_out" if last and len(usable) > 1 else "fit"
-                lines += self._entry(item, folder, role, None)
+                lines += self._entry(item, folder, role, item.pieces if item.short else None)
         return "\n".join(lines) + "\n"
 
     def _entry(
@@ -247,19 +244,24 @@ def propose(
 def _proposal(
     log: Log, wanted: Sequence[str], rig: Rig | None, sample_time: float | None
 ) -> LogProposal:
-    rising = [series for series in log.series.values() if _like_a_clock(series)]
-    clocks = {name: _clock_column(rising, series) for name, series in log.series.items()}
-    used = {entry["column"] for entry in clocks.values() if entry}
-    candidates = [series for name, series in log.series.items() if name not in used]
+    clocks = _Clocks(log, sample_time)
+    candidates = [series for name, series in log.series.items() if name not in clocks.used]
     matches, remarks = matched(candidates, wanted, rig)
-    times = {match.channel: _times(log, match.series, clocks, sample_time) for match in matches}
-    held = _held({name: time for name, time in times.items() if time is not None})
+    made = {match.channel: clocks.of(match.series) for match in matches}
+    known = {name: clock for name, clock in made.items() if clock is not None}
+    laid = {
+        m.channel: sampled(m.channel, m.si(), known[m.channel], _unit(m))
+        for m in matches
+        if m.channel in known
+    }
+    held = _held({name: item.time for name, item in laid.items()})
     matches = [
-        match.with_clock(clocks[match.series.name], match.channel in held) for match in matches
+        match.with_clock(clocks.entries[match.series.name], match.channel in held)
+        for match in matches
     ]
     shared = next((match.time for match in matches if match.time and not match.hold), {})
     for match in matches:
-        if times[match.channel] is None:
+        if match.channel not in known:
             remarks.append(
                 f"{match.series.name} has no clock: give --sample-time, or time in case.toml"
             )
@@ -268,19 +270,29 @@ def _proposal(
                 f"{match.series.name} has few samples at uneven times: taken as logged on change "
                 "(hold)"
             )
-    remarks += _rates({m.channel: times[m.channel] for m in matches if not m.hold})
-    remarks += _suspect(matches, rig)
-    missing = [name for name in wanted if name not in times and channel_of(name) not in SLOW]
+    remarks += _rates(
+        {m.channel: laid[m.channel].time for m in matches if not m.hold and m.channel in laid}
+    )
+    remarks += _suspect(matches, rig, laid)
+    missing = [name for name in wanted if name not in made and channel_of(name) not in SLOW]
     if missing and rig is not None:
         told = ", ".join(_spoken(name, rig) for name in missing)
         remarks.append(f"not found in this log: {told}")
-    stepped = [times[m.channel] for m in matches if not m.hold and times[m.channel] is not None]
-    split, parts = _split(log, stepped[0] if stepped else None)
-    listed = [
-        _listed(series, _times(log, series, clocks, None), matches)
-        for series in log.series.values()
-    ]
-    return LogProposal(log, listed, matches, shared, split, parts, remarks)
+    stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
+    split, pieces, short = _split(log, stepped[0] if stepped else None)
+    if short:
+        remarks.append(
+            f"{short} of {short + len(pieces)} parts have fewer than {_SHORTEST} samples: left out"
+        )
+    listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
+    read = [*log.remarks, *clocks.remarks]
+    read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]
+    log = replace(log, remarks=read)
+    return LogProposal(log, listed, matches, shared, split, pieces, short, remarks)
+
+
+def _unit(match: Match) -> str:
+    return "rad" if same_dimension(match.unit, "rad") else ""
 
 
 _SENSORS: Final = {
@@ -309,54 +321,79 @@ def _spoken(channel: str, rig: Rig) -> str:
 
 
 def _like_a_clock(series: Series) -> bool:
-    """Whether a series is called like a time, and rises."""
+    """Whether a series is called like a time, or is one, and rises."""
     words = words_of(series.name)
-    called = bool(words) and (words[-1] in _TIMES or words[0] in _TIMES)
-    if series.labels or not (called or words == ["x", "value"]):  # LabVIEW calls its time X_Value
+    called = bool(words) and (words[-1] in CLOCK_WORDS or words[0] in CLOCK_WORDS)
+    called |= series.stamps or words == ["x", "value"]  # LabVIEW calls its time X_Value
+    good = series.values[np.isfinite(series.values)]
+    if series.labels or not called or len(good) < 2:
         return False
-    steps = np.diff(series.values[np.isfinite(series.values)])
-    return bool(len(steps)) and bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
+    steps = np.diff(ticks(good).time)
+    return bool(np.mean(steps >= 0.0) > 0.9) and bool(np.any(steps > 0.0))
 
 
-def _clock_column(rising: Sequence[Series], series: Series) -> dict[str, Any]:
-    """The key ``time`` for a series without a clock: the one of its length nearest by name."""
-    if series.time is not None or series in rising:
-        return {}
-    fitting = [other for other in rising if len(other.values) == len(series.values)]
-    if not fitting:
-        return {}
+class _Clocks:
+    """Which series of a log are the times of the others, and what was done to them."""
 
-    def rank(other: Series) -> tuple[int, int]:
-        return len(os.path.commonprefix([other.name, series.name])), -len(other.name)
+    def __init__(self, log: Log, sample_time: float | None) -> None:
+        self._step = sample_time
+        self._clocks = Clocks(log, sample_time)
+        self.remarks: list[str] = []
+        self._rising = [series for series in log.series.values() if _like_a_clock(series)]
+        self.entries = {name: self._column(series) for name, series in log.series.items()}
+        self.used = {entry["column"] for entry in self.entries.values() if entry}
+        if len(self.used) == 1:
+            self._compare(log.series[next(iter(self.used))])
 
-    best = max(fitting, key=rank)
-    return {"column": best.name, "unit": _time_unit(best)}
+    def _column(self, series: Series) -> dict[str, Any]:
+        """The key ``time`` for a series without a clock: the one of its length nearest by name,
+        stamps of messages before those of their arrival.
+        """
+        if series.time is not None or series in self._rising:
+            return {}
+        fitting = [each for each in self._rising if len(each.values) == len(series.values)]
+        if not fitting:
+            return {}
 
+        def rank(other: Series) -> tuple[int, int, int]:
+            near = len(os.path.commonprefix([other.name, series.name]))
+            return near, "header" in words_of(other.name), -len(other.name)
 
-def _time_unit(series: Series) -> str:
-    """The unit that the log says, else the one in which the samples are 10 us to 1 s apart."""
-    known = understood_unit(series.unit)
-    if known is not None and same_dimension(known.unit, "s"):
-        return known.unit
-    steps = np.diff(series.values)
-    usual = float(np.median(steps[steps > 0.0]))
-    if usual < 0.5:
-        return "s"
-    return "ms" if usual < 1000.0 else "us"
+        best = max(fitting, key=rank)
+        known = understood_unit(best.unit)
+        said = known.unit if known is not None and same_dimension(known.unit, "s") else ""
+        unit, remark = unit_of_stamps(best.values, best.name, said)
+        if remark and remark not in self.remarks:
+            self.remarks.append(remark)
+        return {"column": best.name, "unit": unit}
 
+    def of(self, series: Series) -> Ticks | None:
+        """When its rows were taken; None where the log has no clock for it."""
+        entry = self.entries[series.name]
+        if series.time is None and not entry and (self._step is None or series in self._rising):
+            return None
+        try:
+            made = self._clocks.of(series, Clock(entry.get("column"), entry.get("unit")))
+        except RecordingError:  # no time in any row
+            return None
+        said = [text for text in (*made.remarks, made.spread[1]) if text]
+        self.remarks += [text for text in said if text not in self.remarks]
+        return made
 
-def _times(
-    log: Log, series: Series, clocks: dict[str, dict[str, Any]], sample_time: float | None
-) -> Array | None:
-    entry = clocks[series.name]
-    if series.time is not None:
-        return series.time
-    if entry:
-        scale = parse_unit(entry["unit"]).scale
-        return np.asarray(log.series[entry["column"]].values * scale, dtype=np.float64)
-    if sample_time is not None:
-        return np.arange(len(series.values), dtype=np.float64) * sample_time
-    return None
+    def _compare(self, used: Series) -> None:
+        """Say by how much another clock of the same rows lags behind the one that is used."""
+        mine = used.values * parse_unit(unit_of_stamps(used.values, used.name)[0]).scale
+        for other in self._rising:
+            if other is used or len(other.values) != len(mine):
+                continue
+            scale = parse_unit(unit_of_stamps(other.values, other.name)[0]).scale
+            away = other.values * scale - mine
+            away = away[np.isfinite(away)]
+            if len(away) and float(np.max(np.abs(away))) < 60.0:
+                self.remarks.append(
+                    f"the clock is {used.name}; {other.name} is {1e3 * np.median(away):.3g} ms "
+                    f"later in the middle ({1e3 * away.min():.3g} to {1e3 * away.max():.3g} ms)"
+                )
 
 
 def _held(times: dict[str, Array]) -> set[str]:
@@ -372,11 +409,11 @@ def _held(times: dict[str, Array]) -> set[str]:
     return found
 
 
-def _rates(times: dict[str, Array | None]) -> list[str]:
+def _rates(times: dict[str, Array]) -> list[str]:
     """What becomes of channels that were sampled at different rates."""
     rates: dict[str, float] = {}
     for name, time in times.items():
-        steps = np.diff(time) if time is not None else np.empty(0)
+        steps = np.diff(time)
         if np.any(steps > 0.0) and channel_of(name) not in UNTOLD:
             rates[name] = 1.0 / usual_interval(steps[steps > 0.0], len(steps) + 1)
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
@@ -388,44 +425,66 @@ def _rates(times: dict[str, Array | None]) -> list[str]:
     ]
 
 
-def _suspect(matches: Sequence[Match], rig: Rig | None) -> list[str]:
-    values = {match.channel: match.si() for match in matches}
+def _suspect(matches: Sequence[Match], rig: Rig | None, laid: Mapping[str, Sampled]) -> list[str]:
+    values = {m.channel: laid[m.channel].values if m.channel in laid else m.si() for m in matches}
     said = {match.channel: match.unit for match in matches if match.said}
     return [found.text for found in suspicions(values, said, rig)]
 
 
-def _listed(series: Series, time: Array | None, matches: Sequence[Match]) -> Listed:
+def _listed(series: Series, clock: Ticks | None, matches: Sequence[Match]) -> Listed:
     good = series.values[np.isfinite(series.values)]
     if series.labels:
         good = good[:0]
     low, high = (float(good.min()), float(good.max())) if good.size else (np.nan, np.nan)
     rate = np.nan
-    steps = np.diff(time) if time is not None else np.empty(0)
-    steps = steps[steps > 0.0]
-    if len(steps):
-        rate = 1.0 / usual_interval(steps, len(series.values))
+    if clock is not None:
+        steps = np.diff(sampled("", series.values, clock, "").time)
+        steps = steps[steps > 0.0]
+        if len(steps):
+            rate = 1.0 / usual_interval(steps, len(series.values))
     channel = next((match.channel for match in matches if match.series is series), "")
     return Listed(series.name, len(series.values), float(rate), series.unit, low, high, channel)
 
 
-def _split(log: Log, time: Array | None) -> tuple[str | dict[str, Any] | None, int]:
-    """Where one recording ends and the next begins, and how many that makes."""
-    if time is None or len(time) < 2 * _SHORTEST:
-        return None, 1
+def _split(log: Log, clock: Ticks | None) -> tuple[str | dict[str, Any] | None, list[int], int]:
+    """Where one recording ends and the next begins, the numbers of the parts that are long enough,
+    and how many are not.
+    """
+    if clock is None or len(clock.rows) < 2 * _SHORTEST:
+        return None, [], 0
+    time = clock.spread[0]
+    rows = int(clock.rows.max()) + 1
     for series in log.series.values():
         words = words_of(series.name)
-        if len(series.values) == len(time) and words and words[-1] in _TRIALS:
-            count = 1 + int(np.sum(np.diff(series.values) != 0.0))
-            if 1 < count <= min(_MOST_PARTS, len(time) // _SHORTEST):
-                return {"column": series.name}, count
+        if len(series.values) >= rows and words and words[-1] in _TRIALS:
+            column = Split(series.values[clock.rows], clock, series.labels)
+            found = _numbers(Cut(column=series.name), time, column)
+            if found is not None:
+                return {"column": series.name}, *found
     steps = np.diff(time)
-    back = int(np.sum(steps < 0.0))
-    if 0 < back < min(_MOST_PARTS, len(time) // _SHORTEST):
-        return "clock", back + 1
+    if np.any(steps < 0.0):
+        found = _numbers(Cut(), time, None)
+        return ("clock", *found) if found else (None, [], 0)
     forward = steps[steps > 0.0]
     if not len(forward):
-        return None, 1
+        return None, [], 0
     long = forward[forward > max(1.0, _LONG * usual_interval(forward, len(time)))]
-    if 0 < len(long) < min(_MOST_PARTS, len(time) // _SHORTEST):
-        return {"gap": float(f"{0.5 * float(long.min()):.3g}")}, len(long) + 1
-    return None, 1
+    if len(long):
+        gap = float(f"{0.5 * float(long.min()):.3g}")
+        found = _numbers(Cut(gap=gap), time, None)
+        if found is not None:
+            return {"gap": gap}, *found
+    return None, [], 0
+
+
+def _numbers(cut: Cut, time: Array, column: Split | None) -> tuple[list[int], int] | None:
+    """Numbers of the parts that are long enough, and how many are not; None where there are too
+    many parts, or only one.
+    """
+    found = stretches_of(cut, time, column)
+    long = [part.number for part in found if part.stop - part.start >= _SHORTEST]
+    if len(found) < 2 or not long or len(long) > _MOST_PARTS:
+        return None
+    if len(found) - len(long) > len(long):
+        return None
+    return long, len(found) - len(long)

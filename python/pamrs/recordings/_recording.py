@@ -7,13 +7,9 @@ silently.
 
 from __future__ import annotations
 
-import difflib
 import math
-import os
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -21,12 +17,10 @@ from numpy.typing import NDArray
 
 from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
-from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._faults import Fault, find_faults
 from pamrs.recordings._suspicion import suspicions
-from pamrs.recordings.table import Table, read_table, thousands_of
-from pamrs.units import parse_unit, to_si
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -40,7 +34,6 @@ __all__ = [
     "Recording",
     "assemble",
     "judged",
-    "load_recording",
 ]
 
 Array = NDArray[np.float64]
@@ -76,7 +69,6 @@ CHANNELS: Final[dict[str, _Channel]] = {
 }
 # a reference may be one of an angle or of a pressure
 REFERENCE_UNITS: Final = ("rad", "Pa")
-_HEADING = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
 _FEW: Final = 20
 
 
@@ -87,8 +79,8 @@ class Issue:
     Attributes
     ----------
     kind : str
-        ``nan``, ``gap``, ``clock_jump``, ``frozen``, ``saturated``, ``outlier``, ``constant`` or
-        ``short``.
+        ``nan``, ``gap``, ``clock_jump``, ``frozen``, ``saturated``, ``outlier``, ``constant``,
+        ``short``, or ``log`` for what was done to the file as it was read.
     channel : str
         Canonical name; ``time`` for the clock.
     start, stop : float
@@ -315,195 +307,15 @@ class Recording:
         return pd.DataFrame(data, index=index)
 
 
-def load_recording(
-    path: str | os.PathLike[str],
-    *,
-    columns: Sequence[str] | Mapping[str, str] | None = None,
-    delimiter: str = ",",
-    header: bool = True,
-    thousands: str | Mapping[str, str] | None = None,
-    sample_time: float | None = None,
-    decimal: str = ".",
-    name: str | None = None,
-    role: str = "fit",
-) -> Recording:
-    """Read a recording, check it and lay it on a uniform grid.
-
-    Parameters
-    ----------
-    path : path-like
-        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``) or ``.parquet``.
-    columns : sequence or mapping of str, optional
-        Headings ``"name [unit]"`` to use instead of the file's: one for each column in order, or a
-        mapping from the file's headings. An empty heading leaves the column out.
-    delimiter : str
-        What separates cells; ``" "`` means any run of blanks.
-    header : bool
-        Whether the first row holds headings.
-    thousands : str or mapping, optional
-        Mark between groups of digits, of all columns or by channel: ``{"time": "."}``.
-    sample_time : float, optional
-        Grid spacing [s]; without a time column, the spacing of the rows. Else the usual interval.
-    decimal : str
-        Decimal mark.
-    name, role : str
-        Name (default: the file's stem) and role, ``fit`` or ``held_out``.
-
-    Returns
-    -------
-    Recording
-        SI values with masks and issues.
-
-    Raises
-    ------
-    RecordingError
-        If the file cannot be read or a column cannot be understood; the message names file and
-        column.
-    """
-    file = Path(path)
-    source = str(file)
-    if role not in ("fit", "held_out"):
-        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
-    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise RecordingError(
-            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
-        )
-    if len(delimiter) != 1:
-        raise RecordingError(
-            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
-        )
-    if file.is_dir():
-        raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
-    if not header and not isinstance(columns, Sequence):
-        raise RecordingError(
-            f"{source}: without a header, columns must list what each column is: 'name [unit]'"
-        )
-    table = read_table(file, delimiter=delimiter, header=header)
-    wanted = _understood(_headings(table, columns, source), source)
-    raw, units = _si_columns(table, wanted, source, thousands, decimal)
-    stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    said = {channel: unit for channel, (_, unit) in wanted.items() if channel != "time"}
-    recording = assemble(name or stem, role, raw, units, table.ragged, source, sample_time, said)
-    return replace(recording, source=source, said=said)
-
-
-# ------------------------------------------------------------------------- columns
-
-
-def _headings(
-    table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str
-) -> list[str]:
-    found = table.header
-    if columns is None:
-        return found or []
-    if isinstance(columns, str):
-        raise RecordingError(
-            f"{source}: columns = {columns!r} is not allowed: a list of headings is needed"
-        )
-    if isinstance(columns, Mapping):
-        given = found or []
-        strange = [key for key in columns if key not in given]
-        if strange:
-            raise RecordingError(
-                f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
-            )
-        return [columns.get(heading, heading) for heading in given]
-    if len(columns) != len(table.cells):
-        raise RecordingError(
-            f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} "
-            "columns"
-        )
-    return list(columns)
-
-
-def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
-    """Canonical name -> (column, unit) of every heading that is to be used."""
-    problems: list[str] = []
-    wanted: dict[str, tuple[int, str]] = {}
-    for index, heading in enumerate(headings):
-        if not heading.strip():
-            continue
-        match = _HEADING.match(heading)
-        name = match["name"] if match else heading
-        channel = channel_of(name)
-        if match is None or channel not in CHANNELS or name.endswith("."):
-            near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
-            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
-            problems.append(
-                f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
-            )
-            continue
-        expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
-        unit = match["unit"]
-        if unit is None or not unit.strip():
-            problems.append(
-                f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit "
-                "its values are in"
-            )
-        elif name in wanted:
-            problems.append(f"column {heading!r}: the channel {name!r} is there twice")
-        else:
-            trouble = _unit_trouble(unit, expected)
-            if trouble:
-                problems.append(f"column {heading!r}: {trouble}")
-            wanted[name] = (index, unit.strip())
-    if not problems and not set(wanted) - {"time"}:
-        problems.append("there is no channel to use")
-    if problems:
-        raise RecordingError(joined(source, problems))
-    return wanted
-
-
-def _unit_trouble(unit: str, expected: Sequence[str]) -> str | None:
-    trouble = None
-    for si_unit in expected:
-        try:
-            to_si(1.0, unit.strip(), si_unit)
-        except ParameterError as error:
-            trouble = trouble or str(error)
-        else:
-            return None
-    return trouble
-
-
-def _si_columns(
-    table: Table,
-    wanted: Mapping[str, tuple[int, str]],
-    source: str,
-    thousands: str | Mapping[str, str] | None,
-    decimal: str,
-) -> tuple[dict[str, Array], dict[str, str]]:
-    if isinstance(thousands, Mapping):
-        strange = [key for key in thousands if key not in wanted]
-        if strange:
-            raise RecordingError(
-                f"{source}: thousands names {strange[0]!r}, but the channels are: "
-                f"{', '.join(wanted)}"
-            )
-    raw: dict[str, Array] = {}
-    units: dict[str, str] = {}
-    for name, (index, unit) in wanted.items():
-        mark = thousands_of(thousands, name)
-        numbers = table.numbers(index, f"{name} [{unit}]", source, mark, decimal)
-        parsed = parse_unit(unit)
-        values: Array = np.asarray(numbers * parsed.scale + parsed.offset, dtype=np.float64)
-        values[~np.isfinite(values)] = np.nan
-        raw[name] = values
-        units[name] = CHANNELS[channel_of(name)].unit
-        if channel_of(name) == "reference" and parsed.dimension != parse_unit("rad").dimension:
-            units[name] = "Pa"
-    return raw, units
-
-
 # ------------------------------------------------------------------------ assembly
 
 
 def assemble(
     name: str,
     role: str,
-    raw: dict[str, Array],
-    units: dict[str, str],
-    ragged: list[int],
+    time: Array,
+    raw: Mapping[str, Array],
+    units: Mapping[str, str],
     source: str,
     sample_time: float | None,
     said: Mapping[str, str] | None = None,
@@ -514,12 +326,12 @@ def assemble(
     ----------
     name, role : str
         What it is called and for.
-    raw : dict of str to (n,) array
-        SI values by channel, ``time`` among them or not.
-    units : dict of str to str
+    time : (n,) array
+        Seconds, finite.
+    raw : mapping of str to (n,) array
+        SI values by channel.
+    units : mapping of str to str
         SI unit of each.
-    ragged : list of int
-        Rows with too few or too many cells.
     source : str
         The file, for messages.
     sample_time : float or None
@@ -534,33 +346,12 @@ def assemble(
     Raises
     ------
     RecordingError
-        If there is no clock, or a channel cannot be what it is called.
+        If there are fewer than two rows, or a channel cannot be what it is called.
     """
-    issues: list[Issue] = []
-    count = len(next(iter(raw.values())))
-    if "time" not in raw:
-        if sample_time is None:
-            raise RecordingError(
-                f"{source}: column 'time' is missing (give sample_time if the rows are evenly "
-                "spaced)"
-            )
-        raw["time"] = np.asarray(np.arange(count) * sample_time, dtype=np.float64)
-    if count < 2:
+    if len(time) < 2:
         raise RecordingError(f"{source}: one row only; two at least are needed")
-    stamped = np.isfinite(raw["time"])
-    if not stamped.any():
-        raise RecordingError(f"{source}: column 'time' has no value at all")
-    grid = lay_grid(raw["time"][stamped], source, sample_time)
-    if not stamped.all():
-        text = f"{int((~stamped).sum())} rows without a time are left out"
-        issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
-    if ragged:
-        text = (
-            f"{len(ragged)} rows with too few or too many cells (first: row {ragged[0]}) are "
-            "masked there"
-        )
-        issues.append(Issue("nan", "time", 0.0, float(grid.time[-1]), text))
-    issues += [
+    grid = lay_grid(time, source, sample_time)
+    issues = [
         Issue(event.kind, "time", event.start, event.stop, event.text) for event in grid.events
     ]
     if len(grid.time) < _FEW:
@@ -569,13 +360,11 @@ def assemble(
     channels: dict[str, Array] = {}
     masks: dict[str, Mask] = {}
     for channel, values in raw.items():
-        if channel != "time":
-            own = (said or {}).get(channel, "")
-            laid = judged(channel, values[stamped][grid.rows], grid, source, issues, said=own)
-            channels[channel], masks[channel] = laid
+        own = (said or {}).get(channel, "")
+        laid = judged(channel, values[grid.rows], grid, source, issues, said=own)
+        channels[channel], masks[channel] = laid
     issues.sort(key=lambda issue: (issue.start, issue.channel))
-    units.pop("time", None)
-    return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, units)
+    return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, dict(units))
 
 
 def judged(

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -13,9 +13,10 @@ from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import GAP, Array, Event, Grid, Mask, gaps, usual_interval
 from pamrs.recordings._faults import COMMANDS
-from pamrs.recordings._recording import Issue, Recording, judged
+from pamrs.recordings._recording import Issue, Recording, assemble, judged
+from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
 
-__all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock"]
+__all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock", "recording_of", "sampled"]
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
 #: A diagnosis can do without them: they need not last as long as the others.
@@ -42,6 +43,12 @@ class Sampled:
         SI unit.
     hold : bool
         Logged on change: a value holds until the next one.
+    clock : Ticks, optional
+        The rows of the log that it was read from.
+    places : (n,) array of int, optional
+        Which of them it has values in; None if in all of them.
+    remarks : tuple of str
+        What was done to its values as they were read.
     """
 
     name: str
@@ -49,6 +56,98 @@ class Sampled:
     time: Array
     unit: str
     hold: bool = False
+    clock: Ticks | None = None
+    places: Rows | None = None
+    remarks: tuple[str, ...] = ()
+
+    def rows(self, start: int, stop: int) -> Sampled:
+        """The same, between two of its samples."""
+        places = None if self.places is None else self.places[start:stop]
+        return replace(
+            self, values=self.values[start:stop], time=self.time[start:stop], places=places
+        )
+
+
+def sampled(name: str, values: Array, clock: Ticks, unit: str, hold: bool = False) -> Sampled:
+    """A channel with the times of its values.
+
+    Parameters
+    ----------
+    name : str
+        The channel.
+    values : (n,) array
+        SI values of all rows of the log, NaN where there is none.
+    clock : Ticks
+        When the rows were taken.
+    unit : str
+        SI unit.
+    hold : bool
+        Logged on change.
+
+    Returns
+    -------
+    Sampled
+        A channel that has values in few rows only has their times: a slower one is no fault, and a
+        command holds until it is written again.
+    """
+    values = values[clock.rows]
+    remarks: list[str] = []
+    if unit == "rad":
+        values, said = unwound(values)
+        remarks += [said] if said else []
+    places = np.flatnonzero(np.isfinite(values)) if hold else filled_rows(values)
+    if places is None or len(places) == len(values):
+        time = clock.time if hold else clock.spread[0]
+        return Sampled(name, values, time, unit, hold, clock, None, tuple(remarks))
+    if not hold:
+        hold = channel_of(name) in COMMANDS
+        told = "held until the next one" if hold else "taken as sampled at their own times"
+        remarks.append(f"{len(places)} of {len(values)} rows have a value of it: {told}")
+    time = clock.time[places] if hold else spread(clock.time[places])[0]
+    return Sampled(name, values[places], time, unit, hold, clock, places, tuple(remarks))
+
+
+def recording_of(
+    name: str,
+    role: str,
+    channels: Sequence[Sampled],
+    source: str,
+    sample_time: float | None,
+    said: Mapping[str, str],
+) -> Recording:
+    """A recording of channels, whether they share a clock or not.
+
+    Parameters
+    ----------
+    name, role : str
+        What it is called and for.
+    channels : sequence of Sampled
+        Its channels, one at least.
+    source : str
+        The file, for messages.
+    sample_time : float, optional
+        Spacing of the grid [s].
+    said : mapping of str to str
+        Unit of each channel in the file.
+
+    Returns
+    -------
+    Recording
+
+    Raises
+    ------
+    RecordingError
+        If a channel cannot be what it is called, or a clock does not rise.
+    """
+    first = channels[0].time
+    alike = all(
+        channel.time is first or np.array_equal(channel.time, first) for channel in channels
+    )
+    if not alike or any(channel.hold for channel in channels):
+        return on_one_clock(name, role, channels, source, sample_time)
+    raw = {channel.name: channel.values for channel in channels}
+    units = {channel.name: channel.unit for channel in channels}
+    return assemble(name, role, first, raw, units, source, sample_time, said)
 
 
 class _Averaged(Grid):

@@ -12,8 +12,9 @@ import numpy as np
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array
 from pamrs.recordings._several_clocks import Sampled
+from pamrs.recordings._stamps import Ticks
 
-__all__ = ["Cut", "Part", "Split", "parts", "read_split"]
+__all__ = ["Cut", "Part", "Split", "Stretch", "parts", "read_split", "stretches_of"]
 
 _ALLOWED: Final = "'clock', { gap = SECONDS } or { column = \"...\" }"
 _FEWEST: Final = 2  # samples of a part; what is shorter is left out
@@ -29,16 +30,28 @@ class Cut:
 
 
 class Split(NamedTuple):
-    """The column that parts a log, its times [s], and its texts where it has texts."""
+    """The column that parts a log, its clock, and its texts where it has texts."""
 
     values: Array
-    time: Array
+    clock: Ticks
     labels: tuple[str, ...]
 
 
-class Part(NamedTuple):
-    """One recording of several: its number or text, and its channels."""
+class Stretch(NamedTuple):
+    """Rows ``start`` to ``stop`` (exclusive) of a clock, counted from 1, and what they are called;
+    without a label they are no part.
+    """
 
+    number: int
+    label: str
+    start: int
+    stop: int
+
+
+class Part(NamedTuple):
+    """One recording of several: its number and text, and its channels."""
+
+    number: int
     label: str
     channels: list[Sampled]
 
@@ -81,7 +94,7 @@ def parts(
     column: Split | None,
     pieces: Sequence[int | str] | None,
     source: str,
-) -> list[Part]:
+) -> tuple[list[Part], list[str]]:
     """Part the channels of a log.
 
     Parameters
@@ -99,8 +112,10 @@ def parts(
 
     Returns
     -------
-    list of Part
-        In the order of the log; parts with fewer than two samples are left out.
+    parts : list of Part
+        In the order of the log.
+    remarks : list of str
+        Parts that are left out, since a channel has fewer than two samples there.
 
     Raises
     ------
@@ -108,27 +123,67 @@ def parts(
         If there is nothing to cut, or no such piece.
     """
     reference = next((item for item in channels if not item.hold), channels[0])
-    if column is not None:
-        edges = np.flatnonzero(_differ(column.values)) + 1
-        bounds = [0, *edges.tolist(), len(column.values)]
-        labels = _labels(column, bounds)
-        found = _cut(channels, column.time, bounds, labels)
-    elif cut.gap is not None:
-        edges = np.flatnonzero(np.diff(reference.time) > cut.gap) + 1
-        bounds = [0, *edges.tolist(), len(reference.time)]
-        found = _cut(channels, reference.time, bounds, _counted(len(bounds) - 1))
+    clock = column.clock if column is not None else _clock_of(reference)
+    several = {id(_clock_of(item)): _clock_of(item) for item in channels if not item.hold}
+    if cut.gap is None and column is None and len(several) > 1:
+        made = _by_clock(channels, source)
     else:
-        found = _by_clock(channels, source)
+        made = _cut(channels, clock, stretches_of(cut, clock.spread[0], column))
     found = [
         part
-        for part in found
+        for part in made
         if all(len(item.time) >= _FEWEST or item.hold and len(item.time) for item in part.channels)
     ]
+    short = [part.label for part in made if part not in found]
     if len(found) > _MOST:
         raise RecordingError(f"{source}: split gives {len(found)} parts; {_MOST} are allowed")
     if not found:
         raise RecordingError(f"{source}: split leaves no part in which every channel has samples")
-    return found if pieces is None else _chosen(found, pieces, source)
+    chosen = found if pieces is None else _chosen(found, pieces, short, source)
+    remarks = []
+    if short and pieces is None:
+        remarks.append(
+            f"{len(short)} of {len(made)} parts ({', '.join(short[:8])}) are left out: a channel "
+            f"has fewer than {_FEWEST} samples there"
+        )
+    return chosen, remarks
+
+
+def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:
+    """Where a clock is parted.
+
+    Parameters
+    ----------
+    cut : Cut
+        How.
+    time : (n,) array
+        The clock [s].
+    column : Split or None
+        What `cut` names, if it names a column.
+
+    Returns
+    -------
+    list of Stretch
+        Those that have a label, counted from 1.
+    """
+    if column is not None:
+        edges = np.flatnonzero(_differ(column.values)) + 1
+    elif cut.gap is not None:
+        edges = np.flatnonzero(np.diff(time) > cut.gap) + 1
+    else:
+        edges = np.flatnonzero(np.diff(time) < 0.0) + 1
+    bounds = [0, *edges.tolist(), len(time)]
+    labels = _counted(len(bounds) - 1) if column is None else _labels(column, bounds)
+    named = [
+        (label, start, stop)
+        for start, stop, label in zip(bounds[:-1], bounds[1:], labels, strict=True)
+        if label
+    ]
+    return [Stretch(number, *rest) for number, rest in enumerate(named, start=1)]
+
+
+def _clock_of(item: Sampled) -> Ticks:
+    return item.clock or Ticks(np.arange(len(item.time)), item.time)
 
 
 def _differ(values: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
@@ -158,63 +213,72 @@ def _labels(column: Split, bounds: Sequence[int]) -> list[str]:
     return labels
 
 
-def _cut(
-    channels: Sequence[Sampled], time: Array, bounds: Sequence[int], labels: Sequence[str]
-) -> list[Part]:
+def _cut(channels: Sequence[Sampled], clock: Ticks, stretches: Sequence[Stretch]) -> list[Part]:
     """Parts by rows where a channel has the clock that was cut, else by time."""
+    time = clock.spread[0]
     found = []
-    for start, stop, label in zip(bounds[:-1], bounds[1:], labels, strict=True):
+    for number, label, start, stop in stretches:
         low = float(time[start])
         high = float(time[stop]) if stop < len(time) else math.inf
-        inside: list[Sampled] = []
-        for item in channels:
-            if item.time is time or np.array_equal(item.time, time):
-                inside.append(_rows(item, start, stop))
-            else:
-                first, last = (int(np.searchsorted(item.time, edge)) for edge in (low, high))
-                inside.append(_rows(item, first - 1 if item.hold and first else first, last))
-        if label:
-            found.append(Part(label, inside))
+        inside = [_inside(item, clock, start, stop, low, high) for item in channels]
+        found.append(Part(number, label, inside))
     return found
 
 
-def _rows(item: Sampled, start: int, stop: int) -> Sampled:
-    return replace(item, values=item.values[start:stop], time=item.time[start:stop])
+def _inside(item: Sampled, clock: Ticks, start: int, stop: int, low: float, high: float) -> Sampled:
+    """What of a channel lies in a part; of one that holds, with the value from before."""
+    own = item.clock
+    if own is clock or (own is not None and np.array_equal(own.time, clock.time)):
+        if item.places is None:
+            return item.rows(start, stop)
+        first, last = (int(np.searchsorted(item.places, edge)) for edge in (start, stop))
+        before = item.hold and first > 0 and (first == last or item.places[first] > start)
+    else:
+        first, last = (int(np.searchsorted(item.time, edge)) for edge in (low, high))
+        before = item.hold and first > 0
+    inside = item.rows(first - before, last)
+    if before:
+        time = inside.time.copy()
+        time[0] = min(time[0], low)
+        inside = replace(inside, time=time)
+    return inside
 
 
 def _by_clock(channels: Sequence[Sampled], source: str) -> list[Part]:
     """Parts of rising time, each channel by its own clock."""
-    resets = {item.name: np.flatnonzero(np.diff(item.time) < 0.0) + 1 for item in channels}
-    counts = {name: len(edges) + 1 for name, edges in resets.items()}
+    cut = {item.name: stretches_of(Cut(), _clock_of(item).spread[0], None) for item in channels}
+    counts = {name: len(found) for name, found in cut.items()}
     if len(set(counts.values())) > 1:
         said = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise RecordingError(
             f"{source}: split = 'clock': the clocks of the channels give different numbers of "
             f"parts ({said})"
         )
-    edges = {item.name: [0, *resets[item.name].tolist(), len(item.time)] for item in channels}
+    each = [_cut([item], _clock_of(item), cut[item.name]) for item in channels]
     return [
-        Part(
-            str(index + 1),
-            [_rows(item, *edges[item.name][index : index + 2]) for item in channels],
-        )
-        for index in range(next(iter(counts.values())))
+        Part(same[0].number, same[0].label, [part.channels[0] for part in same])
+        for same in zip(*each, strict=True)
     ]
 
 
-def _chosen(found: list[Part], pieces: Sequence[int | str], source: str) -> list[Part]:
+def _chosen(
+    found: list[Part], pieces: Sequence[int | str], short: Sequence[str], source: str
+) -> list[Part]:
     kept: list[Part] = []
-    labels = {part.label: part for part in found}
+    labels: dict[int | str, Part] = {part.label: part for part in found}
+    labels |= {part.number: part for part in found}
     for piece in pieces:
-        number = isinstance(piece, int) and not isinstance(piece, bool)
-        if number and 1 <= int(piece) <= len(found):
-            kept.append(found[int(piece) - 1])
-        elif isinstance(piece, str) and piece in labels:
+        if not isinstance(piece, bool) and piece in labels:
             kept.append(labels[piece])
-        else:
-            some = ", ".join(repr(part.label) for part in found[:8])
+            continue
+        if str(piece) in short:
             raise RecordingError(
-                f"{source}: pieces = {list(pieces)!r}: there is no part {piece!r}; there are "
-                f"{len(found)}, called {some}{' and so on' if len(found) > 8 else ''}"
+                f"{source}: pieces = {list(pieces)!r}: in part {piece!r} a channel has fewer than "
+                f"{_FEWEST} samples"
             )
+        some = ", ".join(repr(part.label) for part in found[:8])
+        raise RecordingError(
+            f"{source}: pieces = {list(pieces)!r}: there is no part {piece!r}; there are "
+            f"{len(found)}, called {some}{' and so on' if len(found) > 8 else ''}"
+        )
     return kept

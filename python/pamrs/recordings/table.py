@@ -21,7 +21,19 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
 
-__all__ = ["NO_VALUE", "Table", "check_size", "is_text", "read_table", "read_text", "split_rows"]
+__all__ = [
+    "NO_VALUE",
+    "Table",
+    "check_size",
+    "is_text",
+    "numbers_in",
+    "numbers_of_cells",
+    "read_table",
+    "read_text",
+    "split_rows",
+    "told_cells",
+    "told_rows",
+]
 
 Array = NDArray[np.float64]
 
@@ -44,21 +56,49 @@ class Table:
         For text files the cells of each column, for others numbers.
     row_numbers : list of int
         Number of each row (from 1, as an editor counts them; the header and blank rows count).
-    ragged : list of int
-        Row numbers with too few or too many cells.
+    remarks : list of str
+        Rows that were left out, and why.
     """
 
     def __init__(
         self,
         header: list[str] | None,
         cells: Sequence[Sequence[str] | Array],
-        row_numbers: list[int],
-        ragged: list[int],
+        row_numbers: Sequence[int],
+        remarks: list[str],
     ) -> None:
         self.header = header
         self.cells = cells
         self.row_numbers = row_numbers
-        self.ragged = ragged
+        self.remarks = remarks
+
+    def samples(
+        self, index: int, label: str, source: str, thousands: str | None, decimal: str
+    ) -> tuple[Array, str]:
+        """Column ``index`` as samples, in which a cell that is no number is a missing one.
+
+        Returns
+        -------
+        values : (n,) array
+            NaN where there is none.
+        remark : str
+            Which cells are no numbers; empty where there are none.
+
+        Raises
+        ------
+        RecordingError
+            If too many are none: the column is written in another way, or is another one.
+        """
+        cells = self.cells[index]
+        if isinstance(cells, np.ndarray):
+            return cells, ""
+        values, strange = numbers_of_cells(cells, thousands, decimal)
+        if not strange:
+            return values, ""
+        hint = _number_hint(cells[strange[0]], thousands, decimal)
+        if len(strange) > len(cells) // (20 if hint else 5):
+            self.numbers(index, label, source, thousands, decimal)  # says which
+        return values, told_cells([cells[row] for row in strange])
 
     def numbers(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -73,28 +113,62 @@ class Table:
         cells = self.cells[index]
         if isinstance(cells, np.ndarray):
             return cells
-        if thousands:
-            cells = [cell.replace(thousands, "") for cell in cells]
-        if decimal != ".":
-            cells = [cell.replace(decimal, ".") for cell in cells]
-        try:
-            return np.array(cells, dtype=np.float64)
-        except ValueError:
-            pass
-        values = np.empty(len(cells))
-        for row, cell in enumerate(cells):
-            text = cell.strip()
-            try:
-                values[row] = math.nan if text.lower() in NO_VALUE else float(text)
-            except ValueError:
-                raise RecordingError(
-                    (
-                        f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} "
-                        "is not a number"
-                    )
-                    + _number_hint(text, thousands, decimal)
-                ) from None
+        values, strange = numbers_of_cells(cells, thousands, decimal)
+        for row in strange:
+            text = cells[row].strip()
+            raise RecordingError(
+                f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} is not a "
+                "number" + _number_hint(text, thousands, decimal)
+            )
         return values
+
+
+def numbers_of_cells(
+    cells: Sequence[str], thousands: str | None, decimal: str
+) -> tuple[Array, list[int]]:
+    """Numbers of cells.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        As they stand in the file.
+    thousands : str or None
+        Mark between groups of digits.
+    decimal : str
+        Decimal mark.
+
+    Returns
+    -------
+    values : (n,) array
+        NaN where there is no number.
+    strange : list of int
+        Rows of cells that are neither a number nor a usual word for none.
+    """
+    plain = [cell.replace(thousands, "") for cell in cells] if thousands else cells
+    if decimal != ".":
+        plain = [cell.replace(decimal, ".") for cell in plain]
+    strange: list[int] = []
+    try:
+        values = np.array(plain, dtype=np.float64)
+    except ValueError:
+        values = np.full(len(plain), math.nan)
+        for row, cell in enumerate(plain):
+            text = cell.strip()
+            if text.lower() not in NO_VALUE:
+                try:
+                    values[row] = float(text)
+                except ValueError:
+                    strange.append(row)
+    values[~np.isfinite(values)] = math.nan
+    return values, strange
+
+
+def told_cells(cells: Sequence[str]) -> str:
+    """What is said of cells that are no numbers: ``3 cells are no numbers ('OL', '#N/A')``."""
+    words = list(dict.fromkeys(cell.strip()[:20] for cell in cells))
+    some = ", ".join(map(repr, words[:4])) + (" and so on" if len(words) > 4 else "")
+    count = "1 cell is no number" if len(cells) == 1 else f"{len(cells)} cells are no numbers"
+    return f"{count} ({some}): taken as missing"
 
 
 def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
@@ -105,7 +179,7 @@ def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
     return ""
 
 
-def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
+def read_table(path: Path, *, delimiter: str, header: bool, decimal: str = "") -> Table:
     """Read the table of one file.
 
     Parameters
@@ -116,6 +190,8 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
         What separates cells in text files; ``" "`` means any run of blanks.
     header : bool
         Whether the first row of a text file has the headings.
+    decimal : str
+        Decimal mark of a file of which only numbers are wanted: then its cells may be numbers.
 
     Returns
     -------
@@ -129,7 +205,7 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
     """
     if not is_text(path):
         return _READERS[path.suffix.lower()](path)
-    return _parse(read_text(path), str(path), delimiter, header)
+    return _parse(read_text(path), str(path), delimiter, header, decimal)
 
 
 def is_text(path: Path) -> bool:
@@ -190,9 +266,12 @@ def check_size(rows: int, cells: int, source: str) -> None:
             )
 
 
-def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
+def _parse(text: str, source: str, delimiter: str, header: bool, decimal: str) -> Table:
     lines = text.count("\n") + 1
     check_size(lines, lines + (text.count(delimiter) if delimiter != " " else 0), source)
+    quick = _quick(text, delimiter, header, decimal)
+    if quick is not None:
+        return quick
     rows, numbers = [], []
     for number, row in enumerate(split_rows(text, delimiter), start=1):
         if any(cell.strip() for cell in row):
@@ -205,17 +284,79 @@ def _parse(text: str, source: str, delimiter: str, header: bool) -> Table:
     if not rows:
         raise RecordingError(f"{source}: a header without rows")
     width = len(headings) if headings is not None else _usual_width(rows)
-    ragged = []
-    for index, row in enumerate(rows):
-        if len(row) != width:
-            ragged.append(numbers[index])
-            rows[index] = (row + [""] * width)[:width] if len(row) < width else [""] * width
+    again = [
+        index
+        for index, row in enumerate(rows)
+        if len(row) == width and headings and [cell.strip() for cell in row] == headings
+    ]
+    ragged = [index for index, row in enumerate(rows) if len(row) != width]
     if len(ragged) > max(1, len(rows) // 20):
         raise RecordingError(
             f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row "
-            f"{ragged[0]}, delimiter {delimiter!r})"
+            f"{numbers[ragged[0]]}, delimiter {delimiter!r})"
         )
-    return Table(headings, list(zip(*rows, strict=True)), numbers, ragged)
+    remarks = told_rows([numbers[i] for i in ragged], f"rows that do not have {width} cells")
+    remarks += told_rows([numbers[i] for i in again], "rows that repeat the headings")
+    gone = {*ragged, *again}
+    kept = [index for index in range(len(rows)) if index not in gone]
+    if not kept:
+        raise RecordingError(f"{source}: no row has {width} cells")
+    columns = list(zip(*(rows[index] for index in kept), strict=True))
+    return Table(headings, columns, [numbers[index] for index in kept], remarks)
+
+
+def told_rows(numbers: Sequence[int], what: str) -> list[str]:
+    """What is said of rows that are left out: none where there is none."""
+    if not numbers:
+        return []
+    return [f"{what}: {len(numbers)} (first: row {numbers[0]}), left out"]
+
+
+def _quick(text: str, delimiter: str, header: bool, decimal: str) -> Table | None:
+    """A table of nothing but numbers, as NumPy reads it; None if it is not one."""
+    if not decimal or '"' in text:
+        return None
+    heading, _, body = text.partition("\n") if header else ("", "", text)
+    values = numbers_in(body.splitlines(), delimiter, decimal)
+    headings = [cell.strip() for cell in split_rows(heading, delimiter)[0]] if heading else None
+    if values is None or not heading.strip() and header:
+        return None
+    if headings is not None and len(headings) != len(values):
+        return None
+    return Table(headings, list(values), range(1 + header, 1 + header + values.shape[1]), [])
+
+
+def numbers_in(lines: Sequence[str], delimiter: str, decimal: str) -> Array | None:
+    """Columns of lines that hold nothing but numbers.
+
+    Parameters
+    ----------
+    lines : sequence of str
+        One for each row.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
+    decimal : str
+        Decimal mark.
+
+    Returns
+    -------
+    (columns, rows) array or None
+        None where a cell is missing or no number, or a line is empty.
+    """
+    if not lines or not lines[0].strip():
+        return None
+    if decimal != ".":
+        lines = [line.replace(decimal, ".") for line in lines]
+    try:
+        values = np.loadtxt(
+            lines, delimiter=None if delimiter == " " else delimiter, ndmin=2, comments=None
+        )
+    except ValueError:
+        return None
+    if len(values) != len(lines) or not values.size:
+        return None
+    values[~np.isfinite(values)] = math.nan
+    return np.ascontiguousarray(values.T)
 
 
 def split_rows(text: str, delimiter: str) -> list[list[str]]:
@@ -270,7 +411,7 @@ def _parquet(path: Path) -> Table:
             ) from error
     if not len(frame):
         raise RecordingError(f"{path}: a header without rows")
-    return Table([str(name) for name in frame.columns], columns, list(range(1, len(frame) + 1)), [])
+    return Table([str(name) for name in frame.columns], columns, range(1, len(frame) + 1), [])
 
 
 _READERS: Final[dict[str, Callable[[Path], Table]]] = {".parquet": _parquet}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +35,8 @@ class Series:
         Its own times [s], on the clock of the log. None where the log has no clock for it.
     labels : tuple of str
         The different texts of a column of texts; empty for numbers.
+    stamps : bool
+        Whether they are dates or times of day, so that nothing but a clock is in it.
     """
 
     name: str
@@ -41,6 +44,7 @@ class Series:
     unit: str = ""
     time: Array | None = None
     labels: tuple[str, ...] = ()
+    stamps: bool = False
 
 
 @dataclass(frozen=True)
@@ -76,11 +80,14 @@ class Log:
         By name, in the order of the file.
     unread : dict of str to str
         What of the file is no series, and why.
+    remarks : list of str
+        What was left out, joined or taken for missing as it was read.
     """
 
     path: Path
     series: dict[str, Series]
     unread: dict[str, str] = field(default_factory=dict)
+    remarks: list[str] = field(default_factory=list)
 
     def find(self, name: str) -> Series:
         """The series of that name, or the only one whose last parts are that name.
@@ -123,8 +130,14 @@ def _few(names: Any, most: int = 12) -> str:
     return ", ".join(known[:most]) + more
 
 
-def collected(path: Path, found: Sequence[Series], unread: Mapping[str, str] | None = None) -> Log:
-    """A log of these series; names that are there twice get a number.
+def collected(
+    path: Path,
+    found: Sequence[Series],
+    unread: Mapping[str, str] | None = None,
+    remarks: Sequence[str] = (),
+) -> Log:
+    """A log of these series; names that are there twice get a number, and two series that are one
+    clock, of seconds and of what is beyond them, become one.
 
     Parameters
     ----------
@@ -134,6 +147,8 @@ def collected(path: Path, found: Sequence[Series], unread: Mapping[str, str] | N
         In the order of the file.
     unread : mapping of str to str, optional
         What is no series, and why.
+    remarks : sequence of str
+        What was done as it was read.
 
     Returns
     -------
@@ -156,7 +171,65 @@ def collected(path: Path, found: Sequence[Series], unread: Mapping[str, str] | N
         raise RecordingError(
             f"{path}: no channel with numbers was found" + (f" ({why})" if why else "")
         )
-    return Log(path, series, dict(unread or {}))
+    log = Log(path, series, dict(unread or {}), list(remarks))
+    for name in list(series):
+        _join(log, name)
+    return log
+
+
+_SECONDS: Final = frozenset({"sec", "secs", "second", "seconds", "s"})
+_BEYOND: Final = {
+    word: scale
+    for scale, words in {
+        1e-9: "nanosec nanosecs nanosecond nanoseconds nsec nsecs nanos ns",
+        1e-6: "microsec microsecs microsecond microseconds usec usecs micros us",
+        1e-3: "millisec millisecs millisecond milliseconds msec msecs millis ms",
+    }.items()
+    for word in words.split()
+}
+
+
+def _parted(name: str) -> tuple[str, str]:
+    """What stands before the last word of a name, and that word."""
+    match = re.fullmatch(r"(.*?)([A-Za-z]+)", name)
+    return (match[1], match[2].lower()) if match else (name, "")
+
+
+def _join(log: Log, name: str) -> None:
+    """Join whole seconds and the series of what is beyond them, if there is one, to one clock."""
+    before, word = _parted(name)
+    whole = log.series.get(name)
+    for other, rest in list(log.series.items()):
+        beyond = _BEYOND.get(_parted(other)[1])
+        prefixes = (before, before.replace("tv_", ""))
+        if whole is None or beyond is None or _parted(other)[0] not in prefixes:
+            continue
+        if word not in _SECONDS or len(whole.values) != len(rest.values):
+            continue
+        if not _parts_of_a_second(whole.values, rest.values, beyond):
+            continue
+        stem = before.strip(" ._-/") or "stamp"
+        joined = f"{stem} stamp" if stem in log.series else stem
+        values = whole.values + beyond * rest.values
+        made = Series(joined, values, "s", whole.time, stamps=True)
+        why = f"it is part of the clock {joined}"
+        series = {joined if key == name else key: each for key, each in log.series.items()}
+        series[joined] = made
+        del series[other]
+        log.series.clear()
+        log.series.update(series)
+        log.unread.update({key: why for key in (name, other) if key != joined})
+        log.remarks.append(f"{name} and {other} are one clock, here {joined}")
+        return
+
+
+def _parts_of_a_second(whole: Array, beyond: Array, scale: float) -> bool:
+    """Whether whole numbers go on by what begins again below one."""
+    good = np.isfinite(whole) & np.isfinite(beyond)
+    rest = beyond[good] * scale
+    if not good.any() or np.any(np.diff(whole[good]) < 0.0) or np.ptp(rest) == 0.0:
+        return False
+    return bool(np.all(whole[good] % 1.0 == 0.0) and rest.min() >= 0.0 and rest.max() < 1.0)
 
 
 def numbers_of(values: Any) -> Array | None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import re
 import zlib
 from collections.abc import Sequence
-from datetime import datetime
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -14,11 +12,20 @@ import numpy as np
 
 from pamrs._files import read_file
 from pamrs.errors import RecordingError
-from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
+from pamrs.recordings.logs._dates import is_moment, moments
+from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
+from pamrs.recordings.logs._serial import arrows_apart, labelled_rows
 from pamrs.recordings.logs._words import split_heading, understood_unit
-from pamrs.recordings.table import NO_VALUE, split_rows
+from pamrs.recordings.table import (
+    NO_VALUE,
+    numbers_in,
+    numbers_of_cells,
+    split_rows,
+    told_cells,
+    told_rows,
+)
 
-__all__ = ["read_text_log"]
+__all__ = ["log_of_rows", "read_text_log"]
 
 _COMMENTS: Final = ("#", "%", "//", "'")
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
@@ -26,16 +33,24 @@ _UNNAMED: Final = "column "
 _LINES: Final = 400  # in which the dialect is looked for
 _HEAD: Final = 5000  # rows above the table, at most
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
+_CUT: Final = 20  # one row in so many may be cut short; more are rows whose last cells are empty
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
-_CLOCK = re.compile(
-    r"(?:(?P<date>\d{1,4}[-./]\d{1,2}[-./]\d{1,4})[ T]+)?"
-    r"(?P<rest>\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?(?:Z|[+-]\d{2}:?\d{2})?)"
-)
 
 
 class _Dialect(NamedTuple):
     delimiter: str
     decimal: str
+
+
+class _Headed(NamedTuple):
+    """Where the numbers of a table begin, and what stands above them."""
+
+    first: int
+    width: int
+    names: list[str]
+    units: list[str]
+    rows: list[list[str]]  # headings and units, as they stand in the file
+    remarks: list[str]
 
 
 def read_text_log(path: Path, form: TextFormat) -> Log:
@@ -60,32 +75,145 @@ def read_text_log(path: Path, form: TextFormat) -> Log:
     """
     text = _decoded(_bytes(path), path)
     lines = [line for line in text.splitlines() if line.strip()]
+    times: list[str] | None = None
+    remarks: list[str] = []
+    if form.delimiter is None:
+        apart = arrows_apart(lines)
+        if apart is not None:
+            lost = len(lines) - len(apart[0])
+            remarks = [f"lines without a time and an arrow: {lost}, left out"] if lost else []
+            times, lines = apart
+        labelled = labelled_rows(lines, times)
+        if labelled is not None:
+            return log_of_rows(path, labelled[0], form, ".", [*remarks, *labelled[1]])
     kept = [line for line in lines if not line.lstrip().startswith(_COMMENTS)]
     dialect = _dialect(kept, form, path)
+    if times is not None:
+        kept = [f"{time}{dialect.delimiter}{line}" for time, line in zip(times, lines, strict=True)]
     if dialect.delimiter == " ":  # a unit belongs to the word before it
         lines, kept = ([re.sub(r"\s+\[", "[", line) for line in some] for some in (lines, kept))
+    comment = _last_comment(lines, dialect)
+    quick = _quick(path, kept, dialect, form, comment)
+    if quick is not None:
+        return quick
     rows = [_stripped(row) for row in split_rows("\n".join(kept), dialect.delimiter)]
-    rows = [row for row in rows if any(cell.strip() for cell in row)]
-    first, width = _first_row(rows, dialect, form)
-    if len(rows) - first < 2:
-        raise RecordingError(
-            f"{path}: no table was found: it has {len(rows) - first} rows of numbers"
-        )
-    names, units = _headings(rows[:first], width, form, _last_comment(lines, dialect, width))
+    return log_of_rows(path, rows, form, dialect.decimal, remarks, comment)
+
+
+def _quick(
+    path: Path, lines: list[str], dialect: _Dialect, form: TextFormat, comment: list[str] | None
+) -> Log | None:
+    """The log of a text that has nothing but numbers below its headings; None if it has more."""
+    middle = len(lines) // 2
+    if form.thousands is not None or '"' in "".join(lines[:_LINES]):
+        return None
+    head, sample = (
+        [_stripped(row) for row in split_rows("\n".join(some), dialect.delimiter)]
+        for some in (lines[:_HEAD], lines[middle : middle + _LINES])
+    )
+    if len(head) != len(lines[:_HEAD]) or len(lines) < _LINES:
+        return None
+    above = _headed(path, head, sample, dialect.decimal, form, comment)
+    columns = numbers_in(lines[above.first :], dialect.delimiter, dialect.decimal)
+    if columns is None or len(columns) != above.width:
+        return None
+    found = [
+        Series(name, values, unit)
+        for name, unit, values in zip(above.names, above.units, columns, strict=True)
+    ]
+    return collected(path, found, None, above.remarks)
+
+
+def log_of_rows(
+    path: Path,
+    rows: list[list[str]],
+    form: TextFormat,
+    decimal: str,
+    remarks: Sequence[str] = (),
+    comment: list[str] | None = None,
+) -> Log:
+    """The log of a table whose cells are texts.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    rows : list of list of str
+        Its cells, without blanks around them.
+    form : TextFormat
+        What is given of it.
+    decimal : str
+        Decimal mark.
+    remarks : sequence of str
+        What was said of it before.
+    comment : list of str, optional
+        Headings that stand in a comment.
+
+    Returns
+    -------
+    Log
+
+    Raises
+    ------
+    RecordingError
+        If it is no table of numbers.
+    """
+    rows = [row for row in rows if any(row)]
+    above = _headed(path, rows[:_HEAD], rows[len(rows) // 2 :][:_LINES], decimal, form, comment)
+    first, width = above.first, above.width
+    body = rows[first:]
+    if len(body) < 2:
+        raise RecordingError(f"{path}: no table was found: it has {len(body)} rows of numbers")
+    again = [i for i, row in enumerate(body) if row[0] and row in above.rows]
+    wide = [i for i, row in enumerate(body) if len(row) > width]
+    short = [i for i, row in enumerate(body) if len(row) < width]
+    if len(short) > max(1, len(body) // _CUT):
+        short = []  # as programs write that end a row with its last value
+    said = [*remarks, *above.remarks]
+    for gone, what in (
+        (short, f"rows with fewer than {width} cells"),
+        (wide, f"rows with more than {width} cells"),
+        (again, "rows that repeat the headings, where a recording starts again"),
+    ):
+        said += told_rows([first + 1 + i for i in gone], what)
+    left = {*again, *wide, *short}
+    kept = [(row + [""] * width)[:width] for i, row in enumerate(body) if i not in left]
+    found: list[Series] = []
+    unread: dict[str, str] = {}
+    for name, unit, cells in zip(above.names, above.units, zip(*kept, strict=True), strict=True):
+        _column(name, unit, cells, decimal, form.thousands, found, unread, said)
+    if again:
+        before = np.cumsum(np.isin(np.arange(len(body)), again))
+        part = np.array([before[i] for i in range(len(body)) if i not in left])
+        found.append(Series("part", 1.0 + part - part[0]))
+    return collected(path, found, unread, said)
+
+
+def _headed(
+    path: Path,
+    head: list[list[str]],
+    middle: list[list[str]],
+    decimal: str,
+    form: TextFormat,
+    comment: list[str] | None,
+) -> _Headed:
+    """What stands above the numbers of a table."""
+    first, width = _first_row(head, middle, decimal, form)
+    if comment is not None and not (len(comment) == width and width > 1):
+        comment = None
+    above = head[:first]
+    names, units, used = _headings(above, width, form, comment)
+    remarks = []
     if form.columns is not None:
         if len(form.columns) != width:
             raise RecordingError(
                 f"{path}: columns lists {len(form.columns)} names, but there are {width} columns"
             )
         names, units = _named(list(form.columns))
-    body = [(row + [""] * width)[:width] for row in rows[first:] if len(row) <= width]
-    found: list[Series] = []
-    unread: dict[str, str] = {}
-    if len(rows) - first - len(body):
-        unread["rows"] = f"{len(rows) - first - len(body)} rows have more than {width} cells"
-    for place, cells in enumerate(zip(*body, strict=True)):
-        _column(names[place], units[place], cells, dialect, form.thousands, found, unread)
-    return collected(path, found, unread)
+    over = len(above) - len(used)
+    if over > 0 and any(used):
+        remarks.append(f"lines above the headings: {over}, not read")
+    return _Headed(first, width, names, units, used, remarks)
 
 
 def _bytes(path: Path) -> bytes:
@@ -133,7 +261,7 @@ def _is_number(cell: str, decimal: str, thousands: str | None) -> bool:
 
 
 def _useful(cell: str, decimal: str, thousands: str | None) -> bool:
-    return _is_number(cell, decimal, thousands) or _CLOCK.fullmatch(cell) is not None
+    return _is_number(cell, decimal, thousands) or is_moment(cell)
 
 
 def _dialect(lines: list[str], form: TextFormat, path: Path) -> _Dialect:
@@ -166,46 +294,51 @@ def _usual(rows: Sequence[Sequence[str]]) -> int:
     return max(set(widths), key=widths.count)
 
 
-def _first_row(rows: list[list[str]], dialect: _Dialect, form: TextFormat) -> tuple[int, int]:
+def _first_row(
+    head: list[list[str]], middle: list[list[str]], decimal: str, form: TextFormat
+) -> tuple[int, int]:
     """Index of the first row of numbers, and how many columns there are."""
-    middle = rows[len(rows) // 2 :][:_LINES]
     width = _usual(middle)
 
     def useful(row: list[str]) -> int:
-        return sum(_useful(cell, dialect.decimal, form.thousands) for cell in row)
+        return sum(_useful(cell, decimal, form.thousands) for cell in row)
 
-    typical = sorted(map(useful, middle))[len(middle) // 2]
-    for index, row in enumerate(rows[:_HEAD]):
+    typical = sorted(map(useful, middle))[len(middle) // 2] if middle else 0
+    for index, row in enumerate(head):
         if width / 2 < len(row) <= width and useful(row) >= max(1, (typical + 1) // 2):
             return (max(index, 1) if form.header else index), width
     return 0, width
 
 
-def _last_comment(lines: list[str], dialect: _Dialect, width: int) -> list[str] | None:
-    """Headings that stand in a comment, ``# t; p1``."""
+def _last_comment(lines: list[str], dialect: _Dialect) -> list[str] | None:
+    """The last comment above the numbers: it may hold the headings, ``# t; p1``."""
     for line in reversed(lines[:200]):
         if line.lstrip().startswith(_COMMENTS):
             cells = _stripped(split_rows(line.lstrip().lstrip("#%/'"), dialect.delimiter)[0])
-            if len(cells) == width and width > 1:
+            if not any(_is_number(cell, dialect.decimal, None) for cell in cells):
                 return cells
     return None
 
 
 def _headings(
     above: list[list[str]], width: int, form: TextFormat, comment: list[str] | None
-) -> tuple[list[str], list[str]]:
-    """Names and units out of the rows above the numbers: headings, and perhaps a row of units."""
+) -> tuple[list[str], list[str], list[list[str]]]:
+    """Names and units out of the rows above the numbers: headings, and perhaps a row of units; and
+    those rows.
+    """
     full = [row for row in above if len(row) in (width, width + 1) or 2 * len(row) > width > 2]
     if form.header is False or not (full or comment):
-        return [f"{_UNNAMED}{i + 1}" for i in range(width)], [""] * width
+        return [f"{_UNNAMED}{i + 1}" for i in range(width)], [""] * width, []
     full = full or [comment or []]
+    used = full[-1:]
     last = [cell.strip("[]() ") for cell in full[-1]]
     units = [""] * width
     if len(full) > 1 and _all_units(last):
         units = ([*last, *[""] * width])[:width]
-        full.pop()
-    named, inside = _named(([*full[-1], *[""] * width])[:width])
-    return named, [a if a and a != "-" else b for a, b in zip(units, inside, strict=True)]
+        used = full[-2:]
+    headings = ["time" if is_moment(cell) else cell for cell in used[0]]
+    named, inside = _named(([*headings, *[""] * width])[:width])
+    return named, [a if a and a != "-" else b for a, b in zip(units, inside, strict=True)], used
 
 
 def _all_units(cells: list[str]) -> bool:
@@ -222,30 +355,33 @@ def _named(headings: list[str]) -> tuple[list[str], list[str]]:
 def _column(
     name: str,
     unit: str,
-    cells: tuple[str, ...],
-    dialect: _Dialect,
+    cells: Sequence[str],
+    decimal: str,
     thousands: str | None,
     found: list[Series],
     unread: dict[str, str],
+    remarks: list[str],
 ) -> None:
     """Add one column to what was found, or say why it is not."""
     if not any(cells):  # as every row of some programs ends with a delimiter
         if not name.startswith(_UNNAMED):
             unread[name] = "it is empty"
         return
-    values, strange = _numbers(cells, dialect.decimal, thousands)
+    values, strange = numbers_of_cells(cells, thousands, decimal)
     if strange and thousands is None and _grouped(cells):
-        values, strange = _numbers(cells, dialect.decimal, ".")
-    if not strange:
+        values, strange = numbers_of_cells(cells, ".", decimal)
+    filled = sum(map(bool, cells))
+    if 2 * len(strange) < filled:
+        if strange:
+            remarks.append(f"{name}: {told_cells([cells[row] for row in strange])}")
         found.append(Series(name, values, unit))
         return
-    stamps = _stamps(cells)
+    stamps = moments(cells)
     if stamps is not None:
-        found.append(Series(name, stamps, "s"))
-        return
-    if 2 * len(strange) < len(cells):
-        row = strange[0]
-        unread[name] = f"in row {row + 1} of the numbers {cells[row][:40]!r} is not a number"
+        lost = [cell for cell, value in zip(cells, stamps[0], strict=True) if np.isnan(value)]
+        remarks += [f"{name}: {told_cells(lost)}"] if lost else []
+        remarks += [f"{name}: {stamps[1]}"] if stamps[1] else []
+        found.append(Series(name, stamps[0], "s", stamps=True))
         return
     labels = tuple(dict.fromkeys(cells))
     if len(labels) > _MOST_TEXTS:
@@ -255,61 +391,6 @@ def _column(
     found.append(Series(name, np.array([place[cell] for cell in cells]), "", None, labels))
 
 
-def _numbers(cells: Sequence[str], decimal: str, thousands: str | None) -> tuple[Array, list[int]]:
-    """Values, NaN where there is none, and the rows whose cells are no number."""
-    plain = [cell.replace(thousands, "") for cell in cells] if thousands else list(cells)
-    if decimal == ",":
-        plain = [cell.replace(",", ".") for cell in plain]
-    strange: list[int] = []
-    try:
-        values = np.array(plain, dtype=np.float64)
-    except ValueError:
-        values = np.full(len(plain), math.nan)
-        for row, cell in enumerate(plain):
-            if cell.lower() not in NO_VALUE:
-                try:
-                    values[row] = float(cell)
-                except ValueError:
-                    strange.append(row)
-    values[~np.isfinite(values)] = math.nan
-    return values, strange
-
-
 def _grouped(cells: Sequence[str]) -> bool:
     """Whether points part thousands: ``1.000.000`` beside ``900.000``, and no other number."""
     return all(_THOUSANDS.fullmatch(cell) or cell.lower() in NO_VALUE for cell in cells)
-
-
-def _stamps(cells: Sequence[str]) -> Array | None:
-    """Seconds since the first cell if all are times of day or dates with one."""
-    seconds = np.empty(len(cells))
-    start: datetime | None = None
-    days, before = 0, -math.inf
-    for row, cell in enumerate(cells):
-        moment = _moment(cell)
-        if moment is None:
-            return None
-        start = start or moment
-        value = (moment - start).total_seconds()
-        if moment.year == 1900 and value + 86400.0 * days < before - 43200.0:
-            days += 1  # a clock of times of day ran past midnight
-        seconds[row] = before = value + 86400.0 * days
-    return seconds
-
-
-def _moment(cell: str) -> datetime | None:
-    match = _CLOCK.fullmatch(cell)
-    if match is None:
-        return None
-    date, rest = match["date"] or "1900-01-01", match["rest"].replace(",", ".").strip()
-    parts = re.split(r"[-./]", date)
-    if len(parts[0]) != 4:  # 12.05.2024: day first, month first only with slashes
-        parts = [parts[2], parts[0], parts[1]] if "/" in date else [parts[2], parts[1], parts[0]]
-    hour = rest if rest[1] != ":" else "0" + rest
-    try:
-        year, month, day = (int(part) for part in parts)
-        return datetime.fromisoformat(f"{year:04d}-{month:02d}-{day:02d}T{hour}").replace(
-            tzinfo=None
-        )
-    except ValueError:
-        return None

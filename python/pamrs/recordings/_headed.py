@@ -1,0 +1,232 @@
+"""Recordings out of files whose headings say it all: ``muscle_pressure [bar]``."""
+
+from __future__ import annotations
+
+import difflib
+import math
+import os
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from pamrs.channels import channel_of
+from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.recordings._clock import Array
+from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS, Issue, Recording
+from pamrs.recordings._several_clocks import recording_of, sampled
+from pamrs.recordings._stamps import Ticks, ticks
+from pamrs.recordings.table import Table, read_table, thousands_of
+from pamrs.units import parse_unit, to_si
+
+__all__ = ["load_recording"]
+
+_HEADING: Final = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
+
+
+def load_recording(
+    path: str | os.PathLike[str],
+    *,
+    columns: Sequence[str] | Mapping[str, str] | None = None,
+    delimiter: str = ",",
+    header: bool = True,
+    thousands: str | Mapping[str, str] | None = None,
+    sample_time: float | None = None,
+    decimal: str = ".",
+    name: str | None = None,
+    role: str = "fit",
+) -> Recording:
+    """Read a recording, check it and lay it on a uniform grid.
+
+    Parameters
+    ----------
+    path : path-like
+        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``) or ``.parquet``.
+    columns : sequence or mapping of str, optional
+        Headings ``"name [unit]"`` to use instead of the file's: one for each column in order, or a
+        mapping from the file's headings. An empty heading leaves the column out.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
+    header : bool
+        Whether the first row holds headings.
+    thousands : str or mapping, optional
+        Mark between groups of digits, of all columns or by channel: ``{"time": "."}``.
+    sample_time : float, optional
+        Grid spacing [s]; without a time column, the spacing of the rows. Else the usual interval.
+    decimal : str
+        Decimal mark.
+    name, role : str
+        Name (default: the file's stem) and role, ``fit`` or ``held_out``.
+
+    Returns
+    -------
+    Recording
+        SI values with masks and issues.
+
+    Raises
+    ------
+    RecordingError
+        If the file cannot be read or a column cannot be understood; the message names file and
+        column.
+    """
+    file = Path(path)
+    source = str(file)
+    if role not in ("fit", "held_out"):
+        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
+    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise RecordingError(
+            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
+        )
+    if len(delimiter) != 1:
+        raise RecordingError(
+            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
+        )
+    if file.is_dir():
+        raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
+    if not header and not isinstance(columns, Sequence):
+        raise RecordingError(
+            f"{source}: without a header, columns must list what each column is: 'name [unit]'"
+        )
+    table = read_table(file, delimiter=delimiter, header=header, decimal=decimal)
+    wanted = _understood(_headings(table, columns, source), source)
+    remarks = [("time", text) for text in table.remarks]
+    raw, units = _si_columns(table, wanted, source, thousands, decimal, remarks)
+    stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
+    said = {channel: unit for channel, (_, unit) in wanted.items() if channel != "time"}
+    clock = _clock(raw, source, sample_time)
+    channels = [sampled(channel, raw[channel], clock, units[channel]) for channel in said]
+    remarks += [("time", text) for text in (*clock.remarks, clock.spread[1]) if text]
+    remarks += [(channel.name, text) for channel in channels for text in channel.remarks]
+    recording = recording_of(name or stem, role, channels, source, sample_time, said)
+    issues = [Issue("log", channel, 0.0, recording.duration, text) for channel, text in remarks]
+    return replace(recording, source=source, said=said, issues=[*issues, *recording.issues])
+
+
+def _clock(raw: dict[str, Array], source: str, sample_time: float | None) -> Ticks:
+    """When the rows of a table were taken."""
+    time = raw.pop("time", None)
+    if time is None:
+        if sample_time is None:
+            raise RecordingError(
+                f"{source}: column 'time' is missing (give sample_time if the rows are evenly "
+                "spaced)"
+            )
+        rows = np.arange(len(next(iter(raw.values()))), dtype=np.float64)
+        return ticks(np.asarray(rows * sample_time))
+    if not np.isfinite(time).any():
+        raise RecordingError(f"{source}: column 'time' has no value at all")
+    return ticks(time, list(raw.values()))
+
+
+# ------------------------------------------------------------------------- columns
+
+
+def _headings(
+    table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str
+) -> list[str]:
+    found = table.header
+    if columns is None:
+        return found or []
+    if isinstance(columns, str):
+        raise RecordingError(
+            f"{source}: columns = {columns!r} is not allowed: a list of headings is needed"
+        )
+    if isinstance(columns, Mapping):
+        given = found or []
+        strange = [key for key in columns if key not in given]
+        if strange:
+            raise RecordingError(
+                f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
+            )
+        return [columns.get(heading, heading) for heading in given]
+    if len(columns) != len(table.cells):
+        raise RecordingError(
+            f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} "
+            "columns"
+        )
+    return list(columns)
+
+
+def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
+    """Canonical name -> (column, unit) of every heading that is to be used."""
+    problems: list[str] = []
+    wanted: dict[str, tuple[int, str]] = {}
+    for index, heading in enumerate(headings):
+        if not heading.strip():
+            continue
+        match = _HEADING.match(heading)
+        name = match["name"] if match else heading
+        channel = channel_of(name)
+        if match is None or channel not in CHANNELS or name.endswith("."):
+            near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
+            hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
+            problems.append(
+                f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
+            )
+            continue
+        expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
+        unit = match["unit"]
+        if unit is None or not unit.strip():
+            problems.append(
+                f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit "
+                "its values are in"
+            )
+        elif name in wanted:
+            problems.append(f"column {heading!r}: the channel {name!r} is there twice")
+        else:
+            trouble = _unit_trouble(unit, expected)
+            if trouble:
+                problems.append(f"column {heading!r}: {trouble}")
+            wanted[name] = (index, unit.strip())
+    if not problems and not set(wanted) - {"time"}:
+        problems.append("there is no channel to use")
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return wanted
+
+
+def _unit_trouble(unit: str, expected: Sequence[str]) -> str | None:
+    trouble = None
+    for si_unit in expected:
+        try:
+            to_si(1.0, unit.strip(), si_unit)
+        except ParameterError as error:
+            trouble = trouble or str(error)
+        else:
+            return None
+    return trouble
+
+
+def _si_columns(
+    table: Table,
+    wanted: Mapping[str, tuple[int, str]],
+    source: str,
+    thousands: str | Mapping[str, str] | None,
+    decimal: str,
+    remarks: list[tuple[str, str]],
+) -> tuple[dict[str, Array], dict[str, str]]:
+    """Values and units of the columns in SI; what is no number counts as missing, and is said."""
+    if isinstance(thousands, Mapping):
+        strange = [key for key in thousands if key not in wanted]
+        if strange:
+            raise RecordingError(
+                f"{source}: thousands names {strange[0]!r}, but the channels are: "
+                f"{', '.join(wanted)}"
+            )
+    raw: dict[str, Array] = {}
+    units: dict[str, str] = {}
+    for name, (index, unit) in wanted.items():
+        mark = thousands_of(thousands, name)
+        numbers, missing = table.samples(index, f"{name} [{unit}]", source, mark, decimal)
+        remarks += [(name, missing)] if missing else []
+        parsed = parse_unit(unit)
+        values: Array = np.asarray(numbers * parsed.scale + parsed.offset, dtype=np.float64)
+        values[~np.isfinite(values)] = np.nan
+        raw[name] = values
+        units[name] = CHANNELS[channel_of(name)].unit
+        if channel_of(name) == "reference" and parsed.dimension != parse_unit("rad").dimension:
+            units[name] = "Pa"
+    return raw, units

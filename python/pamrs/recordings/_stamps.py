@@ -1,0 +1,387 @@
+"""Time stamps as logs have them: unit, counters that overflow, rows out of order, bursts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.recordings._clock import GAP
+from pamrs.units import parse_unit
+
+__all__ = [
+    "CLOCK_WORDS",
+    "Rows",
+    "Ticks",
+    "filled_rows",
+    "spread",
+    "ticks",
+    "unit_of_stamps",
+    "unwound",
+]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+#: Words that name a series of times.
+CLOCK_WORDS: Final = frozenset(
+    {
+        "t",
+        "time",
+        "times",
+        "zeit",
+        "timestamp",
+        "timestamps",
+        "stamp",
+        "stamps",
+        "ts",
+        "seconds",
+        "sec",
+        "secs",
+        "clock",
+        "when",
+        "tijd",
+        "tiempo",
+        "temps",
+        "tempo",
+        "millis",
+        "micros",
+        "nanos",
+        "ms",
+        "us",
+        "ns",
+        "msec",
+        "usec",
+        "nsec",
+        "nsecs",
+        "milliseconds",
+        "microseconds",
+        "nanoseconds",
+        "elapsed",
+        "epoch",
+        "uptime",
+        "datetime",
+        "datum",
+        "uhrzeit",
+        "zeitstempel",
+        "zeitpunkt",
+        "laufzeit",
+        "date",
+    }  # fmt: skip
+)
+_NAMED: Final = {
+    word: unit
+    for unit, words in {
+        "ns": "nanos ns nsec nsecs nanosec nanosecs nanosecond nanoseconds",
+        "us": "micros us usec usecs microsec microsecond microseconds",
+        "ms": "millis ms msec msecs millisec millisecond milliseconds",
+        "s": "s sec secs second seconds sekunden",
+    }.items()
+    for word in words.split()
+}
+_FINER: Final = ("s", "ms", "us", "ns")
+_EPOCH: Final = (9.4e8, 2.1e9)  # seconds since 1970 of the years 2000 to 2036
+_SLOWEST: Final = 60.0  # seconds between samples of a log with such stamps
+_DAYS: Final = ((3.6e4, 5.5e4), (7.3e5, 7.5e5))  # of 1998 to 2050 by Excel and by MATLAB
+_LONGEST: Final = 1e10  # seconds, 300 years: no clock shows more
+_PERIODS: Final = tuple(2.0**bits / scale for scale in (1.0, 1e3, 1e6, 1e9) for bits in (32, 16))
+_OVERFLOW: Final = (0.2, 3.0)  # usual steps that a counter goes on by where it overflows
+_LONG: Final = 20.0  # usual steps; a shorter period has to show several times that it is one
+_OFTEN: Final = 3
+_LATE: Final = 20  # rows that may come late, one after the other
+_CROWDED: Final = 1.5  # usual density of rows; what is denser are two recordings, not one
+_SAME: Final = 3.0  # how far beyond the largest step of an angle one over a full turn may be
+
+
+def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
+    """The unit of time stamps: what the log says where that is possible, else by name and size.
+
+    Parameters
+    ----------
+    values : (n,) array
+        The stamps, NaN where there is none.
+    name : str
+        What the log calls them.
+    said : str
+        A unit of time that the log says, or empty.
+
+    Returns
+    -------
+    unit, remark : str
+        The unit, and what is to be said of it; empty where the log says it.
+    """
+    good = values[np.isfinite(values)]
+    steps = np.diff(good)
+    steps = steps[steps > 0.0]
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    size = float(np.max(np.abs(good))) if len(good) else 0.0
+    spoken = _NAMED.get(_last_word(name), "")
+    for unit in (said, spoken):
+        if unit and size * parse_unit(unit).scale <= _LONGEST:
+            return unit, "" if unit == said else f"the times {name} are taken as {unit} by name"
+    unit = _by_size(size, usual)
+    apart = usual * parse_unit(unit).scale
+    if said or spoken:
+        return unit, (
+            f"the times {name} reach {size:.4g}, which cannot be {said or spoken}: {unit} is "
+            f"taken, samples are then {apart:.4g} s apart"
+        )
+    return unit, (
+        f"the times {name} have no unit in the log: {unit} is taken by their size, samples are "
+        f"then {apart:.4g} s apart"
+    )
+
+
+def _last_word(name: str) -> str:
+    parted = re.sub(r"(?<=[a-zäöü])(?=[A-Z])", " ", name)
+    words = [word for word in re.split(r"[^0-9a-zäöüµ]+", parted.lower()) if word]
+    return words[-1] if words else ""
+
+
+def _by_size(size: float, usual: float) -> str:
+    """A date in one of the units, else the unit in which samples are 10 us to 1 s apart."""
+    for unit in _FINER:
+        scale = parse_unit(unit).scale
+        if _EPOCH[0] <= size * scale <= _EPOCH[1] and usual * scale <= _SLOWEST:
+            return unit
+    if any(low <= size <= high for low, high in _DAYS) and usual * 86400.0 <= 2.0:
+        return "d"
+    limits = (0.5, 1e3, 1e6)
+    return _FINER[sum(usual >= limit for limit in limits)]
+
+
+@dataclass(frozen=True, eq=False)
+class Ticks:
+    """When the rows of a log were taken.
+
+    Attributes
+    ----------
+    rows : (m,) array of int
+        Rows of the log that have a time, in the order of time.
+    time : (m,) array
+        Their times [s]; several rows may have one, and a clock may start again.
+    remarks : tuple of str
+        What was done to the clock.
+    """
+
+    rows: Rows
+    time: Array
+    remarks: tuple[str, ...] = ()
+
+    @cached_property
+    def spread(self) -> tuple[Array, str]:
+        """Times with the rows of one stamp spread over it, and what is to be said of it."""
+        return spread(self.time)
+
+
+def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
+    """Put the rows of a log in the order of their stamps.
+
+    Parameters
+    ----------
+    stamps : (n,) array
+        Seconds, NaN where a row has none.
+    others : sequence of (n,) arrays
+        What else stands in the rows, by which rows that were written twice are known.
+
+    Returns
+    -------
+    Ticks
+        Counters of 16 and 32 bits go on where they overflow, rows that came late are put where
+        they belong, rows that were written twice are left out.
+    """
+    remarks: list[str] = []
+    rows: Rows = np.flatnonzero(np.isfinite(stamps))
+    if len(rows) < len(stamps):
+        remarks.append(f"rows without a time: {len(stamps) - len(rows)} of {len(stamps)}, left out")
+    order, late = _in_order(stamps[rows])
+    if late:
+        remarks.append(f"rows that stand after later ones: {late}, sorted by their times")
+    rows = rows[order]
+    time, said = _counted_on(stamps[rows])
+    remarks += said
+    again = np.flatnonzero(np.diff(time) == 0.0) + 1
+    if len(again) and others and all(_same(values, rows, again) for values in others):
+        remarks.append(f"rows that stand there twice: {len(again)}, left out once")
+        keep = np.ones(len(rows), dtype=bool)
+        keep[again] = False
+        rows, time = rows[keep], time[keep]
+    return Ticks(rows, time, tuple(remarks))
+
+
+def _same(values: Array, rows: Rows, again: Rows) -> bool:
+    now, before = values[rows[again]], values[rows[again - 1]]
+    return bool(np.all((now == before) | (np.isnan(now) & np.isnan(before))))
+
+
+def _counted_on(stamps: Array) -> tuple[Array, list[str]]:
+    """Stamps of a counter that overflows, as if it had more bits."""
+    steps = np.diff(stamps)
+    back = steps[steps < 0.0]
+    forward = steps[steps > 0.0]
+    if not len(back) or not len(forward):
+        return stamps, []
+    usual = float(np.median(forward))
+    low, high = (limit * usual for limit in _OVERFLOW)
+    for period in _PERIODS:
+        gone = back + period
+        fits = (gone >= low) & (gone <= high)
+        often = len(back) >= _OFTEN and fits.all()
+        if fits.any() and (period >= _LONG * usual or often):
+            over = steps < -0.5 * period
+            turns = np.concatenate([[0.0], np.cumsum(over)])
+            bits = 16 if period in _PERIODS[1::2] else 32
+            text = f"overflows of a clock of {bits} bits: {int(over.sum())}, counted on"
+            return stamps + period * turns, [text]
+    return stamps, []
+
+
+def _in_order(time: Array) -> tuple[Rows, int]:
+    """Order of the rows in which a few that came late stand in their places; where the clock
+    starts again, it stays so.
+    """
+    order: Rows = np.arange(len(time))
+    steps = np.diff(time)
+    backs = np.flatnonzero(steps < 0.0)
+    if not len(backs) or not np.any(steps > 0.0):
+        return order, 0
+    usual = float(np.median(steps[steps > 0.0]))
+    laid = time.copy()
+    start, done, moved = 0, 0, 0
+    for at in backs.tolist():
+        if at + 1 < done:
+            continue
+        after = laid[at + 1 : at + 2 + _LATE]
+        ahead = np.flatnonzero(after >= laid[at])
+        if len(ahead):
+            stop = at + 1 + int(ahead[0])
+        else:
+            stop = len(laid) if at + 1 + _LATE >= len(laid) else 0
+        low = float(laid[at + 1 : stop].min()) if stop else 0.0
+        first = start + int(np.searchsorted(laid[start : at + 1], low))
+        span = float(laid[at]) - low
+        if stop and (stop - 1 - first) * usual <= _CROWDED * span:
+            local = first + np.argsort(laid[first:stop], kind="stable")
+            moved += stop - at - 1
+            order[first:stop] = order[local]
+            laid[first:stop] = laid[local]
+            done = stop
+        else:
+            start = done = at + 1
+    return order, moved
+
+
+def spread(time: Array) -> tuple[Array, str]:
+    """Times of rows of which several have one stamp, spread over it by their count.
+
+    Parameters
+    ----------
+    time : (n,) array
+        Seconds, in order; a clock may start again.
+
+    Returns
+    -------
+    time : (n,) array
+        The same where no stamp is there twice.
+    remark : str
+        What was done; empty where nothing was.
+    """
+    again = int(np.sum(np.diff(time) == 0.0))
+    firsts = np.flatnonzero(np.concatenate([[True], np.diff(time) != 0.0]))
+    if not again or len(firsts) < 2:
+        return time, ""
+    counts = np.diff(np.append(firsts, len(time)))
+    lasting = np.diff(time[firsts])
+    rising = lasting > 0.0
+    if not rising.any():
+        return time, ""
+    after, before = (lasting / counts[side] for side in (slice(None, -1), slice(1, None)))
+    if _uneven(before[rising]) < 0.5 * _uneven(after[rising]):  # packets, stamped as they came
+        laid = -_spread_on(-time[::-1])[::-1]
+        where = "before it"
+    else:
+        laid, where = _spread_on(time), "to the next one"
+    return laid, (
+        f"{len(time)} rows have {len(firsts)} different times (up to {int(counts.max())} rows of "
+        f"one): spread evenly over the time {where}"
+    )
+
+
+def _uneven(steps: Array) -> float:
+    return float(np.mean(np.abs(steps / np.median(steps) - 1.0)))
+
+
+def _spread_on(time: Array) -> Array:
+    """Rows of one stamp, spread up to the next one; none across a pause."""
+    firsts = np.flatnonzero(np.concatenate([[True], np.diff(time) != 0.0]))
+    counts = np.diff(np.append(firsts, len(time)))
+    at = time[firsts]
+    lasting = np.append(np.diff(at), -1.0)
+    rising = lasting > 0.0
+    each = lasting / counts
+    usual = float(np.median(each[rising]))
+    step = np.where(rising & (each <= GAP * usual), each, usual)
+    if np.median(counts) >= 2.0:  # a log begins within a burst, which ends with the next one
+        begins = np.concatenate([[True], ~rising[:-1]])
+        part = begins & rising & (each > 1.02 * usual)
+        at = np.where(part, at + lasting - counts * usual, at)
+        step = np.where(part, usual, step)
+    within = np.arange(len(time)) - np.repeat(firsts, counts)
+    return np.asarray(np.repeat(at, counts) + within * np.repeat(step, counts))
+
+
+def filled_rows(values: Array) -> Rows | None:
+    """Rows in which a slower channel has its values; None where it has one in nearly every row.
+
+    Parameters
+    ----------
+    values : (n,) array
+        NaN where a cell is empty.
+
+    Returns
+    -------
+    (m,) array of int or None
+    """
+    filled = np.flatnonzero(np.isfinite(values))
+    if len(filled) < 3 or float(np.median(np.diff(filled))) < 2.0:
+        return None
+    return filled
+
+
+def unwound(angle: Array) -> tuple[Array, str]:
+    """An angle without the leaps of an encoder that starts again after a full turn.
+
+    Parameters
+    ----------
+    angle : (n,) array
+        Radians, NaN where there is none.
+
+    Returns
+    -------
+    angle : (n,) array
+        On the turn that is nearest to zero for an encoder that counts from 0, else nearest to half
+        a turn; the same where nothing leaps.
+    remark : str
+        What was done; empty where nothing was.
+    """
+    turn = 2.0 * np.pi
+    good = np.flatnonzero(np.isfinite(angle))
+    data = angle[good]
+    steps = np.diff(data)
+    leaps = np.abs(steps) > 0.5 * turn
+    if not leaps.any() or leaps.mean() > 0.1 or float(np.ptp(data)) > 1.001 * turn:
+        return angle, ""
+    beyond = np.abs(np.abs(steps[leaps]) - turn)
+    if float(beyond.max()) > _SAME * float(np.max(np.abs(steps[~leaps]), initial=0.0)):
+        return angle, ""
+    laid = np.unwrap(data)
+    middle = 0.0 if float(data.min()) >= -1e-3 * turn else 0.5 * turn
+    laid -= turn * np.round((float(np.median(laid)) - middle) / turn)
+    result = angle.copy()
+    result[good] = laid
+    return result, f"leaps by a full turn: {int(leaps.sum())}, unwrapped"

@@ -1,0 +1,114 @@
+"""Dates and times of day as texts: German, American, ISO, with fractions, AM and PM."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from datetime import date
+from typing import Final
+
+import numpy as np
+
+from pamrs.recordings.logs._log import Array
+
+__all__ = ["is_moment", "moments"]
+
+_MOMENT: Final = re.compile(
+    r"(?:(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?:,? +|T))?"
+    r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,:]\d+)?))?"
+    r"(?: ?([AaPp])\.?[Mm]\.?)?(Z|[+-]\d{2}:?\d{2})?"
+)
+_DAY: Final = 86400.0
+
+
+def is_moment(cell: str) -> bool:
+    """Whether a text is a time of day, perhaps with a date before it."""
+    return _MOMENT.fullmatch(cell) is not None
+
+
+def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
+    """Seconds since the first of some dates or times of day.
+
+    Parameters
+    ----------
+    cells : sequence of str
+        ``22.11.2022 10:16:51,123``, ``11/22/2022 10:16:51 AM``, ``10:16:51.123``.
+
+    Returns
+    -------
+    seconds : (n,) array
+        NaN where a cell is none of these; times of day go on past midnight.
+    remark : str
+        How dates are read that may be read in two ways; empty where there are none.
+    None where fewer than half of the cells are such texts.
+    """
+    found = [_MOMENT.fullmatch(cell) for cell in cells]
+    there = [match for match in found if match is not None]
+    if 2 * len(there) <= len(cells):
+        return None
+    month_first, remark = _order({match[0]: match for match in there})
+    seconds = np.full(len(cells), math.nan)
+    days: dict[tuple[str, str, str], float] = {}
+    passed, before = 0.0, -math.inf
+    for row, match in enumerate(found):
+        if match is None:
+            continue
+        value = _seconds_of_day(match)
+        if match[1] is None:
+            if value + passed < before - 0.5 * _DAY:
+                passed += _DAY  # a clock of times of day ran past midnight
+            seconds[row] = before = value + passed
+            continue
+        written = (match[1], match[3], match[4])
+        if written not in days:
+            days[written] = _day(written, month_first)
+        seconds[row] = days[written] * _DAY + value
+    good = seconds[np.isfinite(seconds)]
+    return (seconds - good[0], remark) if len(good) else None
+
+
+def _order(there: dict[str, re.Match[str]]) -> tuple[bool, str]:
+    """Whether months stand before days, which only days above 12 show; else a slash means so."""
+    dates = {(m[1], m[2], m[3], m[4]) for m in there.values() if m[1] and len(m[1]) < 4}
+    if not dates:
+        return False, ""
+    first, second = (max(int(each[place]) for each in dates) for place in (0, 2))
+    slash = any(each[1] == "/" for each in dates)
+    if first > 12 or second > 12:
+        return first <= 12, ""
+    if len(dates) == 1:
+        return slash, ""
+    some = min(dates)
+    written = f"{some[0]}{some[1]}{some[2]}{some[1]}{some[3]}"
+    return slash, f"dates like {written} are read with the {'month' if slash else 'day'} first"
+
+
+def _day(written: tuple[str, str, str], month_first: bool) -> float:
+    """Days since a fixed one; NaN where there is no such date."""
+    first, second, third = map(int, written)
+    if len(written[0]) == 4:
+        year, month, day = first, second, third
+    else:
+        month, day = (first, second) if month_first else (second, first)
+        year = third + (2000 if third < 100 else 0)
+    try:
+        return float(date(year, month, day).toordinal())
+    except ValueError:
+        return math.nan
+
+
+def _seconds_of_day(match: re.Match[str]) -> float:
+    """Seconds since midnight, UTC where the text says its zone."""
+    hour = int(match[5])
+    if match[8]:
+        hour = hour % 12 + (12 if match[8] in "Pp" else 0)
+    seconds = 0.0
+    if match[7]:
+        seconds = float(match[7].replace(",", ".").replace(":", "."))
+    value = hour * 3600.0 + int(match[6]) * 60.0 + seconds
+    zone = match[9]
+    if zone and zone != "Z":
+        away = int(zone[1:3]) * 3600.0 + int(zone[-2:]) * 60.0
+        value -= away if zone[0] == "+" else -away
+    return value
