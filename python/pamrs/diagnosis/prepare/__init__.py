@@ -6,9 +6,9 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 (recordings that hold the same samples),
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `without_rails`,
 `suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
-`smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`, `available_blocks`, `begun`,
-`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
-(beginnings that nobody measured).
+`smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
+`available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and their residuals),
+`begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
 """
 
 from __future__ import annotations
