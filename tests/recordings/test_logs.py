@@ -188,8 +188,9 @@ def test_topics_at_their_own_rates_and_stamps_of_their_own(tmp_path: Path) -> No
             now = 10**18 + step * 10**7
             writer.write(made["/p"], now, store.serialize_cdr(number(2.0), number.__msgtype__))
             if step % 5 == 0:
+                sent = now - (2 + 12 * (step % 2)) * 10**6
                 message = wrench(
-                    header(stamp(7, step * 10**6), "cell"),
+                    header(stamp(sent // 10**9, sent % 10**9), "cell"),
                     store.types["geometry_msgs/msg/Wrench"](
                         vector(0.0, 0.0, float(step)), vector(0.0, 0.0, 0.0)
                     ),
@@ -202,11 +203,19 @@ def test_topics_at_their_own_rates_and_stamps_of_their_own(tmp_path: Path) -> No
         log = read_log(path)
         force = log.find("/cell/wrench/force/z")
         assert force.time is not None
-        np.testing.assert_allclose(force.time, 0.05 * np.arange(20), atol=1e-12)
+        late = 2e-3 + 12e-3 * (np.arange(20) % 2)
+        sent = 0.05 * np.arange(20) - late
+        np.testing.assert_allclose(force.time, sent - sent[0], atol=1e-12)
         np.testing.assert_allclose(force.values, 5.0 * np.arange(20))
         np.testing.assert_allclose(
-            log.find("/cell/header/stamp").values, 7.0 + 0.005 * np.arange(20)
+            log.find("/cell/header/stamp").values, 1e9 + sent, rtol=0, atol=3e-7
         )
+        np.testing.assert_allclose(
+            log.find("/cell/arrival").values, 0.05 * np.arange(20) + 2e-3, atol=1e-12
+        )
+        assert "/cell: times are the stamps of its messages" in log.remarks[0]
+        assert "arrived 8 ms later in the middle (2 to 14 ms)" in log.remarks[0]
+        assert log.remarks[1:] == ["/p: no stamps, times are those of arrival"]
         assert len(log.find("/p/data").values) == 100
 
 

@@ -9,17 +9,21 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pamrs.errors import RecordingError
-from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
+from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 
 __all__ = ["read_bag", "read_mcap"]
 
 _MOST_ELEMENTS: Final = 64  # of an array in a message; longer ones are images and the like
 _DEEPEST: Final = 8
+_SECONDS: Final = (("sec", "nanosec"), ("secs", "nsecs"), ("seconds", "nanos"))
+_OTHER_CLOCK: Final = 1e9  # ns between stamp and arrival that no network takes
 _OF_ADDRESSES: Final = frozenset("%?#")  # rosbags opens a bag by an address, which SQLite decodes
 
 _Messages = Iterable[tuple[str, int, Any]]
+Times = NDArray[np.int64]
 
 
 def read_bag(path: Path, form: TextFormat) -> Log:
@@ -91,8 +95,9 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
     -------
     Log
         ``/topic/field/part``; an element of an array is ``field[2]``, or ``field[elbow]`` where
-        the message names its elements. Times are those at which the messages were logged, from the
-        first one on; the stamps in the messages are channels of their own.
+        the message names its elements. Times are the stamps in the messages, where all messages
+        of a topic have one, else those at which they were logged, from the first one on; what
+        their delay is is said, and ``/topic/arrival`` has the times of arrival.
     """
     from mcap.reader import make_reader
 
@@ -132,29 +137,96 @@ def _decoders(encoding: str) -> Any:
     return None
 
 
+class _Topic:
+    """The messages of a topic: when they arrived, which stamps they have, and their numbers."""
+
+    def __init__(self) -> None:
+        self.arrived: list[int] = []
+        self.stamps: list[int | None] = []
+        self.rows: dict[str, list[int]] = {}
+        self.values: dict[str, list[float]] = {}
+
+    def take(self, name: str, arrived: int, message: Any) -> None:
+        """Take the numbers of one message."""
+        for inner, value in _numbers(name, message, 0):
+            self.rows.setdefault(inner, []).append(len(self.arrived))
+            self.values.setdefault(inner, []).append(value)
+        self.arrived.append(arrived)
+        self.stamps.append(_stamp(message))
+
+    def times(self, name: str) -> tuple[Times, str]:
+        """Nanoseconds of the messages: their stamps, else their arrival; and what is to be said."""
+        arrived = np.array(self.arrived, dtype=np.int64)
+        if any(stamp is None for stamp in self.stamps):
+            return arrived, ""
+        stamps = np.array(self.stamps, dtype=np.int64)
+        late = arrived - stamps
+        if np.all(late == 0):
+            return arrived, ""
+        low, middle, high = (f"{1e-6 * x:.4g}" for x in (late.min(), np.median(late), late.max()))
+        told = (
+            f"{name}: times are the stamps of its messages, which arrived {middle} ms later in the "
+            f"middle ({low} to {high} ms); time = {{ column = '{name}/arrival' }} takes the arrival"
+        )
+        if abs(np.median(late)) > _OTHER_CLOCK:
+            stamps += late.min()
+            told += "; the stamps are of another clock, moved so that the least delay is 0"
+        return stamps, told
+
+
 def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
-    stamps: dict[str, list[int]] = {}
-    values: dict[str, list[float]] = {}
-    for topic, stamp, message in messages:
-        for name, value in _numbers(topic, message, 0):
-            stamps.setdefault(name, []).append(stamp)
-            values.setdefault(name, []).append(value)
-    if not stamps:
+    topics: dict[str, _Topic] = {}
+    for name, arrived, message in messages:
+        topics.setdefault(name, _Topic()).take(name, arrived, message)
+    topics = {name: topic for name, topic in topics.items() if topic.values}
+    if not topics:
         why = "; ".join(f"{topic}: {text}" for topic, text in unread.items())
         raise RecordingError(f"{path}: no message with numbers was found ({why or 'it is empty'})")
-    first = min(min(times) for times in stamps.values())
-    clocks: dict[tuple[int, ...], Any] = {}
+    times = {name: topic.times(name) for name, topic in topics.items()}
+    first = min(int(stamps.min()) for stamps, _ in times.values())
+    remarks = [told for _, told in times.values() if told]
+    if remarks:
+        remarks += [
+            f"{name}: no stamps, times are those of arrival"
+            for name, topic in topics.items()
+            if None in topic.stamps
+        ]
     found: list[Series] = []
-    for name, numbers in values.items():
-        key = tuple(stamps[name])
-        if key not in clocks:  # nanoseconds are subtracted before they become floating numbers
-            clocks[key] = (np.array(key, dtype=np.int64) - first) * 1e-9
-        order = np.argsort(clocks[key], kind="stable")
-        array = np.array(numbers, dtype=np.float64)
-        array[~np.isfinite(array)] = np.nan
-        unit = "s" if name.endswith("/stamp") else ""
-        found.append(Series(name, array[order], unit, clocks[key][order]))
-    return collected(path, found, unread)
+    for name, topic in topics.items():
+        stamps, told = times[name]
+        clock = _seconds(stamps - first)  # subtracted before they become floating numbers
+        clocks = {tuple(range(len(clock))): clock}
+        for inner, numbers in topic.values.items():
+            rows = tuple(topic.rows[inner])
+            own = clocks.setdefault(rows, clock[list(rows)])
+            array = np.array(numbers, dtype=np.float64)
+            array[~np.isfinite(array)] = np.nan
+            found.append(Series(inner, array, "s" if inner.endswith("/stamp") else "", own))
+        if told:
+            arrival = _seconds(np.array(topic.arrived, dtype=np.int64) - first)
+            found.append(Series(f"{name}/arrival", arrival, "s", clock))
+    return collected(path, found, unread, remarks)
+
+
+def _seconds(times: Times) -> Array:
+    return np.asarray(times * 1e-9, dtype=np.float64)
+
+
+def _stamp(message: Any) -> int | None:
+    """The stamp of a message [ns]: of its header, or its own; None where it has none."""
+    fields = message if isinstance(message, dict) else _slots(message)
+    for key in ("header", "stamp", "timestamp"):
+        inside = fields.get(key)
+        if inside is None or isinstance(inside, (str, bytes, int, float, list, tuple, np.ndarray)):
+            continue
+        inner = inside if isinstance(inside, dict) else _slots(inside)
+        if key == "header":
+            return _stamp({"stamp": inner["stamp"]}) if "stamp" in inner else None
+        for whole, part in _SECONDS:
+            if {whole, part} <= set(inner):
+                stamp = int(inner[whole]) * 10**9 + int(inner[part])
+                return stamp or None  # 0: it was not set
+    return None
 
 
 def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
@@ -170,7 +242,7 @@ def _numbers(name: str, value: Any, depth: int) -> Iterator[tuple[str, float]]:
                 yield from _numbers(f"{name}[{index}]", item, depth + 1)
         return
     fields = value if isinstance(value, dict) else _slots(value)
-    for whole, part in (("sec", "nanosec"), ("seconds", "nanos")):  # of ROS, of Protobuf
+    for whole, part in _SECONDS:
         if {whole, part} == set(fields):
             yield name, float(fields[whole]) + 1e-9 * float(fields[part])
             return
