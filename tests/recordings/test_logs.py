@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import importlib.util
+import struct
+import zipfile
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +17,7 @@ from hypothesis import strategies as st
 from pamrs.errors import MissingPackageError, RecordingError
 from pamrs.recordings import load_recording, load_recordings
 from pamrs.recordings import logs as logs_package
-from pamrs.recordings.logs import TextFormat, read_log
+from pamrs.recordings.logs import TextFormat, _sheets, read_log
 from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, mapping, signals, written
 
 
@@ -94,7 +97,8 @@ def test_names_that_are_not_there(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "ending", ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather"]
+    "ending",
+    ["mat", "h5", "mf4", "tdms", "db3", "mcap", "parquet", "npz", "feather", "xlsx", "xls"],
 )
 def test_broken_files_are_named(tmp_path: Path, ending: str) -> None:
     file = tmp_path / f"broken.{ending}"
@@ -274,7 +278,7 @@ def test_utf_16_with_headings_that_say_it_all(tmp_path: Path) -> None:
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )
 @given(data=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
-@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "mcap", "tdms", "h5"])
+@pytest.mark.parametrize("ending", ["csv", "npy", "npz", "mcap", "tdms", "h5", "xlsx", "xls"])
 def test_any_bytes_are_a_log_or_an_error_that_names_the_file(
     tmp_path: Path, ending: str, data: bytes
 ) -> None:
@@ -319,3 +323,42 @@ def test_older_files_of_asam_that_are_called_dat(tmp_path: Path) -> None:
     rows = "".join(f"{0.1 * i:.1f} {i}\n" for i in range(30))
     (tmp_path / "text.dat").write_text(rows, encoding="utf-8")
     assert len(read_log(tmp_path / "text.dat").series) == 2
+
+
+@pytest.mark.parametrize("kind", ["xlsx", "xls"])
+def test_sheets_with_cells_far_out_are_refused_before_they_are_read(
+    tmp_path: Path, kind: str
+) -> None:
+    """Their range is laid out cell by cell, so that one far cell would take all memory."""
+    file, _, _ = written(tmp_path, kind)
+    data = file.read_bytes()
+    if kind == "xls":
+        last, far = (struct.pack("<HHHH", 0x203, 14, *at) for at in ((402, 3), (65535, 65535)))
+        assert data.count(last) == 1
+        file.write_bytes(data.replace(last, far))
+    else:
+        made = tmp_path / "far.xlsx"
+        with zipfile.ZipFile(file) as old, zipfile.ZipFile(made, "w") as new:
+            for item in old.infolist():
+                text = old.read(item).replace(b'r="D403"', b'r="XFD1048576"')
+                new.writestr(item.filename, text)
+        file = made
+    with pytest.raises(RecordingError, match=r"about \d+ cells; at most"):
+        read_log(file)
+
+
+def test_sheets_with_dates_texts_and_several_tables(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    when = datetime(2022, 11, 22, 10, 16, 51)
+    rows = [["Zeit", "Druck [bar]"]]
+    rows += [[when + timedelta(seconds=0.5 * i), f"{i},5"] for i in range(40)]
+    other = [["t [s]", "x [mm]"], *([i, 2.0 * i] for i in range(40))]
+    cells = {"a": rows, "b": other, "notes": [["stand 3"]]}
+    monkeypatch.setattr(_sheets, "_sheets", lambda path: cells)
+    log = _sheets.read_sheets(tmp_path / "run.xlsx", TextFormat())
+    assert list(log.series) == ["a/Zeit", "a/Druck", "b/t", "b/x"]
+    np.testing.assert_allclose(log.find("Zeit").values, 0.5 * np.arange(40))
+    np.testing.assert_allclose(log.find("Druck").values, np.arange(40) + 0.5)
+    assert log.remarks == ["a/numbers that are texts with a decimal comma: 40, read"]
+    assert "no table was found" in log.unread["sheet notes"]

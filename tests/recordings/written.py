@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gzip
 import json
+import struct
 import warnings
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -285,6 +287,88 @@ def write_protobuf_mcap(path: Path, data: dict[str, Array]) -> None:
             writer.write_message("/rig", message, log_time=nanos, publish_time=nanos)
 
 
+def _sheet(data: dict[str, Array]) -> list[list[Any]]:
+    head = ["t [s]", "u [V]", "p1 [bar]", "angle [deg]"]
+    return [
+        ["Stand 3", "12 May"],
+        [],
+        head,
+        *(list(row) for row in zip(*data.values(), strict=True)),
+    ]
+
+
+def write_xlsx(path: Path, data: dict[str, Array]) -> None:
+    """A workbook of one sheet with a title above its table, with as little as Excel needs."""
+    rows = []
+    for number, row in enumerate(_sheet(data), start=1):
+        cells = [
+            f'<c r="{chr(65 + place)}{number}" t="inlineStr"><is><t>{cell}</t></is></c>'
+            if isinstance(cell, str)
+            else f'<c r="{chr(65 + place)}{number}"><v>{float(cell)!r}</v></c>'
+            for place, cell in enumerate(row)
+        ]
+        rows.append(f'<row r="{number}">{"".join(cells)}</row>')
+    main = "http://schemas.openxmlformats.org/spreadsheetml/2006/main"
+    office = "http://schemas.openxmlformats.org/officeDocument/2006/relationships"
+    package = "http://schemas.openxmlformats.org/package/2006"
+    parts = {
+        "[Content_Types].xml": f'<Types xmlns="{package}/content-types"/>',
+        "_rels/.rels": f'<Relationships xmlns="{package}/relationships"><Relationship Id="r1" '
+        f'Type="{office}/officeDocument" Target="xl/workbook.xml"/></Relationships>',
+        "xl/workbook.xml": f'<workbook xmlns="{main}" xmlns:r="{office}"><sheets>'
+        '<sheet name="Run" sheetId="1" r:id="r1"/></sheets></workbook>',
+        "xl/_rels/workbook.xml.rels": f'<Relationships xmlns="{package}/relationships">'
+        f'<Relationship Id="r1" Type="{office}/worksheet" Target="worksheets/sheet1.xml"/>'
+        "</Relationships>",
+        "xl/worksheets/sheet1.xml": f'<worksheet xmlns="{main}"><sheetData>{"".join(rows)}'
+        "</sheetData></worksheet>",
+    }
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as packed:
+        for name, text in parts.items():
+            packed.writestr(name, text)
+
+
+def write_xls(path: Path, data: dict[str, Array]) -> None:
+    """The same as Excel 97 writes it: records in a stream of a compound file."""
+
+    def record(kind: int, body: bytes) -> bytes:
+        return struct.pack("<HH", kind, len(body)) + body
+
+    def begin(kind: int) -> bytes:
+        return record(0x809, struct.pack("<HHHHII", 0x600, kind, 0, 0, 0, 0))
+
+    cells = b""
+    for number, row in enumerate(_sheet(data)):
+        for place, cell in enumerate(row):
+            at = struct.pack("<HHH", number, place, 0)
+            if isinstance(cell, str):
+                cells += record(0x204, at + struct.pack("<HB", len(cell), 0) + cell.encode())
+            else:
+                cells += record(0x203, at + struct.pack("<d", cell))
+    end, name = record(0x0A, b""), b"Run"
+    sheet = struct.pack("<IBBBB", len(begin(5)) + 4 + 8 + len(name) + 4, 0, 0, len(name), 0) + name
+    book = begin(5) + record(0x85, sheet) + end + begin(0x10) + cells + end
+    blocks = -(-max(len(book), 4096) // 512)
+    follow = [*range(1, blocks), 0xFFFFFFFE, 0xFFFFFFFE, 0xFFFFFFFD]  # the book, the folder, this
+    follow += [0xFFFFFFFF] * (128 - len(follow))
+
+    def entry(title: str, kind: int, child: int, first: int, size: int) -> bytes:
+        text = title.encode("utf-16-le")
+        return struct.pack(
+            "<64sHBBIII36xIII", text, len(text) + 2, kind, 1, 2**32 - 1, 2**32 - 1, child,
+            first, size, 0,
+        )  # fmt: skip
+
+    folder = entry("Root Entry", 5, 1, 0xFFFFFFFE, 0)
+    folder += entry("Workbook", 2, 2**32 - 1, 0, blocks * 512)
+    head = bytes.fromhex("d0cf11e0a1b11ae1") + bytes(16)
+    head += struct.pack("<HHHHH6xIIIIIIIII", 0x3E, 3, 0xFFFE, 9, 6, 0, 1, blocks, 0, 4096,
+                        0xFFFFFFFE, 0, 0xFFFFFFFE, 0)  # fmt: skip
+    head += struct.pack("<109I", blocks + 1, *[0xFFFFFFFF] * 108)
+    body = book.ljust(blocks * 512, b"\0") + folder.ljust(512, b"\0")
+    path.write_bytes(head + body + struct.pack("<128I", *follow))
+
+
 #: Name of the file, who writes it, where its channels are, its times.
 FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any]] = {
     "excel": ("run.csv", write_excel, "{}", "Zeit"),
@@ -304,6 +388,8 @@ FORMATS: dict[str, tuple[str, Callable[[Path, dict[str, Array]], None], str, Any
     "hdf5": ("run.h5", write_hdf5, "daq/{}", "daq/t"),
     "mf4": ("run.mf4", write_mf4, "{}", None),
     "tdms": ("run.tdms", write_tdms, "daq/{}", None),
+    "xlsx": ("run.xlsx", write_xlsx, "{}", "t"),
+    "xls": ("run.xls", write_xls, "{}", "t"),
     "bag": ("run_bag", write_bag, "/rig/position[{}]", None),
     "mcap": ("run.mcap", write_mcap, "/rig/{}", None),
     "json mcap": ("run.mcap", write_json_mcap, "/rig/{}", None),

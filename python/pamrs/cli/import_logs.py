@@ -23,8 +23,8 @@ def import_command(
         list[Path],
         typer.Argument(
             help=(
-                "Logs of one rig: CSV and other text, Parquet, Feather, MATLAB, HDF5, MF4, TDMS, "
-                "ROS bags, MCAP, NumPy. They are not changed."
+                "Logs of one rig: CSV and other text, Excel, Parquet, Feather, MATLAB, HDF5, MF4, "
+                "TDMS, ROS bags, MCAP, NumPy. They are not changed."
             )
         ),
     ],

@@ -1,4 +1,4 @@
-"""Logs of a laboratory, read as they are: text, tables, MATLAB, HDF5, MDF, TDMS, bags.
+"""Logs of a laboratory, read as they are: text, tables, sheets, MATLAB, HDF5, MDF, TDMS, bags.
 
 :func:`read_log` turns a file into named series of numbers, each with the unit and the clock that
 the file gives it. There is one module for each family of formats; which of the series is which
@@ -19,6 +19,7 @@ from pamrs.recordings.logs._log import Log, Series, TextFormat
 from pamrs.recordings.logs._matlab import read_matlab
 from pamrs.recordings.logs._measurement import read_mdf, read_tdms
 from pamrs.recordings.logs._ros import read_bag, read_mcap
+from pamrs.recordings.logs._sheets import read_sheets
 from pamrs.recordings.logs._tables import read_arrow, read_numpy
 from pamrs.recordings.logs._text import read_text_log
 from pamrs.recordings.logs._words import Written, split_heading, understood_unit
@@ -60,6 +61,7 @@ _FORMATS: Final[dict[str, _Format]] = {
     **dict.fromkeys((".mf4", ".mdf"), _MDF),
     ".tdms": _Format(read_tdms, ("nptdms",)),
     **dict.fromkeys((".bag", ".db3"), _BAG),
+    **dict.fromkeys((".xlsx", ".xlsm", ".xls"), _Format(read_sheets, ("python_calamine",))),
     ".mcap": _Format(read_mcap, ("mcap", "mcap_ros2")),
 }
 #: Endings that are read.
