@@ -179,3 +179,28 @@ def test_locks_are_what_pyproject_allows():
             assert pinned[wanted.name.lower().replace("_", "-")] in wanted.specifier, text
     recipe = (ROOT / "Makefile").read_text(encoding="utf-8").partition("\nlock:")[2]
     assert f"!= ({oldest.replace('.', ', ')})" in recipe.partition("\n\n")[0]
+
+
+#: pages that are read whole, with the most words that they may have
+PAGES = {"README.md": 900}
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_pages_that_are_read_whole_stay_short(name):
+    assert len((ROOT / name).read_text(encoding="utf-8").split()) <= PAGES[name]
+
+
+def test_links_between_pages_lead_somewhere():
+    folders = ("docs", "cases", "trial", "benchmarks", "tests")
+    pages = [
+        *ROOT.glob("*.md"),
+        *(page for name in folders for page in (ROOT / name).rglob("*.md")),
+    ]
+    assert len(pages) > 50
+    lost = []
+    for page in pages:
+        text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+        for link in re.findall(r"\]\(([^)#\s]+)", text):
+            if "://" not in link and not (page.parent / link).exists():
+                lost.append(f"{page.relative_to(ROOT)}: {link}")
+    assert not lost
