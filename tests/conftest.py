@@ -1,8 +1,16 @@
-"""What tests of the work tell at the end of a run, whichever process they ran in."""
+"""For every test: what fails is raised, not left out of a result with a warning; and what tests of
+the work tell at the end of a run, whichever process they ran in.
+"""
 
 from __future__ import annotations
 
+import os
+
 import pytest
+
+from pamrs._losses import STRICT
+
+os.environ[STRICT] = "1"
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

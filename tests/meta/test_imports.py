@@ -21,6 +21,8 @@ LAYERS = (
         "findings",
         "_checks",
         "_files",
+        "_losses",
+        "_normal",
         "_stretches",
         "_writing",
         "_moved",

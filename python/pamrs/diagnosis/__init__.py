@@ -224,11 +224,11 @@ def diagnose(
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, left_out = _problems(case, chosen, _asked(case.rig, consider))
-    blocks = inner.blocks
-    gas = [b for b in blocks if not b.mechanical]
-    motion = [b for b in blocks if b.mechanical]
+    motion = [b for b in inner.blocks if b.mechanical]
+    parts = [[b for b in inner.blocks if not b.mechanical], motion]
     with _in_range(case.name):
-        groups = examine(inner, outer, case.rig, [part for part in (gas, motion) if part], say)
+        groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
+        inner, outer = _judged_only(inner, outer, groups)
         groups = [calibrated(group, chosen.verdict) for group in groups]
         unsettled = _unsettled(case.rig) if motion else []
         factor = chosen.verdict.unknown_geometry_probability
@@ -236,8 +236,8 @@ def diagnose(
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
         diagnosis = assemble(case, inner, outer, groups)
-    begun = said_of_beginnings(blocks, [*inner.recordings, *outer.recordings])
-    warnings = [*clipped, *suspected, *masked, *held, *left_out, *begun]
+    begun = said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
+    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *left_out, *begun]
     warnings += diagnosis.warnings
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
@@ -249,10 +249,26 @@ def diagnose(
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    data = data_used(case.recordings, counts, blocks, case.rig, inner.core, left_out=bool(left_out))
+    data = data_used(
+        case.recordings,
+        counts,
+        inner.blocks,
+        case.rig,
+        inner.core,
+        left_out=bool(left_out or inner.losses.told),
+    )
     return replace(
         diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
     )
+
+
+def _judged_only(inner: Problem, outer: Problem, groups: list[Group]) -> tuple[Problem, Problem]:
+    """Recordings without the blocks whose judgement failed."""
+    judged = {block.name for group in groups for block in group.blocks}
+    if not judged:
+        raise DiagnosisError("; ".join(inner.losses.told))
+    kept = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
+    return kept, kept if outer is inner else replace(outer, blocks=kept.blocks)
 
 
 def _check_rig(case: Case) -> None:

@@ -14,6 +14,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._normal import solve_normal
+
 __all__ = ["LawParameter", "LevelLine", "fit_levels", "mean_of_series"]
 
 Array = NDArray[np.float64]
@@ -95,7 +97,7 @@ def fit_levels(design: Array, observed: Array, stderr: Array) -> LevelLine:
 
     def solved(extra: float) -> tuple[Array, Array, float]:
         weight = 1.0 / (own + extra)
-        covar = np.linalg.inv(columns.T @ (weight[:, None] * columns))
+        covar = solve_normal(columns.T @ (weight[:, None] * columns), np.eye(count))
         values = covar @ (columns.T @ (weight * observed))
         return values, covar, float(np.sum(weight * (observed - columns @ values) ** 2))
 

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from markupsafe import Markup
 
+from pamrs._losses import Losses
 from pamrs.channels import UNITS, channel_of
 from pamrs.findings import ChannelError, Findings, Trace
 from pamrs.report import figures
@@ -453,9 +455,21 @@ def render(diagnosis: Findings) -> str:
     str
         HTML text.
     """
-    recordings, hidden = _recordings(diagnosis)
+    losses = Losses()
+    pictures = {
+        name: _markup(losses.part(f"the picture of the {name}", partial(drawn, diagnosis)))
+        for name, drawn in _PICTURES.items()
+    }
+    tables = {
+        name: losses.part(f"the table of {name.replace('_', ' ')}", partial(made, diagnosis), [])
+        for name, made in _TABLES.items()
+    }
+    recordings, hidden = losses.part(
+        "the pictures of the recordings", partial(_recordings, diagnosis), ([], 0)
+    )
     bits = diagnosis.next_experiment.expected_information_bits
     shown = diagnosis.condition_map.block if diagnosis.condition_map else ""
+    warnings = [*losses.told, *diagnosis.warnings]
     return render_page(
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
@@ -466,43 +480,57 @@ def render(diagnosis: Findings) -> str:
         ),
         headline=_typeset(words.claim(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
-        facts=_facts(diagnosis),
-        warnings=(diagnosis.warnings[:WARNINGS_SHOWN], diagnosis.warnings[WARNINGS_SHOWN:]),
+        warnings=(warnings[:WARNINGS_SHOWN], warnings[WARNINGS_SHOWN:]),
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
-        intervals=_intervals(diagnosis),
         conditions=[condition.text for condition in diagnosis.where.conditions],
-        chain=_markup(chain_svg(diagnosis)),
-        free_run=_free_run(diagnosis),
-        free_notes=_free_notes(diagnosis),
-        blocks=_markup(figures.blocks_svg(diagnosis)),
-        map=_markup(figures.map_svg(diagnosis)),
         map_block=words.spoken_name(shown or diagnosis.where.block or ""),
-        probabilities=_probabilities(diagnosis),
-        effects=_effects(diagnosis),
-        verdicts=_blocks(diagnosis),
-        budget=_markup(figures.budget_svg(diagnosis)),
         budget_note=words.BUDGET_NOTE,
-        budgets=[
-            f"{words.spoken_name(block)}: {sentence}"
-            for block, sentence in words.budget_sentences(diagnosis)
-        ],
-        wrong=_wrong(diagnosis),
-        kept=[words.kept_details(u) for u in diagnosis.unexplained],
-        considered=[words.considered_sentence(asked) for asked in diagnosis.considered],
-        ambiguity=_sets(diagnosis),
-        tested=_tested(diagnosis),
         experiment=diagnosis.next_experiment.text,
-        excitation=_excitation(diagnosis),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
-        separating=_markup(_separating(diagnosis)),
-        ranking=_ranking(diagnosis),
-        pairs=_pairs(diagnosis),
-        fits=_fits(diagnosis),
         recordings=recordings,
         hidden=hidden,
-        parameters=_parameters(diagnosis),
         timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
         data=words.data_sentence(diagnosis),
         model=diagnosis.model,
+        **pictures,
+        **tables,
     )
+
+
+def _budgets(diagnosis: Findings) -> list[str]:
+    """What takes the mismatch of each block, in words."""
+    return [
+        f"{words.spoken_name(block)}: {sentence}"
+        for block, sentence in words.budget_sentences(diagnosis)
+    ]
+
+
+#: What the template calls each, and what makes it.
+_PICTURES: Final[dict[str, Callable[[Findings], str | None]]] = {
+    "chain": chain_svg,
+    "blocks": figures.blocks_svg,
+    "map": figures.map_svg,
+    "budget": figures.budget_svg,
+    "separating": _separating,
+}
+_TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
+    "facts": _facts,
+    "intervals": _intervals,
+    "free_run": _free_run,
+    "free_notes": _free_notes,
+    "probabilities": _probabilities,
+    "effects": _effects,
+    "verdicts": _blocks,
+    "budgets": _budgets,
+    "wrong": _wrong,
+    "kept": lambda diagnosis: [words.kept_details(u) for u in diagnosis.unexplained],
+    "considered": lambda d: [words.considered_sentence(asked) for asked in d.considered],
+    "ambiguity": _sets,
+    "tested": _tested,
+    "excitation": _excitation,
+    "ranking": _ranking,
+    "pairs": _pairs,
+    "fits": _fits,
+    "parameters": _parameters,
+}

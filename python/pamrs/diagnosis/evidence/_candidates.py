@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from typing import TypeVar
 
 from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
@@ -47,6 +48,9 @@ __all__ = [
     "start_of",
     "without_autocorrelation",
 ]
+
+
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,10 +283,7 @@ class Attempts:
         stiffest = self.settings.transients.least_step_share * self.inner.core.stable_step
         if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
             return None  # it would take too long
-        try:
-            return self._transient(effect, beside)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+        return self._tried((*beside.names, effect), lambda: self._transient(effect, beside))
 
     def _transient(self, effect: str, beside: Candidate) -> Candidate | None:
         white = self.white
@@ -415,15 +416,16 @@ class Attempts:
             return None  # it would replace what the model holds
         settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
         limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
-        try:
+
+        def found() -> Candidate:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit, share=share)
-            autocorrelation = self.autocorrelation(best)
-            if max(autocorrelation.values()) > self.settings.noise.correlated_variance:
+            weights = self.autocorrelation(best)
+            if max(weights.values()) > self.settings.noise.correlated_variance:
                 again = [self.start_of(best, effect) for effect in effects]
-                best = self._fit(again, autocorrelation, best, evaluations=limit, share=share)
+                best = self._fit(again, weights, best, evaluations=limit, share=share)
             return self.judged(effects, best)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+
+        return self._tried(effects, found)
 
     def fitted_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
@@ -435,11 +437,25 @@ class Attempts:
         if not self.held.isdisjoint(id_of(e) for e in effects):
             return None
         limit = self.settings.search.first_evaluations
-        try:
-            found = self._fit(starts, self.white, warm, wrong=wrong, evaluations=limit)
-            return replace(self.judged(effects, found), wrong=wrong)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+
+        def found() -> Candidate:
+            short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=limit)
+            return replace(self.judged(effects, short), wrong=wrong)
+
+        return self._tried((*effects, *wrong), found)
+
+    def _tried(self, names: Iterable[str], work: Callable[[], Found]) -> Found | None:
+        """What an attempt at a hypothesis gives; None where it leaves the range in which the model
+        holds, or fails.
+        """
+
+        def inside() -> Found | None:
+            try:
+                return work()
+            except SimulationError:
+                return None
+
+        return self.inner.losses.part(f"the hypothesis {' + '.join(names)}", inside)
 
     def _fit(
         self,
@@ -495,8 +511,9 @@ class Attempts:
         """The baseline with some parameters freed, a few steps from where they go alone: enough to
         see which of many are worth a whole fit.
         """
-        try:
-            found = fit(
+
+        def found() -> Candidate:
+            short = fit(
                 self.inner,
                 self.nominal,
                 (),
@@ -506,9 +523,9 @@ class Attempts:
                 freed=names,
                 evaluations=self.settings.wrong_parameters.first_evaluations,
             )
-            return replace(self.judged((), found), wrong=names)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+            return replace(self.judged((), short), wrong=names)
+
+        return self._tried(names, found)
 
     def freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
@@ -523,7 +540,7 @@ class Attempts:
         settings = self.settings
         least = settings.fit.final_step_share if share is None else share
 
-        def found(autocorrelation: dict[str, float], begun: Fit) -> Fit:
+        def fitted(autocorrelation: dict[str, float], begun: Fit) -> Fit:
             return fit(
                 self.inner,
                 self.nominal,
@@ -536,17 +553,20 @@ class Attempts:
                 share=least,
             )
 
+        def found(alone: bool) -> Candidate:
+            first = fitted(self.white, self._moved_alone(names) if alone else baseline)
+            autocorrelation = self.autocorrelation(first)
+            correlated = max(autocorrelation.values()) > settings.noise.correlated_variance
+            judged = self.judged((), fitted(autocorrelation, first) if correlated else first)
+            return replace(judged, wrong=names)
+
         best: Candidate | None = None
         for alone in (True, False):
-            try:
-                first = found(self.white, self._moved_alone(names) if alone else baseline)
-                autocorrelation = self.autocorrelation(first)
-                correlated = max(autocorrelation.values()) > settings.noise.correlated_variance
-                judged = self.judged((), found(autocorrelation, first) if correlated else first)
-            except SimulationError:
-                continue  # it leaves the range in which the model holds
+            judged = self._tried(names, partial(found, alone))
+            if judged is None:
+                continue
             if best is None or judged.misfit < best.misfit:
-                best = replace(judged, wrong=names)
+                best = judged
             if not any(significant(e) for e in best.fitted.values()):
                 break
         return best
@@ -560,11 +580,12 @@ class Attempts:
         """
         if not wrong:
             return self.fitted(starts, warm, self.white)
-        try:
-            found = self._gone_on(starts, warm, wrong, self.settings.fit.effect_evaluations)
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
-        return found if found.is_wrong(self.settings.fit.most_tolerances) else None
+        limit = self.settings.fit.effect_evaluations
+        names = (*(start.effect for start in starts), *wrong)
+        found = self._tried(names, lambda: self._gone_on(starts, warm, wrong, limit))
+        if found is None or not found.is_wrong(self.settings.fit.most_tolerances):
+            return None
+        return found
 
     def without(self, larger: Candidate, needless: str) -> Candidate | None:
         """A set of persistent effects and wrong parameters without one of its terms, fitted to its
@@ -572,13 +593,18 @@ class Attempts:
         """
         starts = [self.start_of(larger.fit, e) for e in larger.effects if e != needless]
         wrong = tuple(name for name in larger.wrong if name != needless)
+        return self._to_its_end(starts, larger.fit, wrong)
+
+    def _to_its_end(
+        self, starts: list[Start], warm: Fit, wrong: tuple[str, ...]
+    ) -> Candidate | None:
+        """Effects fitted to the end from a fit, with some parameters freed; None where that cannot
+        be run.
+        """
         settings = self.settings.fit
-        try:
-            return self._gone_on(
-                starts, larger.fit, wrong, settings.polish_evaluations, settings.final_step_share
-            )
-        except SimulationError:
-            return None  # it leaves the range in which the model holds
+        limit, share = settings.polish_evaluations, settings.final_step_share
+        names = (*(start.effect for start in starts), *wrong)
+        return self._tried(names, lambda: self._gone_on(starts, warm, wrong, limit, share))
 
     def _gone_on(
         self,
@@ -622,10 +648,10 @@ class Attempts:
             | {n: c.fit.values[n] for c in candidates for n in c.wrong},
         )
         share = self.settings.fit.final_step_share
-        try:
-            return self._fit(starts, self.white, warm, wrong=wrong, share=share)
-        except SimulationError:
-            return None
+        names = (*(start.effect for start in starts), *wrong)
+        return self._tried(
+            names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=share)
+        )
 
     def polished(self, candidate: Candidate) -> Candidate:
         """A fitted set of persistent effects, fitted to its end.
@@ -636,17 +662,9 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        settings = self.settings.fit
         starts = [self.start_of(found, effect) for effect in candidate.effects]
-        try:
-            polished = self._gone_on(
-                starts,
-                found,
-                candidate.wrong,
-                settings.polish_evaluations,
-                settings.final_step_share,
-            )
-        except SimulationError:
+        polished = self._to_its_end(starts, found, candidate.wrong)
+        if polished is None:
             return candidate
         return replace(polished, gain=candidate.gain, forms_tried=candidate.forms_tried)
 

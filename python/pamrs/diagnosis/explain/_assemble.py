@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,8 @@ from pamrs.findings import (
     EffectFound,
     EffectParameterFound,
     FitErrors,
+    FreeRun,
+    NextExperiment,
     ParameterFound,
     StageError,
     Tested,
@@ -98,12 +101,15 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
     fit_found = models.residuals(fitted)
     out_found = fit_found if held is fitted else models.residuals(held)
-    located = _located(judged, settings)
+    located, part = _located(judged, settings), fitted.losses.part
     picture = Picture()
     if located is not None:
         block = next(b for b in fitted.blocks if b.name == located)
-        picture = describe(
-            block, fitted.recordings, nominal, fit_found["refit"], fit_found["after"], noise_level
+        compared = fit_found["refit"], fit_found["after"]
+        picture = part(
+            "the conditions of the mismatch",
+            lambda: describe(block, fitted.recordings, nominal, *compared, noise_level),
+            picture,
         )
     fit_table = _table(fitted, fit_found, noise_level)
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
@@ -114,10 +120,13 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(table, settings.verdict.least_gap) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
-    terms = budget(judged, held, out_found, noise_level, nominal, models.final, models.events)
+    budgeted = partial(budget, judged, held, out_found, noise_level, nominal)
+    terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
-    runs, runs_note = free_run(held, out_found, nominal, models.final, models.events)
+    running = partial(free_run, held, out_found, nominal, models.final, models.events)
+    nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
+    runs, runs_note = part("the free run", running, nothing)
     effects = _effects(judged, verdict, fitted)
     constants = said_of_constants(runs or [], [effect.id for effect in effects], settings.warnings)
     diagnosis = Diagnosis(
@@ -129,14 +138,18 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         probabilities=probabilities,
         parameters=_parameters(nominal, known, owners, settings.fit),
         fit=FitErrors(fit_table, held_table, gap),
-        next_experiment=next_experiment(
-            verdict,
-            ambiguity,
-            _hypotheses(judged, probabilities, nominal, fitted),
-            nominal,
-            judged,
-            fitted,
-            held,
+        next_experiment=part(
+            "the next experiment",
+            lambda: next_experiment(
+                verdict,
+                ambiguity,
+                _hypotheses(judged, probabilities, nominal, fitted),
+                nominal,
+                judged,
+                fitted,
+                held,
+            ),
+            NextExperiment(""),
         ),
         warnings=constants + _warnings(case, models, table, settings, same=held is fitted),
         rig=models.final
@@ -151,8 +164,10 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
-        considered=_considered(judged, settings.evidence, fitted),
-        tested=_tested(groups, settings.evidence),
+        considered=part(
+            "what was asked for", lambda: _considered(judged, settings.evidence, fitted), []
+        ),
+        tested=part("the list of what was tested", lambda: _tested(groups, settings.evidence), []),
         free_run=runs,
         free_run_note=runs_note,
         settings=settings,

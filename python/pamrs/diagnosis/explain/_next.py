@@ -286,7 +286,12 @@ def next_experiment(
             DiagnosisError, ParameterError, SimulationError
         ):  # a rig that no experiment of the library suits
             simulated = propose(
-                nominal, hypotheses, asked.noise, recordings, settings=fitted.settings
+                nominal,
+                hypotheses,
+                asked.noise,
+                recordings,
+                settings=fitted.settings,
+                losses=fitted.losses,
             )
     if simulated is not None and not simulated.excitation:
         simulated = None  # of what is open one has a model

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._losses import Losses
 from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
 from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
@@ -63,7 +64,7 @@ def _logarithmic(name: str) -> bool:
     return id_of(term) + dot + short in LOGARITHMIC
 
 
-class Stopped(Exception):
+class Stopped(BaseException):
     """Nobody waits for this work any more."""
 
 
@@ -85,6 +86,8 @@ class Problem:
         Set by whoever wants no more of it: the next evaluation raises `Stopped`.
     considered : tuple of tuple of str, optional
         Sets of names (effects, parameters that may be wrong) that the caller asks for.
+    losses : Losses, optional
+        What failed and was left out.
     """
 
     blocks: list[Block]
@@ -93,6 +96,7 @@ class Problem:
     settings: DiagnosisSettings
     stopped: Event = field(default_factory=Event)
     considered: tuple[tuple[str, ...], ...] = ()
+    losses: Losses = field(default_factory=Losses)
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,16 @@ distances of all pairs say how much of the present uncertainty the experiment re
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._losses import Losses
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.next_experiment._chains import chains_of, is_sealed
@@ -284,6 +285,7 @@ def propose(
     channels: tuple[str, ...] | None = None,
     experiments: Sequence[Experiment] | None = None,
     settings: DiagnosisSettings | None = None,
+    losses: Losses | None = None,
 ) -> NextExperiment:
     """The experiment that tells most about which hypothesis holds.
 
@@ -308,6 +310,8 @@ def propose(
         To choose from; the library's by default.
     settings : DiagnosisSettings, optional
         How experiments are compared; the published ones by default.
+    losses : Losses, optional
+        Told of an experiment that fails, which is then left out; raised by default.
 
     Returns
     -------
@@ -350,21 +354,27 @@ def propose(
         pool = experiments_of(nominal, records, own_settings)
     found: list[Outcome] = []
     known: dict[Experiment, list[Simulation] | None] = {}
+
+    def outcome(experiment: Experiment, sensor: str) -> Outcome | None:
+        if experiment not in known:
+            known[experiment] = None  # where it fails, it is not tried again
+            known[experiment] = _simulated(experiment, chosen)
+        runs = known[experiment]
+        if runs is None:
+            return None
+        try:
+            return outcome_of(experiment, chosen, sound, own, settings, sensor, runs, ranking=True)
+        except (SimulationError, DiagnosisError):
+            return None  # it cannot be run there, or nothing is measured on both sides of a block
+
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
             enough = len(found) >= own_settings.most_shown
             if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
                 break  # what is left costs more and cannot tell more
-            if experiment not in known:
-                known[experiment] = _simulated(experiment, chosen)
-            runs = known[experiment]
-            if runs is None:
-                continue
-            # a hypothesis cannot be run there, or nothing is measured on both sides of a block
-            with contextlib.suppress(SimulationError, DiagnosisError):
-                found.append(
-                    outcome_of(experiment, chosen, sound, own, settings, sensor, runs, ranking=True)
-                )
+            one = partial(outcome, experiment, sensor)
+            told = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
+            found += [] if told is None else [told]
     if not found:
         raise DiagnosisError(
             f"no experiment of rig {nominal.name!r} can be simulated with all of "

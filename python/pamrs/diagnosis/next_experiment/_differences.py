@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._normal import solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels
@@ -371,7 +372,7 @@ def _left(
             keys.append(key)
     stacked, jacobian = np.concatenate(rows), np.concatenate(slopes)
     with np.errstate(over="ignore", invalid="ignore"):
-        moved = np.linalg.solve(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
+        moved = solve_normal(jacobian.T @ jacobian + np.eye(spread.size), jacobian.T @ stacked)
         left = stacked - jacobian @ moved
     if not np.isfinite(left).all():
         raise SimulationError("a model of the recordings leaves the range of its numbers")

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._normal import solve_normal
 from pamrs.diagnosis.fit import (
     Key,
     Problem,
@@ -501,7 +502,7 @@ def _picture(
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
     shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
     total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
-    freed = np.linalg.solve(total.baseline + np.eye(len(total.baseline)), total.mixed)
+    freed = solve_normal(total.baseline + np.eye(len(total.baseline)), total.mixed)
     gram = total.signatures - total.mixed.T @ freed
     sizes = {
         key: np.sqrt(

@@ -16,6 +16,7 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._normal import solve_normal
 from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import exclude
@@ -80,9 +81,9 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
     chosen: list[str] = []
     for threshold in (least, max(least, partner * float(products[0, 0]))):
         normal = products[np.ix_(base, base)] + np.diag(prior)
-        normal += 1e-9 * np.diag(np.diag(normal)) + 1e-12 * np.eye(len(base))
+        normal += 1e-9 * np.diag(np.diag(normal))
         shared = products[np.ix_(base, columns)]
-        solved = np.linalg.solve(normal, shared)
+        solved = solve_normal(normal, shared)
         powers = products[columns, columns] - np.sum(shared * solved, axis=0)
         alongs = products[0, columns] - (products[base, 0] + pull) @ solved
         gains = [

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
+from pamrs._normal import solve_normal
 from pamrs.channels import channel_of
 from pamrs.diagnosis.fit import (
     Fit,
@@ -216,12 +217,12 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     keep = values > 1e-10 * max(float(values[-1]), 1e-300)
     u = scaled @ vectors[:, keep] / np.sqrt(values[keep])
     inner = (vectors[:, keep] * np.sqrt(values[keep])).T
-    normal = inner.T @ inner + np.diag(free) + 1e-12 * np.eye(free.size)
-    shrunk = inner @ np.linalg.solve(normal, inner.T)
+    normal = inner.T @ inner + np.diag(free)
+    shrunk = inner @ solve_normal(normal, inner.T)
     weights, turn = np.linalg.eigh(0.5 * (shrunk + shrunk.T))
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
     moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
-    pull = u @ (inner @ np.linalg.solve(normal, moved))
+    pull = u @ (inner @ solve_normal(normal, moved))
     return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 
 
@@ -349,18 +350,26 @@ class _Looking:
 
     def _look(self, start: Start) -> tuple[Signature, Score | None] | None:
         """The signature of a start and its score; None where the model cannot be run so."""
-        fitted = self.fitted
-        try:
-            rig = start.applied(fitted.rig)
-            known = self._known(start)
-            found = changes(self.problem, rig, fitted.residuals, start.effect, known)
-        except SimulationError:
-            return None  # this size leaves the range in which the model holds
+        what = f"the signature of {start.effect}"
+        found = self.problem.losses.part(what, lambda: self._changes(start))
+        if found is None:
+            return None
         if not place_of(start.effect):
             self.seen[_values(start)] = found
         rows, _ = stacked(self.problem, found, self.inflation)
         entry = (start.effect, start, rows - self.stand.rows)
         return entry, next(iter(Screen(self.stand, [entry], self.settings).scores()), None)
+
+    def _changes(self, start: Start) -> dict[Key, Residual] | None:
+        """Residuals with an effect at the size of a start; None where that leaves the range in
+        which the model holds.
+        """
+        fitted, known = self.fitted, self._known(start)
+        try:
+            rig = start.applied(fitted.rig)
+            return changes(self.problem, rig, fitted.residuals, start.effect, known)
+        except SimulationError:
+            return None
 
     def _known(self, start: Start) -> dict[Key, Residual]:
         """What is known of an effect at one place: in a block in which it acts at no other one, it

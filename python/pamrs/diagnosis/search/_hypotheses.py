@@ -100,16 +100,33 @@ def examine(
         Blocks that share parameters, part by part.
     say : callable
         Receives progress.
+
+    Returns
+    -------
+    list of Group
+        Without the blocks of a part whose judgement failed, which the losses of `fitted` tell.
     """
+    losses, through = fitted.losses, (SimulationError,)
 
-    def begin(blocks: list[Block]) -> _Mismatch | Group:
-        return _begun_with(fitted, held, nominal, blocks, say)
+    def begin(blocks: list[Block]) -> _Mismatch | Group | None:
+        what = f"the judgement of {' and '.join(b.name for b in blocks)}"
+        work = partial(_begun_with, fitted, held, nominal, blocks, say)
+        return losses.part(what, work, through=through)
 
-    def end(part: _Mismatch | Group) -> list[Group]:
-        if isinstance(part, Group):
-            return [part]
-        others = [p for p in begun if p is not part and not isinstance(p, Group)]
-        return part.beside([start for p in others for start in p.leading]).groups(say)
+    def end(part: _Mismatch | Group | None) -> list[Group]:
+        if part is None or isinstance(part, Group):
+            return [part] if part else []
+        others = [p for p in begun if isinstance(p, _Mismatch) and p is not part]
+        starts = [start for p in others for start in p.leading]
+        names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
+        beside = losses.part(
+            f"what other blocks name, tried in {names},",
+            lambda: part.beside(starts),
+            part,
+            through=through,
+        )
+        what = f"the judgement of {names}"
+        return losses.part(what, lambda: beside.groups(say), [], through=through)
 
     # two processors are kept busy by recordings and parts; threads of the linear algebra would only
     # wait for each other
@@ -261,7 +278,11 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     blocks = refit.trial.inner.blocks
     persistent = [e for e in _acting(refit.trial, blocks) if info_of(e).lasting]
     trial = replace(refit.trial, suspects=blocks)
-    return beside_quiet(trial, below_noise(trial, nothing, persistent, say) or nothing, tell)
+    part = trial.inner.losses.part
+    below = part("the search below the noise", lambda: below_noise(trial, nothing, persistent, say))
+    quiet = below or nothing
+    what = "the search for a value at the end of its range"
+    return part(what, lambda: beside_quiet(trial, quiet, tell), quiet)
 
 
 def _explained(refit: _Refit, tell: Say) -> _Mismatch:
@@ -278,7 +299,10 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
     # events of free times would always mend a noise level that was estimated too low
     transient = [] if marginal else [e for e in acting if e in EFFECTS and EFFECTS[e].transient]
     persistent = [e for e in acting if info_of(e).lasting]
-    mistaken = freed(trial, start.fit, refit.first, tell)
+    part = trial.inner.losses.part
+    mistaken = part(
+        "the search for wrong values", lambda: freed(trial, start.fit, refit.first, tell), []
+    )
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
     strong = far_above_noise(trial, start)
@@ -370,16 +394,23 @@ class _Mismatch:
             none, unlisted = settings.marginal_probability, weighed["unlisted"]
             weighed |= {"": none * unlisted, "unlisted": (1.0 - none) * unlisted}
         now = refit.start.fitted[self.block.name]
+        part, least = refit.trial.inner.losses.part, settings.least_gain
+        shares: dict[str, float] = {}
+        resampled = partial(
+            inclusion, self.screened, least, settings.partner_share, refit.trial.settings
+        )
         group = replace(
             refit.group(self.candidates, weighed, self.block),
-            inclusion=inclusion(
-                self.screened, settings.least_gain, settings.partner_share, refit.trial.settings
-            ),
+            inclusion=part("the screen of resampled recordings", resampled, shares),
             predicted_gain=_predicted_gain(self.screened, now, settings.marginal_excess),
         )
-        unlisted = weighed["unlisted"] > settings.split_from
-        parts = _apart(group, refit.trial, self.terms) if unlisted else []
-        return parts or [_with_form(group, refit, say, self.tell)]
+        if weighed["unlisted"] > settings.split_from:
+            what = "the division of the blocks by their names"
+            parts = part(what, lambda: _apart(group, refit.trial, self.terms), [])
+            if parts:
+                return parts
+        what = "the search for a form of what is missing"
+        return [part(what, lambda: _with_form(group, refit, say, self.tell), group)]
 
 
 @dataclass(frozen=True)
@@ -443,7 +474,9 @@ def _hypotheses(
         settings=trial.settings,
     )
     singles = _singles(trial, screened, start.fit, alone, tell)
-    singles = _with_same_data(trial, start, singles, terms.seconds)
+    part = trial.inner.losses.part
+    what = "the effects that are the same data as others"
+    singles = part(what, lambda: _with_same_data(trial, start, singles, terms.seconds), singles)
     value = max(mistaken, key=alone, default=None)
     leads = value is not None and all(alone(c) <= alone(value) for c in singles)
     weight = partial(alone, value=value if leads else None)
@@ -453,10 +486,15 @@ def _hypotheses(
         singles = _one_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=left_everywhere)
-        sets = [s for c in _alike(lasting, alone, trial) for s in beside_wrong(trial, c, tell)]
+
+        def more() -> list[Candidate]:
+            near = _alike(lasting, alone, trial)
+            return [s for c in near for s in beside_wrong(trial, c, tell)]
     else:
-        sets = several(trial, screened, start, singles, mistaken, transient, weight, tell)
-    asked = considered(trial, screened, start, weight, tell)
+        more = partial(several, trial, screened, start, singles, mistaken, transient, weight, tell)
+    sets = part("the search for sets of names", more, [])
+    what = "what was asked for"
+    asked = part(what, lambda: considered(trial, screened, start, weight, tell), [])
     return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
 
 
@@ -494,15 +532,22 @@ def _weighed(
         close and not explains(close[0], start, trial.compared, settings.evidence)
     ):
         tell("fitting to the end " + ", ".join(c.key for c in close))
-        ended = [
-            trial.polished(in_best_forms(trial, screened, c, tell)) if c in close else c
-            for c in candidates
-        ]
+
+        def best(candidate: Candidate) -> Candidate:
+            what = f"the search for the best form of {candidate.key}"
+            work = partial(in_best_forms, trial, screened, candidate, tell)
+            return trial.polished(trial.inner.losses.part(what, work, candidate))
+
+        ended = [best(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in ended if c.is_wrong(settings.fit.most_tolerances)]
         found = weights(candidates)
         sets = [c for c in candidates if _odds(found, c) > settings.search.polish_from]
-        parts = without_needless(trial, candidates, sets, tell)
+        parts = trial.inner.losses.part(
+            "the search for terms that are not needed",
+            lambda: without_needless(trial, candidates, sets, tell),
+            [],
+        )
         if parts:
             kept = {frozenset(c.names) for c in parts}
             candidates = [*(c for c in candidates if frozenset(c.names) not in kept), *parts]

@@ -1,0 +1,103 @@
+"""A part of some work that fails costs that part alone, and is told.
+
+Errors that the work expects are handled where they arise; here is what nobody expected: a mistake
+of the program, a matrix that cannot be inverted, memory that is not there. Under a test
+(``PAMRS_STRICT`` in the environment, which ``tests/conftest.py`` sets) it is raised as it is, so
+that a mistake cannot hide in a warning.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+from typing import Final, TypeVar, overload
+
+__all__ = ["STRICT", "Losses", "reason"]
+
+STRICT: Final = "PAMRS_STRICT"
+"""Variable of the environment under which nothing is left out: what fails is raised."""
+
+Found = TypeVar("Found")
+Instead = TypeVar("Instead")
+
+
+def reason(error: BaseException) -> str:
+    """Kind and message of an error on one line."""
+    message = " ".join(str(error).split())
+    kind = type(error).__name__
+    return f"{kind}: {message[:300]}" if message else kind
+
+
+class Losses:
+    """What failed and was left out; threads may share one.
+
+    Attributes
+    ----------
+    told : list of str
+        A sentence for each, in the order in which they failed.
+    """
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+        self._lock = threading.Lock()
+
+    @overload
+    def part(
+        self,
+        what: str,
+        work: Callable[[], Found],
+        instead: None = None,
+        *,
+        through: tuple[type[Exception], ...] = (),
+    ) -> Found | None: ...
+
+    @overload
+    def part(
+        self,
+        what: str,
+        work: Callable[[], Found],
+        instead: Instead,
+        *,
+        through: tuple[type[Exception], ...] = (),
+    ) -> Found | Instead: ...
+
+    def part(
+        self,
+        what: str,
+        work: Callable[[], Found],
+        instead: Instead | None = None,
+        *,
+        through: tuple[type[Exception], ...] = (),
+    ) -> Found | Instead | None:
+        """What some work gives, or something in its place where it fails.
+
+        Parameters
+        ----------
+        what : str
+            The work, as the sentence that tells of its loss names it.
+        work : callable
+            Does it.
+        instead : object, optional
+            Given where it fails.
+        through : tuple of type, optional
+            Errors that are no loss of a part: they are raised.
+
+        Returns
+        -------
+        object
+        """
+        try:
+            return work()
+        except Exception as error:
+            if os.environ.get(STRICT) or isinstance(error, through):
+                raise
+            self.add(what, error)
+            return instead
+
+    def add(self, what: str, error: BaseException) -> None:
+        """Tell of something that failed."""
+        text = f"{what} failed and was left out ({reason(error)}); please report it"
+        with self._lock:
+            if text not in self.told:
+                self.told.append(text)

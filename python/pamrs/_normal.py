@@ -1,0 +1,42 @@
+"""Normal equations that can be solved whatever scales their unknowns have."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["solve_normal"]
+
+Array = NDArray[np.float64]
+
+_RIDGE: Final = 1e-12
+"""What is added to the diagonal, as a part of it: more than the rounding of the sums, far less than
+anything that data tell."""
+
+
+def solve_normal(normal: Array, right: Array) -> Array:
+    """Solution of normal equations, also where they are singular.
+
+    Each unknown is measured by its own entry of the diagonal, and the ridge is a part of that: an
+    absolute one is lost beside large entries and bends small ones.
+
+    Parameters
+    ----------
+    normal : (n, n) array
+        Symmetric, with no negative direction but by rounding.
+    right : (n,) or (n, m) array
+        Right-hand side.
+
+    Returns
+    -------
+    (n,) or (n, m) array
+        An unknown that the equations do not see is zero.
+    """
+    size = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    size[~(size > 0.0)] = 1.0
+    scaled = normal / size / size[:, None]
+    scaled[np.diag_indices_from(scaled)] += _RIDGE * len(size)
+    rows = (slice(None), *([None] * (right.ndim - 1)))
+    return np.asarray(np.linalg.solve(scaled, right / size[rows]) / size[rows])

@@ -1,0 +1,199 @@
+"""What fails in a diagnosis costs that part alone, and is told; under a test it is raised."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import pamrs
+from pamrs._losses import STRICT, Losses
+from pamrs._normal import solve_normal
+from pamrs.diagnosis.evidence import _candidates
+from pamrs.diagnosis.explain import _assemble
+from pamrs.diagnosis.next_experiment import _choice
+from pamrs.diagnosis.result import schema
+from pamrs.diagnosis.search import _hypotheses
+from pamrs.errors import DiagnosisError
+from pamrs.recordings import Recording
+from pamrs.report import html
+from tests.diagnosis.synthetic import diagnosis
+
+Array = NDArray[np.float64]
+
+
+def broken(*_: object, **__: object) -> Any:
+    raise np.linalg.LinAlgError("Singular matrix")
+
+
+@pytest.fixture
+def lenient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As where a user runs it."""
+    monkeypatch.delenv(STRICT)
+
+
+def recording(channels: dict[str, Array], time: Array) -> Recording:
+    step = float(time[1] - time[0])
+    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
+    return Recording("run", "fit", time, step, channels, mask, [], {})
+
+
+def leaking() -> pamrs.Case:
+    """A chamber with a leak, 120 s at 10 Hz."""
+    rig = pamrs.rigs.sealed_chamber()
+    truth = rig.with_effect("leak_muscle", {"conductance": 3e-11})
+    run = pamrs.simulate(
+        truth, duration=120.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
+    )
+    pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
+    return pamrs.Case("hold", rig, [recording({"muscle_pressure": pressure}, run.time)], Path())
+
+
+def shoulder() -> pamrs.Case:
+    """A run of the nominal shoulder, 4 s at 200 Hz."""
+    time = 0.005 * np.arange(800)
+    command = 5.0 + 0.45 * np.sin(1.6 * time) + 0.25 * np.sin(4.1 * time)
+    rig, start = pamrs.rigs.shoulder(), {"muscle_pressure": 2e5, "joint_angle": 0.9}
+    run = pamrs.simulate(rig, command, sample_time=0.005, initial=start)
+    rng = np.random.default_rng(5)
+    noise = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
+    channels = {c: run[c] + rng.normal(0.0, s, time.size) for c, s in noise.items()}
+    return pamrs.Case("run", rig, [recording({"valve_command": command} | channels, time)], Path())
+
+
+def told(found: pamrs.Diagnosis) -> list[str]:
+    return [w for w in found.warnings if "LinAlgError: Singular matrix" in w]
+
+
+@pytest.mark.usefixtures("lenient")
+def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = _candidates.fit
+
+    def fit(problem: Any, nominal: Any, effects: Any, *rest: Any, **options: Any) -> Any:
+        return (broken if "heat_transfer" in effects else right)(
+            problem, nominal, effects, *rest, **options
+        )
+
+    monkeypatch.setattr(_candidates, "fit", fit)
+    found = pamrs.diagnose(leaking())
+    assert found.effects[0].id == "leak_muscle"
+    assert found.warnings[0] == told(found)[0]
+    assert "heat_transfer" in found.warnings[0]
+    jsonschema.validate(json.loads(found.to_json()), schema())
+
+
+@pytest.mark.usefixtures("lenient")
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        (_hypotheses, "freed"),
+        (_hypotheses, "inclusion"),
+        (_hypotheses, "beside_wrong"),
+        (_hypotheses, "considered"),
+        (_assemble, "describe"),
+        (_assemble, "budget"),
+        (_assemble, "free_run"),
+        (_assemble, "next_experiment"),
+    ],
+)
+def test_a_step_that_fails_costs_itself(
+    module: Any, name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(module, name, broken)
+    found = pamrs.diagnose(leaking())
+    assert found.effects[0].id == "leak_muscle"
+    assert len(told(found)) == 1
+    found.report(tmp_path / "page.html")
+    found.figure(tmp_path / "picture.png")
+    assert "Singular matrix" in (tmp_path / "page.html").read_text(encoding="utf-8")
+    jsonschema.validate(json.loads(found.to_json()), schema())
+
+
+@pytest.mark.usefixtures("lenient")
+def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
+    right = _hypotheses._begun_with
+
+    def begun(fitted: Any, held: Any, nominal: Any, blocks: Any, say: Any) -> Any:
+        work = right if blocks[0].mechanical else broken
+        return work(fitted, held, nominal, blocks, say)
+
+    monkeypatch.setattr(_hypotheses, "_begun_with", begun)
+    found = pamrs.diagnose(shoulder())
+    assert [b for entry in found.blocks for b in entry.blocks] == ["arm"]
+    assert found.warnings[0].startswith("the judgement of supply and chamber failed")
+    monkeypatch.setattr(_hypotheses, "_begun_with", broken)
+    with pytest.raises(DiagnosisError, match="Singular matrix"):
+        pamrs.diagnose(leaking())
+
+
+def test_an_experiment_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(STRICT)
+    rig = pamrs.rigs.sealed_chamber()
+    leak = rig.with_effect("leak_muscle", {"conductance": 1e-13})
+    sets = [("none", rig, 0.5), ("leak_muscle", leak, 0.5)]
+    right, failed = _choice._simulated, []
+
+    def simulated(experiment: Any, hypotheses: Any) -> Any:
+        if not failed:
+            failed.append(experiment.name)
+            broken()
+        return right(experiment, hypotheses)
+
+    monkeypatch.setattr(_choice, "_simulated", simulated)
+    losses = Losses()
+    found = _choice.propose(rig, sets, losses=losses)
+    assert found.ranking
+    assert failed[0] not in [entry.name for entry in found.ranking]
+    assert len(losses.told) == 1
+    failed.clear()
+    with pytest.raises(np.linalg.LinAlgError):
+        _choice.propose(rig, sets)
+
+
+@pytest.mark.usefixtures("lenient")
+@pytest.mark.parametrize("part", ["chain", "map", "facts", "free_run"])
+def test_a_part_of_a_page_that_fails_costs_itself(
+    part: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    place = html._PICTURES if part in html._PICTURES else html._TABLES
+    monkeypatch.setitem(place, part, broken)
+    page = html.render(diagnosis())
+    assert f"{part.replace('_', ' ')} failed and was left out" in page
+    assert "</html>" in page
+
+
+def test_under_a_test_it_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
+    with pytest.raises(np.linalg.LinAlgError):
+        Losses().part("this", broken)
+    monkeypatch.setattr(_assemble, "budget", broken)
+    with pytest.raises(np.linalg.LinAlgError):
+        pamrs.diagnose(leaking())
+
+
+def test_an_interrupt_is_no_loss(lenient: None) -> None:
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    losses = Losses()
+    with pytest.raises(KeyboardInterrupt):
+        losses.part("this", interrupted)
+    assert losses.told == []
+
+
+@pytest.mark.parametrize("scale", [1e-20, 1.0, 1e20])
+@pytest.mark.parametrize("columns", [(0, 0), (0, 1, 1), (0, 1, 2)])
+def test_normal_equations_of_any_scale_are_solved(scale: float, columns: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(0)
+    rows = scale * rng.normal(size=(30, 3))[:, columns] * np.logspace(0, -12, len(columns))
+    values = rows @ np.ones(len(columns))
+    found = solve_normal(rows.T @ rows, rows.T @ values)
+    assert np.linalg.norm(rows @ found - values) < 1e-6 * np.linalg.norm(values)
+
+
+def test_an_unknown_that_is_not_seen_is_zero() -> None:
+    assert solve_normal(np.diag([2.0, 0.0]), np.array([1.0, 0.0])).tolist()[1] == 0.0
