@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import io
 import os
+import re
 import stat
 import tomllib
 from pathlib import Path
@@ -20,6 +21,8 @@ __all__ = [
     "parse_toml",
     "read_file",
     "read_toml",
+    "resolved",
+    "shown",
 ]
 
 MOST_BYTES: Final = 512 << 20
@@ -118,7 +121,7 @@ def read_toml(path: Path) -> str:
     UnicodeDecodeError
         If it is no text in UTF-8.
     """
-    return read_file(path, most=MOST_TOML_BYTES).decode("utf-8").replace("\r\n", "\n")
+    return read_file(path, most=MOST_TOML_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
 
 
 def parse_toml(text: str) -> dict[str, Any]:
@@ -139,21 +142,86 @@ def parse_toml(text: str) -> dict[str, Any]:
         If it is not TOML, or is nested deeper than :data:`MOST_DEPTH`.
     """
     deep = f"nested more than {MOST_DEPTH} deep, and at most that is allowed"
+    if _DOTTED.search(text):  # before it is parsed, which takes the square of the depth
+        raise tomllib.TOMLDecodeError(deep)
     try:
         document = tomllib.loads(text)
     except RecursionError as error:
         raise tomllib.TOMLDecodeError(deep) from error
+    except ValueError as error:  # a number of more digits than Python reads, too
+        raise tomllib.TOMLDecodeError(str(error)) from error
     inside: list[Any] = [document]
     for _ in range(MOST_DEPTH + 1):
-        inside = [
+        parts = [
             part
             for value in inside
             for part in (value.values() if isinstance(value, dict) else value)
-            if isinstance(part, (dict, list))
         ]
+        for part in parts:
+            if isinstance(part, int) and not -(2**63) <= part < 2**63:
+                raise tomllib.TOMLDecodeError(
+                    f"a whole number of {len(str(abs(part)))} digits is not allowed: it must fit "
+                    "into 64 bits"
+                )
+        inside = [part for part in parts if isinstance(part, (dict, list))]
         if not inside:
             return document
     raise tomllib.TOMLDecodeError(deep)
+
+
+_DOTTED: Final = re.compile(
+    rf"""(?<![\w"'-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{MOST_DEPTH + 1}}}"""
+)
+"""A key of more parts than tables may be nested."""
+
+
+_SHOWN: Final = {
+    code: f"\\x{code:02x}" if code < 256 else f"\\u{code:04x}"  # noqa: PLR2004
+    for code in (*range(32), 127, *range(128, 160), 0x61C, *range(0x200B, 0x2010),
+                 *range(0x2028, 0x202F), *range(0x2066, 0x206A), 0xFEFF)
+} | {9: "\\t", 10: "\\n", 13: "\\r"}  # fmt: skip
+
+
+def shown(text: str, *, lines: bool = False) -> str:
+    r"""Text of which what a terminal would obey (its escapes, returns, marks of direction) is shown
+    instead: a name in a file must not be able to write over what is said of it.
+
+    Parameters
+    ----------
+    text : str
+        The text.
+    lines : bool, optional
+        Whether it may have several lines and tabs.
+
+    Returns
+    -------
+    str
+
+    Examples
+    --------
+    >>> print(shown("a\x1b[2J\nb"))
+    a\x1b[2J\nb
+    """
+    if lines:
+        text = text.replace("\r\n", "\n")
+    kept = {code: told for code, told in _SHOWN.items() if not lines or code not in (9, 10)}
+    return text.translate(kept)
+
+
+def resolved(path: str | os.PathLike[str]) -> Path:
+    """A path with its links followed as far as they lead: one in a circle stays as it is, and what
+    opens it says so.
+
+    Parameters
+    ----------
+    path : path-like
+        It need not be there.
+
+    Returns
+    -------
+    Path
+    """
+    return Path(os.path.realpath(path))
 
 
 def is_inside(folder: Path, path: Path) -> bool:
@@ -168,7 +236,7 @@ def is_inside(folder: Path, path: Path) -> bool:
     -------
     bool
     """
-    return path.resolve().is_relative_to(folder.resolve())
+    return resolved(path).is_relative_to(resolved(folder))
 
 
 def found_outside(folder: Path, path: Path) -> Path | None:

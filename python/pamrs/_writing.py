@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import secrets
+import stat
 import tempfile
 from collections.abc import Iterable
 from pathlib import Path
@@ -16,13 +19,9 @@ _ROOM: Final = 1 << 20
 """Bytes that must fit where a file is to be written: a result with its page and pictures."""
 
 
-_UMASK = os.umask(0)  # it can only be read by setting it: once, at import
-os.umask(_UMASK)
-
-
 def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path:
     """Write `content` to a temporary file beside `path`, then rename: readers never see half a
-    file.
+    file. A new file has the mode that the process gives to files, one that was there keeps its own.
     """
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content
@@ -31,16 +30,17 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     ):  # a pipe or a terminal: nothing there to keep whole
         Path(path).write_bytes(data)
         return Path(path)
-    handle, temporary = tempfile.mkstemp(
-        dir=target.parent, prefix=f".{target.name}.", suffix=".tmp"
-    )
+    temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}.tmp")
+    # made as any file is, so that the system takes off what the user's mask says
+    handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     try:
         with os.fdopen(handle, "wb") as stream:
             stream.write(data)
-        os.chmod(temporary, 0o666 & ~_UMASK)
+        with contextlib.suppress(FileNotFoundError):
+            os.chmod(temporary, stat.S_IMODE(target.stat().st_mode) & 0o777)
         os.replace(temporary, target)
     except BaseException:
-        Path(temporary).unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     return Path(path)
 

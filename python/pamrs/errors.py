@@ -5,6 +5,9 @@ from __future__ import annotations
 import importlib
 from collections.abc import Iterable
 
+_MOST_TOLD = 20
+"""Problems of one file that are told: a screen."""
+
 
 class PamrsError(Exception):
     """Base of every error that pamrs raises on purpose."""
@@ -129,9 +132,11 @@ def joined(head: str, problems: Iterable[str]) -> str:
     Returns
     -------
     str
-        A single line for one problem, else the headline and a line for each.
+        A single line for one problem, else the headline and a line for each of the first.
     """
     found = list(problems)
     if len(found) == 1:
         return f"{head}: {found[0]}"
-    return "\n".join([f"{head}: {len(found)} problems", *(f"  - {line}" for line in found)])
+    told = [f"  - {line}" for line in found[:_MOST_TOLD]]
+    more = [f"  - and {len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
+    return "\n".join([f"{head}: {len(found)} problems", *told, *more])

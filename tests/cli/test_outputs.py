@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+import pamrs
 import pamrs.diagnosis
 import pamrs.recordings
 from pamrs import _writing, cli, report
@@ -135,47 +136,71 @@ def test_what_is_done_is_told_although_a_file_cannot_be_written(
     assert not json.exists()
 
 
-@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EPIPE])
-def test_the_text_is_not_lost_with_standard_output(capsys, tmp_path, monkeypatch, diagnosed, code):
-    """`pamrs diagnose CASE --json FILE > out.txt` on a full disk: work was done, and more than
-    nothing is left of it.
-    """
-    echo = cli._shared.typer.echo
-
-    def full(text="", **options):
-        if not options.get("err"):
-            raise OSError(code, os.strerror(code))
-        echo(text, **options)
-
-    monkeypatch.setattr(cli._shared.typer, "echo", full)
-    json = tmp_path / "a.json"
-    found, out, err = run(capsys, "diagnose", tmp_path, "--json", json)
-    assert (found, out) == (cli.NOT_WRITTEN, "")
-    assert "verdict: none\n" in err
-    assert f"not written: standard output ({os.strerror(code)})" in err
-    assert json.read_text(encoding="utf-8") == "{}\n"
+#: A diagnosis that is done at once, run as the command is.
+DONE = """
+import sys
+from pathlib import Path
+import pamrs.diagnosis, pamrs.recordings
+from pamrs import cli
+from tests.cli.test_outputs import Done
+class Loaded:
+    name, path = "a case", Path(".")
+pamrs.recordings.load_case = lambda *given, **options: Loaded()
+pamrs.diagnosis.diagnose = lambda case, **options: Done()
+sys.exit(cli.main(["diagnose", ".", "--json", "a.json"]))
+"""
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is needed")
-@pytest.mark.parametrize("both", [False, True])
-def test_a_full_disk_behind_standard_output_gives_its_own_exit_code(tmp_path, both):
-    """The buffer that could not be written must not fail again as the process ends."""
-    code = (
-        "import sys; from pathlib import Path; from pamrs.cli import _shared; from pamrs.errors "
-        "import NotWrittenError\n"
-        "try: _shared.write({Path(sys.argv[1]): 'kept'}, _shared.tell('told'))\n"
-        "except NotWrittenError: sys.exit(4)"
+@pytest.mark.parametrize(
+    ("streams", "told"),
+    [
+        (">&-", "verdict: none"),
+        (">/dev/full", "verdict: none"),
+        ("2>&-", ""),
+        ("2>/dev/full", ""),
+        (">&- 2>&-", ""),
+        (">/dev/full 2>/dev/full", ""),
+    ],
+)
+def test_a_stream_that_takes_nothing_costs_no_result(tmp_path, streams, told):
+    """What is done is written first, then told wherever it can be, and the exit code says that some
+    of it could not.
+    """
+    root = Path(__file__).parents[2]
+    paths = os.pathsep.join([str(Path(pamrs.__file__).parents[1]), str(root)])
+    done = subprocess.run(
+        ["sh", "-c", f'exec "$0" -c "$1" {streams}', sys.executable, DONE],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
     )
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            [sys.executable, "-c", code, str(tmp_path / "a.txt")],
-            stdout=full,
-            stderr=full if both else subprocess.PIPE,
-            check=False,
-        )
-    assert done.returncode == 4
-    assert (tmp_path / "a.txt").read_text(encoding="utf-8") == "kept"
-    assert both or b"told" in done.stderr
+    assert done.returncode == cli.NOT_WRITTEN == 4
+    assert (tmp_path / "a.json").read_text(encoding="utf-8") == "{}\n"
+    assert told in done.stderr
+    assert "Traceback" not in done.stderr + done.stdout
+    if streams.startswith("2"):
+        assert done.stdout == "verdict: none\n"
+
+
+def test_a_new_file_has_the_mode_that_the_user_wants(tmp_path):
+    before = os.umask(0o027)
+    try:
+        write_atomically(tmp_path / "a", "new")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "a").stat().st_mode & 0o777 == 0o640
+
+
+def test_a_file_that_was_there_keeps_its_mode(tmp_path):
+    file = tmp_path / "a"
+    file.write_text("before", encoding="utf-8")
+    file.chmod(0o600)
+    write_atomically(file, "after")
+    assert file.read_text(encoding="utf-8") == "after"
+    assert file.stat().st_mode & 0o777 == 0o600
 
 
 def test_a_package_that_is_broken_is_named(capsys, tmp_path, monkeypatch, diagnosed):

@@ -24,6 +24,7 @@ LAYERS = (
         "_losses",
         "_normal",
         "_stretches",
+        "_termination",
         "_writing",
         "_moved",
     ),

@@ -4,8 +4,8 @@
 Results go to standard output, progress and errors to standard error. The exit code is 0 when the
 command did its work (a diagnosis that finds nothing missing included), 1 when it was interrupted, 2
 when the input is wrong or an output could not be written from the start (nothing was done then), 3
-when ``prove`` has a case without a result, 4 when the work was done and its text printed, but a
-file of it could not be written. Everything heavy is imported inside the command that
+when ``prove`` has a case without a result, 4 when the work was done, but a file of it or its text
+could not be written. Everything heavy is imported inside the command that
 needs it, so that ``pamrs --help`` answers at once.
 """
 
@@ -17,6 +17,7 @@ from typing import Annotated, Final
 
 import typer
 
+from pamrs.cli._streams import guarded
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
@@ -36,6 +37,8 @@ __all__ = ["NOT_WRITTEN", "app", "main"]
 
 NOT_WRITTEN: Final = 4
 """Exit code when the work was done, but a file of its result could not be written."""
+_MOST_SHOWN: Final = 1500
+"""Characters of an error's message that are shown: less than a screen."""
 _TYPER_INTERRUPTED: Final = 130
 """What typer makes of an interrupt, in its newer versions."""
 
@@ -46,7 +49,7 @@ app = typer.Typer(
     ),
     epilog=(
         "Exit codes: 0 done; 1 interrupted; 2 wrong input, nothing done; 3 prove: a case has no "
-        "result; 4 done and printed, but a file could not be written."
+        "result; 4 done, but a file or the text could not be written."
     ),
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -95,6 +98,14 @@ def _one_line(error: BaseException) -> str:
     return "; ".join(parts) or type(error).__name__
 
 
+def _refuse(text: str) -> None:
+    """Print an error, at most a screen of it."""
+    if len(text) > _MOST_SHOWN:
+        half = _MOST_SHOWN // 2
+        text = f"{text[:half]} [{len(text) - 2 * half} characters left out] {text[-half:]}"
+    typer.echo(f"pamrs: error: {text}", err=True)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line.
 
@@ -107,15 +118,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         Exit code: 0 done, 1 interrupted, 2 wrong input (one line on standard error says what), 3 a
-        case without a result, 4 done and told on standard output, but a file could not be written.
+        case without a result, 4 done, but a file or the text could not be written.
 
     Examples
     --------
     >>> main(["rig", "check", "no_such_file.toml"])
     2
     """
-    command = typer.main.get_command(app)
     words = list(sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    with guarded() as lost:
+        code = _run(words)
+    if not lost:
+        return code
+    with guarded():
+        _refuse(f"not written: {'; '.join(lost)}")
+    return code or NOT_WRITTEN
+
+
+def _run(words: list[str]) -> int:
+    """Run a command; the exit code."""
+    command = typer.main.get_command(app)
     try:
         code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
         if code == _TYPER_INTERRUPTED:
@@ -124,14 +146,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         typer.echo("pamrs: interrupted", err=True)
         return 1
     except NotWrittenError as error:
-        typer.echo(f"pamrs: error: {_one_line(error)}", err=True)
+        _refuse(_one_line(error))
         return NOT_WRITTEN
     except OSError as error:
         where = f"{error.filename}: " if error.filename is not None else ""
-        typer.echo(f"pamrs: error: {where}{error.strerror or _one_line(error)}", err=True)
+        _refuse(f"{where}{error.strerror or _one_line(error)}")
         return 2
     except ValueError as error:
-        typer.echo(f"pamrs: error: {_one_line(error)}", err=True)
+        _refuse(_one_line(error))
         return 2
     except Exception as error:
         from pamrs.errors import PamrsError
@@ -139,6 +161,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         usage = getattr(error, "format_message", None)
         if usage is None and not isinstance(error, PamrsError):
             raise
-        typer.echo(f"pamrs: error: {usage() if usage is not None else _one_line(error)}", err=True)
+        _refuse(usage() if usage is not None else _one_line(error))
         return 2
     return int(code or 0)

@@ -4,19 +4,19 @@ progress.
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 import typer
 
+from pamrs._files import shown
 from pamrs._writing import check_writable
+from pamrs.cli._streams import terminal
 
 if TYPE_CHECKING:
     import numpy as np
@@ -35,7 +35,6 @@ __all__ = [
     "progress",
     "quantity",
     "rig_named",
-    "tell",
     "usable_samples",
     "write",
 ]
@@ -156,46 +155,16 @@ def usable_samples(
     }
 
 
-def tell(text: str) -> list[str]:
-    """Print the text of a result; on standard error where standard output takes none (a full disk,
-    a reader that is gone), so that what was worked out is not lost.
-
-    Parameters
-    ----------
-    text : str
-        What was found.
-
-    Returns
-    -------
-    list of str
-        What could not be written, and why, for :func:`write`; empty where it was printed.
-    """
-    try:
-        typer.echo(text)
-        sys.stdout.flush()
-    except OSError as error:
-        # what is left in the buffer would be tried again when the process ends
-        with contextlib.suppress(OSError, ValueError):
-            nowhere = os.open(os.devnull, os.O_WRONLY)
-            os.dup2(nowhere, sys.stdout.fileno())
-            os.close(nowhere)
-        with contextlib.suppress(OSError):
-            typer.echo(text, err=True)
-        return [f"standard output ({error.strerror or error})"]
-    return []
-
-
-def write(
-    contents: Mapping[Path, str | bytes | Callable[[Path], object]], failed: Sequence[str] = ()
-) -> None:
-    """Write every file, and say so; one that fails does not keep the others from being written.
+def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]], told: str = "") -> None:
+    """Write every file and say so, then print what was found; a file that fails does not keep the
+    others, or the text, from coming.
 
     Parameters
     ----------
     contents : mapping of Path to str, bytes or callable
         What is to be in each file, or what writes it, given its path.
-    failed : sequence of str, optional
-        What could not be written before, and why.
+    told : str, optional
+        What was found, as text.
 
     Raises
     ------
@@ -207,7 +176,7 @@ def write(
     from pamrs._writing import write_atomically
     from pamrs.errors import NotWrittenError, ParameterError
 
-    failed = list(failed)
+    failed: list[str] = []
     refused: ParameterError | None = None
     for path, content in contents.items():
         try:
@@ -221,8 +190,9 @@ def write(
             why = getattr(error, "strerror", None) or str(error) or type(error).__name__
             failed.append(f"{path} ({why})")
         else:
-            with contextlib.suppress(OSError):
-                typer.echo(f"written: {path}", err=True)
+            typer.echo(f"written: {path}", err=True)
+    if told:
+        typer.echo(told.removesuffix("\n"))
     if refused is not None:
         raise refused
     if failed:
@@ -232,11 +202,12 @@ def write(
 @contextmanager
 def progress(text: str) -> Iterator[None]:
     """Say on standard error what is going on, with a clock where a person is looking."""
-    started = time.perf_counter()
+    started, text = time.perf_counter(), shown(text)
     if sys.stderr.isatty():
         from rich.console import Console
+        from rich.text import Text
 
-        with Console(stderr=True).status(text):
+        with Console(file=terminal()).status(Text(text)):
             yield
     else:
         typer.echo(f"{text} ...", err=True)

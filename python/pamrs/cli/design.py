@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 import typer
 
 from pamrs.cli._shared import check_writable, exact, named_muscle, write
+from pamrs.cli._streams import terminal
 
 if TYPE_CHECKING:
     from pamrs.design import (
@@ -112,9 +113,7 @@ def _joint(
         caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
         shown = {"comparison": found.comparison, "front": found.front}
         contents[png] = lambda path: write_atomically(path, draw(found.design, caption, **shown))
-    typer.echo(title)
-    typer.echo(_summary(found))
-    write(contents)
+    write(contents, f"{title}\n{_summary(found)}")
 
 
 # ------------------------------------------------------------------------- search
@@ -291,7 +290,7 @@ def _bar(what: str) -> Iterator[Callable[[int, int], None] | None]:
         MofNCompleteColumn(),
         TimeElapsedColumn(),
     )
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    with Progress(*columns, console=Console(file=terminal()), transient=True) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, total: progress.update(task, completed=done, total=total)
 

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs._files import resolved
 from pamrs.channels import channel_of
 from pamrs.cli._shared import (
     check_writable,
     exact,
     progress,
     rig_named,
-    tell,
     write,
 )
 from pamrs.errors import check_packages
@@ -102,8 +102,8 @@ def diagnose_command(
     """Find the physics that the rig's model leaves out of a case's recordings; with --plan, what
     could be found at all.
 
-    The verdict is printed before files are written. Exit code 0: diagnosed; 2: not diagnosed; 4:
-    diagnosed, but some file could not be written.
+    Files are written before the verdict is printed. Exit code 0: diagnosed; 2: not diagnosed; 4:
+    diagnosed, but some file or the text could not be written.
     """
     check_writable(report, json, png, model, experiment)
     if plan is not None:
@@ -138,7 +138,6 @@ def diagnose_command(
 
     with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded, consider=consider or ())
-    failed = tell(result.summary())
     files: dict[Path | None, Callable[[Path], object]] = {
         json: result.to_json,
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
@@ -146,7 +145,7 @@ def diagnose_command(
         png: result.figure,
         report: result.report,
     }
-    write({path: how for path, how in files.items() if path is not None}, failed)
+    write({path: how for path, how in files.items() if path is not None}, result.summary())
 
 
 def _playable(result: Diagnosis, file: Path | None) -> Path | None:
@@ -175,9 +174,9 @@ def _model_text(result: Diagnosis, case: Case, file: Path) -> str:
 
     if not isinstance(result.rig, Rig):
         return result.model
-    home = case.path.resolve()
+    home = resolved(case.path)
     try:
-        folder = os.path.relpath(home, file.resolve().parent)
+        folder = os.path.relpath(home, resolved(file).parent)
     except ValueError:  # on another drive
         folder = str(home)
     return result.rig.with_case(Path(folder).as_posix()).to_toml_text()
@@ -214,5 +213,5 @@ def _plan(
     )
     with progress(f"planning for {loaded.name}"):
         result = plan_diagnosis(loaded, given, noise=noise)
-    failed = tell(result.text())
-    write({} if json is None else {json: dumps(result.to_dict(), indent=2) + "\n"}, failed)
+    files = {} if json is None else {json: dumps(result.to_dict(), indent=2) + "\n"}
+    write(files, result.text())

@@ -161,8 +161,7 @@ def _muscle(
     shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
     asked = _Asked(model, order, "per_level" if per_level else "linear", friction, compare)
     summary, contents = _results(inputs, asked, shape, notes, _command(context), outputs)
-    typer.echo(summary, nl=False)
-    write(contents)
+    write(contents, summary)
     if rig is not None and inputs.rig is None:
         typer.echo(
             (
@@ -269,8 +268,7 @@ def _map(
         contents[json] = _map_json(fit, inputs.data, _command(context))
     if rig is not None:
         contents[rig] = fit.to_rig(inputs.muscle, inputs.rig).to_toml_text()
-    typer.echo(f"{inputs.data.label}: {fit.fit_report()}", nl=False)
-    write(contents)
+    write(contents, f"{inputs.data.label}: {fit.fit_report()}")
 
 
 @fit_app.command("friction")
@@ -315,8 +313,7 @@ def _friction(
         from pamrs.fit.report import render_friction_png
 
         contents[png] = lambda path: write_atomically(path, render_friction_png(fit, map_))
-    typer.echo(f"{map_.label}: {fit.fit_report()}")
-    write(contents)
+    write(contents, f"{map_.label}: {fit.fit_report()}")
 
 
 def _rubbing(

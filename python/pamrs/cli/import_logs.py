@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from pamrs._files import is_inside
+from pamrs._files import is_inside, resolved
 from pamrs.cli._shared import as_given, exact, progress, rig_named, write
 
 if TYPE_CHECKING:
@@ -75,7 +75,7 @@ def import_command(
     contents: dict[Path, str | bytes] = {}
     named = "rig.toml"
     if rig is not None and rig.exists():
-        named = Path(os.path.relpath(rig.resolve(), folder.resolve())).as_posix()
+        named = Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix()
     text = proposal.case_toml(folder, named)
     if file is None:
         typer.echo(text)

@@ -43,8 +43,7 @@ def library_command(
         from pamrs.rigs import bench
 
         contents[rig] = bench(entry(name).muscle, name).to_toml_text()
-    typer.echo(shown)
-    write(contents)
+    write(contents, shown)
 
 
 def _facts() -> str:

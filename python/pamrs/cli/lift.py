@@ -57,7 +57,6 @@ def lift_command(
         pressure=None if pressure is None else exact("pressure", pressure, "pressure"),
         to=None if to is None else exact("to", to, "angle"),
     )
-    typer.echo(result.summary())
     import json as encoder
 
     document = {"schema": SCHEMA, **result.to_dict()}
@@ -65,4 +64,5 @@ def lift_command(
         json: encoder.dumps(document, indent=1, allow_nan=False) + "\n",
         png: result.plot,
     }
-    write({path: content for path, content in files.items() if path is not None})
+    found = {path: content for path, content in files.items() if path is not None}
+    write(found, result.summary())

@@ -112,13 +112,9 @@ def reproduce_command(
             for picture in section.pictures
         },
     }
-    typer.echo(table(rows, headings=headings))
-    typer.echo("")
-    for section in sections:
-        for sentence in section.in_short:
-            typer.echo(sentence)
-    typer.echo(f"\n{verdicts(rows)}")
-    write(contents)
+    in_short = [sentence for section in sections for sentence in section.in_short]
+    lines = [table(rows, headings=headings), "", *in_short, f"\n{verdicts(rows)}"]
+    write(contents, "\n".join(lines))
 
 
 def _every(output: Path, search: bool, cache: Path | None) -> None:
@@ -160,6 +156,5 @@ def _every(output: Path, search: bool, cache: Path | None) -> None:
         contents[folder / "facts.csv"] = to_csv(section.rows)
         for picture in section.pictures:
             contents[folder / f"{picture.name}.png"] = picture.png
-    for section in sections.values():
-        typer.echo(f"{section.title}: {verdicts(list(section.rows))}")
-    write(contents)
+    told = [f"{section.title}: {verdicts(list(section.rows))}" for section in sections.values()]
+    write(contents, "\n".join(told))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs import rigs
+from pamrs._files import resolved
 from pamrs.cli._shared import rig_named
 from pamrs.units import with_unit
 
@@ -102,7 +103,7 @@ def _rig_new(
     file.parent.mkdir(parents=True, exist_ok=True)
     if file.exists():
         raise FileExistsError(f"{file}: is there already; it is not overwritten")
-    called = file.resolve().parent.name if file.stem == "rig" else file.stem
+    called = resolved(file).parent.name if file.stem == "rig" else file.stem
     called = (called or file.stem) if name is None else name
     write_atomically(file, rigs.template(like, called, gas))
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

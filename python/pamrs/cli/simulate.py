@@ -106,20 +106,20 @@ def simulate_command(
             exact("duration", duration, "time"),
             exact("sample_time", sample_time, "time"),
         )
-    typer.echo(result.summary())
+    lines = [result.summary()]
     if recording is not None:
         from pamrs.simulation import differences
 
         for name, rms in differences(result, recording).items():
             unit, factor = laboratory_unit(name)
             told = f"{name}: rms difference from the recording {factor * rms:.4g}"
-            typer.echo(with_unit(told, unit))
+            lines.append(with_unit(told, unit))
     files: dict[Path | None, Callable[[Path], object]] = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: result.plot(path, recorded=recorded),
         animation: lambda path: _animate(path, result, speed),
     }
-    write({path: how for path, how in files.items() if path is not None})
+    write({path: how for path, how in files.items() if path is not None}, "\n".join(lines))
 
 
 def _animate(path: Path, result: Simulation, speed: float) -> None:

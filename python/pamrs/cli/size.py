@@ -83,12 +83,13 @@ def size_command(
         filling.supply_pressure / 1e5,
         filling.dead_volume * 1e3,
     )
-    typer.echo(f"required: {', '.join(point)}")
-    typer.echo(f"valve {area:.4g} mm2, supply {supplied:.4g} bar, dead volume {dead:.4g} l\n")
-    typer.echo(result.table())
-    for line in _remarks(candidates):
-        typer.echo(line)
-    write(contents)
+    lines = [
+        f"required: {', '.join(point)}",
+        f"valve {area:.4g} mm2, supply {supplied:.4g} bar, dead volume {dead:.4g} l\n",
+        result.table(),
+        *_remarks(candidates),
+    ]
+    write(contents, "\n".join(lines))
 
 
 # ------------------------------------------------------------------------- inputs

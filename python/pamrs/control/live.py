@@ -21,10 +21,10 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._termination import Termination
 from pamrs.control._live_commands import Command, LiveCommands, pair
 from pamrs.control._loop import trajectories_of
 from pamrs.control._protocol import Controller, Reference, check_controller
-from pamrs.control._termination import Termination
 from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.simulation import whole_samples

@@ -22,6 +22,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
+from pamrs._files import resolved
+from pamrs._termination import Termination
 from pamrs._writing import check_writable, write_atomically
 from pamrs.diagnosis.result import READABLE
 from pamrs.errors import CaseError, ParameterError
@@ -170,7 +172,7 @@ def case_digest(folder: Path) -> str:
     """SHA-256 over every file of a case, so that a result of another case of the same name is not
     kept.
     """
-    return _digest(Path(folder).resolve(), lambda path: True)
+    return _digest(resolved(folder), lambda path: True)
 
 
 def code_digest() -> str:
@@ -286,7 +288,7 @@ def _launch(command: Sequence[str], case: Path, out: Path) -> _Running:
         open(Path(home.name, "stderr"), "wb") as cried,
     ):
         process = subprocess.Popen(
-            [*command, str(case.resolve()), str(out.resolve())],
+            [*command, str(resolved(case)), str(resolved(out))],
             cwd=home.name, env=environment, stdin=subprocess.DEVNULL, stdout=told, stderr=cried,
         )  # fmt: skip
     return _Running(case, process, home, time.perf_counter())
@@ -436,7 +438,8 @@ def prove(
         )
     run.record()
     own = (sys.executable, "-m", "pamrs.diagnosis.prove", *([OUTSIDE] if allow_outside else []))
-    run.finish(command or own, jobs, timeout, tell)
+    with Termination() as ending:
+        run.finish(command or own, jobs, timeout, tell, ending)
     return Proof(target, {case.name: run.entries[case.name] for case in run.cases}, kept)
 
 
@@ -497,14 +500,24 @@ class _Run:
         )
 
     def finish(
-        self, command: Sequence[str], jobs: int, timeout: float, tell: Callable[[str], None]
+        self,
+        command: Sequence[str],
+        jobs: int,
+        timeout: float,
+        tell: Callable[[str], None],
+        ending: Termination,
     ) -> None:
-        """Diagnose what waits, so many cases at a time, each in a process of its own."""
+        """Diagnose what waits, so many cases at a time, each in a process of its own.
+
+        A signal that ends the program is looked at between two steps, so that none comes between a
+        worker's start and its place among those that are ended with it.
+        """
         began, todo, kept = time.perf_counter(), len(self.waiting), len(self.entries)
         running: list[_Running] = []
         done = 0
         try:
             while self.waiting or running:
+                ending.check()
                 while self.waiting and len(running) < jobs:
                     running.append(self._started(command, self.waiting.pop(0)))
                 for slow in (r for r in running if time.perf_counter() - r.began > timeout):

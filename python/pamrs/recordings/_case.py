@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._files import found_outside, parse_toml, read_toml
+from pamrs._files import found_outside, parse_toml, read_toml, resolved, shown
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
@@ -65,6 +65,10 @@ class Case:
     recordings: list[Recording]
     path: Path
     description: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", shown(self.name))
+        object.__setattr__(self, "description", shown(self.description, lines=True))
 
     @property
     def fit(self) -> list[Recording]:
@@ -136,7 +140,7 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     _unknown(problems, "", document, _TOP)
     if document.get("schema") != SCHEMA:
         problems.append(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
-    name = _text(problems, document, "name", home.resolve().name)
+    name = _text(problems, document, "name", resolved(home).name)
     description = _text(problems, document, "description", "")
     source = _text(problems, document, "source", "")
     outside = [] if allow_outside else _outside(home, document)

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs._checks import positive
+from pamrs._files import resolved
 from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
@@ -162,7 +163,7 @@ class Proposal:
     def _entry(
         self, item: LogProposal, folder: Path, role: str, pieces: list[int] | None
     ) -> list[str]:
-        file = os.path.relpath(item.log.path.resolve(), folder.resolve())
+        file = os.path.relpath(resolved(item.log.path), resolved(folder))
         lines = ["", *(f"# {text}" for text in item.remarks if role == "fit" or pieces is None)]
         lines += ["[[recording]]", f"file = {_toml(Path(file).as_posix())}", f'role = "{role}"']
         if self.columns is not None:

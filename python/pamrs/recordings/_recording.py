@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._files import shown
 from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
 from pamrs.errors import RecordingError
@@ -177,6 +178,9 @@ class Recording:
     parameters: dict[str, OwnValue] = field(default_factory=dict)
     said: dict[str, str] = field(default_factory=dict)
     commands: dict[str, Array] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "name", shown(self.name))
 
     def __len__(self) -> int:
         return len(self.time)

@@ -102,15 +102,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     fit_found = models.residuals(fitted)
     out_found = fit_found if held is fitted else models.residuals(held)
     located, part = _located(judged, settings), fitted.losses.part
-    picture = Picture()
-    if located is not None:
-        block = next(b for b in fitted.blocks if b.name == located)
-        compared = fit_found["refit"], fit_found["after"]
-        picture = part(
-            "the conditions of the mismatch",
-            lambda: describe(block, fitted.recordings, nominal, *compared, noise_level),
-            picture,
-        )
+    picture = _picture(located, nominal, fitted, fit_found, noise_level)
     fit_table = _table(fitted, fit_found, noise_level)
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
@@ -128,6 +120,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
     runs, runs_note = part("the free run", running, nothing)
     effects = _effects(judged, verdict, fitted)
+    likely = partial(_hypotheses, judged, probabilities, nominal, fitted)
     constants = said_of_constants(runs or [], [effect.id for effect in effects], settings.warnings)
     diagnosis = Diagnosis(
         case=case.name,
@@ -140,15 +133,7 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=part(
             "the next experiment",
-            lambda: next_experiment(
-                verdict,
-                ambiguity,
-                _hypotheses(judged, probabilities, nominal, fitted),
-                nominal,
-                judged,
-                fitted,
-                held,
-            ),
+            lambda: next_experiment(verdict, ambiguity, likely(), nominal, judged, fitted, held),
             NextExperiment(""),
         ),
         warnings=constants + _warnings(case, models, table, settings, same=held is fitted),
@@ -173,6 +158,25 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         settings=settings,
     )
     return _worded(diagnosis, case, judged, forms)
+
+
+def _picture(
+    located: str | None,
+    nominal: Rig,
+    fitted: Problem,
+    found: dict[str, dict[Key, Residual]],
+    noise_level: dict[Key, NoiseLevel],
+) -> Picture:
+    """Where and when the block that the answer is about is off."""
+    if located is None:
+        return Picture()
+    block = next(b for b in fitted.blocks if b.name == located)
+    stages = found["refit"], found["after"]
+    return fitted.losses.part(
+        "the conditions of the mismatch",
+        lambda: describe(block, fitted.recordings, nominal, *stages, noise_level),
+        Picture(),
+    )
 
 
 def _worded(

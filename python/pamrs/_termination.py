@@ -1,11 +1,13 @@
-"""Signals that end a program, as exceptions: a live loop must write its safe command first."""
+"""Signals that end a program, as exceptions: a live loop must write its safe command first, a trial
+end its workers.
+"""
 
 from __future__ import annotations
 
 import signal
 import threading
 from types import FrameType
-from typing import Any, Final, Self
+from typing import Any, Final, NoReturn, Self
 
 __all__ = ["Termination"]
 
@@ -45,9 +47,19 @@ class Termination:
         for number, handler in self._old.items():
             signal.signal(number, handler)
 
+    def check(self) -> None:
+        """Raise for a signal that came while it was not armed."""
+        if self.late is not None:
+            number, self.late = self.late, None
+            self._raise(number)
+
     def _came(self, number: int, frame: FrameType | None) -> None:
         if not self.armed:
             self.late = number
             return
         self.armed = False
+        self._raise(number)
+
+    @staticmethod
+    def _raise(number: int) -> NoReturn:
         raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)

@@ -1,0 +1,98 @@
+"""What files say is printed as text: no name moves a cursor, forges a line or is markup."""
+
+import os
+import subprocess
+import sys
+from io import StringIO
+from pathlib import Path
+
+import pytest
+
+import pamrs
+from pamrs import cli
+from pamrs._files import shown
+from pamrs.cli import _shared
+
+FAULTS = Path(__file__).parents[1] / "faults"
+
+
+class Terminal(StringIO):
+    """Standard error where a person is looking."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize("name", ["[/foo]", "[bold]x", "[link=file:///]", "a\x1b]0;pwn\x07"])
+def test_a_name_is_no_markup(monkeypatch, name):
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with _shared.progress(f"diagnosing {name}"):
+        pass
+    assert shown(name) in terminal.getvalue()
+    assert "\x07" not in terminal.getvalue()
+
+
+@pytest.mark.parametrize("fault", ["19_name_markup", "20_terminal_escape"])
+def test_names_of_a_case_are_text(fault):
+    case = pamrs.load_case(FAULTS / fault)
+    said = [case.name, *(r.name for r in case.recordings), *case.description.split("\n")]
+    assert not any(ord(letter) < 32 or ord(letter) == 127 for text in said for letter in text)
+    if fault == "19_name_markup":
+        assert case.name == "[/foo]"
+    else:
+        assert case.name == r"\x1b]0;pwn\x07\x1b[2J\x1b[31mred\r\nfake: verdict none"
+
+
+def test_a_command_sends_no_control_characters(capsys, tmp_path):
+    rig = tmp_path / "a\x07\x9b2J.toml"
+    rig.write_text('name = "x"\n', encoding="utf-8")
+    assert cli.main(["rig", "check", str(rig)]) == 2
+    captured = capsys.readouterr()
+    assert r"a\x07\x9b2J.toml" in captured.err
+    assert captured.err.count("\n") == 1
+
+
+def test_a_name_that_is_no_text_is_printed(capsys, tmp_path):
+    name = os.fsdecode(os.fsencode(str(tmp_path)) + b"/\xff.toml")
+    assert cli.main(["rig", "check", name]) == 2
+    assert r"\udcff.toml" in capsys.readouterr().err
+
+
+def test_an_error_is_no_longer_than_a_screen(capsys, tmp_path):
+    words = ["rig", "check", "x" * 100_000]
+    assert cli.main(words) == 2
+    assert len(capsys.readouterr().err) < 2000
+    rig = tmp_path / "rig.toml"
+    rig.write_text("".join(f"key_{k} = 1\n" for k in range(5000)), encoding="utf-8")
+    assert cli.main(["rig", "check", str(rig)]) == 2
+    assert len(capsys.readouterr().err) < 2000
+
+
+def test_an_interrupt_while_the_commands_are_imported_is_no_traceback(tmp_path):
+    (tmp_path / "typer.py").write_text("raise KeyboardInterrupt\n", encoding="utf-8")
+    paths = os.pathsep.join([str(tmp_path), str(Path(pamrs.__file__).parents[1])])
+    done = subprocess.run(
+        [sys.executable, "-m", "pamrs", "--help"],
+        env={**os.environ, "PYTHONPATH": paths},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (1, "", "pamrs: interrupted\n")
+
+
+def test_links_in_a_circle_are_an_error_in_words(capsys, tmp_path):
+    (tmp_path / "case.toml").symlink_to("case.toml")
+    (tmp_path / "rig.toml").symlink_to("other.toml")
+    (tmp_path / "other.toml").symlink_to("rig.toml")
+    for words in (
+        ["diagnose", tmp_path],
+        ["diagnose", tmp_path, "--allow-outside"],
+        ["rig", "check", tmp_path / "rig.toml"],
+        ["import", tmp_path / "rig.toml"],
+    ):
+        assert cli.main([str(word) for word in words]) == 2
+        err = capsys.readouterr().err
+        assert err.startswith("pamrs: error: ")
+        assert err.count("\n") == 1
