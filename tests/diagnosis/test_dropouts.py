@@ -13,7 +13,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import without_impossible
-from pamrs.recordings import Recording, load_recording
+from pamrs.recordings import Issue, Recording, load_recording
 from pamrs.recordings._faults import find_faults
 from tests.diagnosis.test_load import RIG, recording
 
@@ -33,6 +33,7 @@ def dropped(name: str, value: float, stretches: list[tuple[int, int]]) -> Record
 def test_a_length_beyond_the_load_does_not_end_the_run(value: float) -> None:
     """Also where windows of the load begin: at 0 and 2.5 s."""
     bad = dropped("length", value, [(0, 12), (495, 520), (1000, 1010)])
+    bad = replace(bad, issues=[Issue("log", "time", 0.0, 6.0, "rows without a time: 3 of 1204")])
     found = pamrs.diagnose(pamrs.Case("lift", RIG, [bad], Path()))
     assert found.verdict in ("none", "parameters")
     (told,) = (text for text in found.warnings if "beyond the possible" in text)
@@ -40,6 +41,10 @@ def test_a_length_beyond_the_load_does_not_end_the_run(value: float) -> None:
     assert "0 to 0.055 s, 2.475 to 2.595 s, 5 to 5.045 s" in told
     (own,) = found.data
     assert own.masked["length"] == pytest.approx(47 / len(bad))
+    assert own.read == ["rows without a time: 3 of 1204"]
+    first = " ".join(line.strip() for line in found.summary().splitlines()[1:6])
+    wanted = f"rows without a time: 3 of 1204; length: 47 of {len(bad)} samples masked."
+    assert f"Left out or mended: {bad.name}: {wanted}" in first
 
 
 @pytest.mark.parametrize(

@@ -198,6 +198,8 @@ class Diagnosis(Findings):
     def summary(self) -> str:
         """Return the result as plain text for a terminal, about 20 lines."""
         lines = [f"Diagnosis of {self.case}", *textwrap.wrap(self.headline + ".", 96)]
+        left_out = words.left_out_sentence(self)
+        lines += textwrap.wrap(left_out + "." * bool(left_out), 96, subsequent_indent="  ")
         where = self.where.text
         if where:
             lines += [

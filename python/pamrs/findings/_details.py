@@ -289,6 +289,8 @@ class RecordingUsed(Entry):
         Share of samples of a channel that could not be used, where there are any.
     parameters : dict of str to float
         Parameters of the rig that had another value in it than in the rig file, SI.
+    read : list of str
+        What was left out, sorted, spread or taken for missing as its log was read.
     """
 
     recording: str
@@ -301,6 +303,7 @@ class RecordingUsed(Entry):
     unused: dict[str, str]
     masked: dict[str, float]
     parameters: dict[str, float] = field(default_factory=dict)
+    read: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True, eq=False)

@@ -491,7 +491,11 @@ def render(diagnosis: Findings) -> str:
         recordings=recordings,
         hidden=hidden,
         timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
-        data=words.data_sentence(diagnosis),
+        data=". ".join(
+            text
+            for text in (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis))
+            if text
+        ),
         model=diagnosis.model,
         **pictures,
         **tables,

@@ -52,6 +52,7 @@ __all__ = [
     "kept_sentence",
     "label",
     "leading",
+    "left_out_sentence",
     "moved_parameters",
     "name_chance",
     "noise_alone",
@@ -821,6 +822,42 @@ def _percent(share: float) -> str:
 def _span(interval: Sequence[float]) -> str:
     """An interval in percent."""
     return " to ".join(_percent(share) for share in interval)
+
+
+_TOLD_LOGS = 3
+"""Recordings of which a summary says what was left out."""
+
+
+def left_out_sentence(diagnosis: Findings) -> str:
+    """What of the recordings was left out, mended or masked, with its counts.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        What was found.
+
+    Returns
+    -------
+    str
+        Empty where all of them was used as it was written.
+    """
+    told = []
+    for own in diagnosis.data:
+        counts: dict[int, list[str]] = {}
+        for name, share in own.masked.items():
+            counts.setdefault(max(round(share * own.samples), 1), []).append(name)
+        parts = list(own.read)
+        parts += [
+            f"{', '.join(names)}: {count} of {own.samples} samples masked"
+            for count, names in counts.items()
+        ]
+        if parts:
+            told.append(f"{own.recording}: {'; '.join(parts)}")
+    if not told:
+        return ""
+    more = len(told) - _TOLD_LOGS
+    rest = f". {more} more recordings have such samples" if more > 0 else ""
+    return f"Left out or mended: {'. '.join(told[:_TOLD_LOGS])}{rest}"
 
 
 def data_sentence(diagnosis: Findings) -> str:

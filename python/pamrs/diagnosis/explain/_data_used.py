@@ -94,6 +94,11 @@ def data_used(
                     if (share := float(np.mean(~mask))) > 0.0
                 },
                 parameters={name: own.value for name, own in recording.parameters.items()},
+                read=[
+                    issue.text if issue.channel == "time" else f"{issue.channel}: {issue.text}"
+                    for issue in recording.issues
+                    if issue.kind == "log"
+                ],
             )
         )
     return found

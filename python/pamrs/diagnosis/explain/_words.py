@@ -341,11 +341,12 @@ def warnings(
         )
     # what was only masked comes last
     for recording in case.recordings:
-        for issue in recording.issues[:8]:
+        issues = [issue for issue in recording.issues if issue.kind != "log"]  # said with the data
+        for issue in issues[:8]:
             when = f"{issue.start:g} to {issue.stop:g} s"
             out.append(f"{recording.name}: {issue.kind} in {issue.channel}, {when}: {issue.text}")
-        if len(recording.issues) > 8:
-            out.append(f"{recording.name}: {len(recording.issues) - 8} more issues of this kind")
+        if len(issues) > 8:
+            out.append(f"{recording.name}: {len(issues) - 8} more issues of this kind")
     return out
 
 
