@@ -2,8 +2,12 @@
 
 A unit is written as products and quotients of known symbols, with exponents as plain digits:
 ``"kg m2"``, ``"N m s/rad"``, ``"m3/(s Pa)"``, ``"l/(s bar)"``. Symbols are case sensitive. The
-angle and the volt count as dimensions of their own, so that a pressure given in degrees is an error
-and not a number; inside a compound unit (``N m/rad``) the angle may be left out.
+angle, the volt and the ampere count as dimensions of their own, so that a pressure given in degrees
+is an error and not a number; inside a compound unit (``N m/rad``) the angle may be left out.
+
+Pressures are gauge pressures, and a unit may say so: ``"bar(g)"``, ``"barg"``, ``"psi gauge"``. An
+absolute one (``"bar(a)"``, ``"psia"``, ``"kPa abs"``) is told by :func:`split_absolute`, and read only
+where there is an ambient pressure to subtract.
 """
 
 from __future__ import annotations
@@ -23,6 +27,7 @@ __all__ = [
     "from_si",
     "parse_unit",
     "same_dimension",
+    "split_absolute",
     "to_si",
     "with_unit",
 ]
@@ -41,6 +46,7 @@ DIMENSIONS: Final[dict[str, str]] = {
     "force": "N",
     "torque": "N m",
     "voltage": "V",
+    "current": "A",
     "temperature": "K",
     "inertia": "kg m2",
     "first moment": "kg m",
@@ -48,26 +54,30 @@ DIMENSIONS: Final[dict[str, str]] = {
     "conductance": "m3/(s Pa)",
 }
 
-# base dimensions: m, kg, s, K, V, rad
-_Vector = tuple[int, int, int, int, int, int]
-_NONE: Final[_Vector] = (0, 0, 0, 0, 0, 0)
-_M: Final[_Vector] = (1, 0, 0, 0, 0, 0)
-_M2: Final[_Vector] = (2, 0, 0, 0, 0, 0)
-_M3: Final[_Vector] = (3, 0, 0, 0, 0, 0)
-_KG: Final[_Vector] = (0, 1, 0, 0, 0, 0)
-_S: Final[_Vector] = (0, 0, 1, 0, 0, 0)
-_K: Final[_Vector] = (0, 0, 0, 1, 0, 0)
-_V: Final[_Vector] = (0, 0, 0, 0, 1, 0)
-_RAD: Final[_Vector] = (0, 0, 0, 0, 0, 1)
-_N: Final[_Vector] = (1, 1, -2, 0, 0, 0)
-_PA: Final[_Vector] = (-1, 1, -2, 0, 0, 0)
-_J: Final[_Vector] = (2, 1, -2, 0, 0, 0)
-_W: Final[_Vector] = (2, 1, -3, 0, 0, 0)
-_HZ: Final[_Vector] = (0, 0, -1, 0, 0, 0)
+# base dimensions: m, kg, s, K, V, A, rad
+_Vector = tuple[int, int, int, int, int, int, int]
+_NONE: Final[_Vector] = (0, 0, 0, 0, 0, 0, 0)
+_M: Final[_Vector] = (1, 0, 0, 0, 0, 0, 0)
+_M2: Final[_Vector] = (2, 0, 0, 0, 0, 0, 0)
+_M3: Final[_Vector] = (3, 0, 0, 0, 0, 0, 0)
+_KG: Final[_Vector] = (0, 1, 0, 0, 0, 0, 0)
+_S: Final[_Vector] = (0, 0, 1, 0, 0, 0, 0)
+_K: Final[_Vector] = (0, 0, 0, 1, 0, 0, 0)
+_V: Final[_Vector] = (0, 0, 0, 0, 1, 0, 0)
+_A: Final[_Vector] = (0, 0, 0, 0, 0, 1, 0)
+_RAD: Final[_Vector] = (0, 0, 0, 0, 0, 0, 1)
+_N: Final[_Vector] = (1, 1, -2, 0, 0, 0, 0)
+_PA: Final[_Vector] = (-1, 1, -2, 0, 0, 0, 0)
+_J: Final[_Vector] = (2, 1, -2, 0, 0, 0, 0)
+_W: Final[_Vector] = (2, 1, -3, 0, 0, 0, 0)
+_HZ: Final[_Vector] = (0, 0, -1, 0, 0, 0, 0)
 
 _POUND: Final = 0.45359237
 _INCH: Final = 0.0254
 _G: Final = 9.80665
+_LONGEST: Final = 64  # letters of a unit
+_MOST_POWER: Final = 9  # of a symbol; no unit has more, and more overflows
+_MERCURY: Final = 133322.387415  # pressure of a metre of mercury; water has 1000 kg/m3 [Pa]
 
 _SYMBOLS: Final[dict[str, tuple[float, _Vector]]] = {
     "1": (1.0, _NONE),
@@ -91,42 +101,55 @@ _SYMBOLS: Final[dict[str, tuple[float, _Vector]]] = {
     "ft": (12 * _INCH, _M),
     "l": (1e-3, _M3),
     "L": (1e-3, _M3),
-    ("ml"): (1e-6, _M3),
-    ("mL"): (1e-6, _M3),
-    ("cl"): (1e-5, _M3),
-    ("gal"): (3.785411784e-3, _M3),
-    ("kg"): (1.0, _KG),
-    ("g"): (1e-3, _KG),
-    ("lb"): (_POUND, _KG),
-    ("oz"): (_POUND / 16, _KG),
-    ("Pa"): (1.0, _PA),
-    ("hPa"): (1e2, _PA),
+    "ml": (1e-6, _M3),
+    "mL": (1e-6, _M3),
+    "cl": (1e-5, _M3),
+    "gal": (3.785411784e-3, _M3),
+    "kg": (1.0, _KG),
+    "g": (1e-3, _KG),
+    "lb": (_POUND, _KG),
+    "oz": (_POUND / 16, _KG),
+    "Pa": (1.0, _PA),
+    "hPa": (1e2, _PA),
     "kPa": (1e3, _PA),
     "MPa": (1e6, _PA),
     "bar": (1e5, _PA),
-    "barg": (1e5, _PA),
     "mbar": (1e2, _PA),
-    ("atm"): (101325.0, _PA),
-    ("psi"): (_POUND * _G / _INCH**2, _PA),
-    ("psig"): (_POUND * _G / _INCH**2, _PA),
-    ("rad"): (1.0, _RAD),
-    ("mrad"): (1e-3, _RAD),
-    ("deg"): (math.pi / 180, _RAD),
-    ("°"): (math.pi / 180, _RAD),
+    "atm": (101325.0, _PA),
+    "at": (_G * 1e4, _PA),
+    "psi": (_POUND * _G / _INCH**2, _PA),
+    "Torr": (101325.0 / 760, _PA),
+    "mmHg": (_MERCURY * 1e-3, _PA),
+    "inHg": (_MERCURY * _INCH, _PA),
+    "mmH2O": (_G, _PA),
+    "cmH2O": (_G * 10, _PA),
+    "mH2O": (_G * 1e3, _PA),
+    "inH2O": (_G * 1e3 * _INCH, _PA),
+    "mmWC": (_G, _PA),
+    "mWC": (_G * 1e3, _PA),
+    "inWC": (_G * 1e3 * _INCH, _PA),
+    "rad": (1.0, _RAD),
+    "mrad": (1e-3, _RAD),
+    "deg": (math.pi / 180, _RAD),
+    "°": (math.pi / 180, _RAD),
     "rev": (2 * math.pi, _RAD),
-    "rpm": (2 * math.pi / 60, (0, 0, -1, 0, 0, 1)),
+    "rpm": (2 * math.pi / 60, (0, 0, -1, 0, 0, 0, 1)),
     "N": (1.0, _N),
     "kN": (1e3, _N),
     "mN": (1e-3, _N),
     "lbf": (_POUND * _G, _N),
     "kgf": (_G, _N),
     "Nm": (1.0, _J),
-    ("J"): (1.0, _J),
-    ("kJ"): (1e3, _J),
-    ("W"): (1.0, _W),
-    ("kW"): (1e3, _W),
-    ("V"): (1.0, _V),
-    ("mV"): (1e-3, _V),
+    "Nmm": (1e-3, _J),
+    "Ncm": (1e-2, _J),
+    "J": (1.0, _J),
+    "kJ": (1e3, _J),
+    "W": (1.0, _W),
+    "kW": (1e3, _W),
+    "V": (1.0, _V),
+    "mV": (1e-3, _V),
+    "A": (1.0, _A),
+    "mA": (1e-3, _A),
     "K": (1.0, _K),
 }
 
@@ -139,7 +162,14 @@ _OFFSETS: Final[dict[str, tuple[float, float]]] = {
     "°F": (5.0 / 9.0, 273.15 - 32.0 * 5.0 / 9.0),
 }
 
-_ABSOLUTE: Final = {"bara", "psia", "bar_abs", "bar(a)"}
+#: What stands behind a unit of pressure: measured from the ambient pressure, or from nothing.
+_FROM_AMBIENT: Final = frozenset(("g", "gauge", "ü", "rel", "relative"))
+_FROM_NOTHING: Final = frozenset(("a", "abs", "absolute", "absolut"))
+_BEHIND: Final = "|".join(sorted(_FROM_AMBIENT | _FROM_NOTHING, key=len, reverse=True))
+_MEASURED_FROM = re.compile(
+    rf"(?P<unit>.+?)(?:[\s_-]*\(\s*(?P<inside>{_BEHIND})\.?\s*\)|[\s_-]*(?P<behind>{_BEHIND})\.?)",
+    re.IGNORECASE,
+)
 _FACTOR = re.compile(r"(?P<symbol>[^\d\s^*·/()-]+|1|-|%)\^?(?P<power>-?\d+)?")
 
 
@@ -165,8 +195,8 @@ def _product(text: str, whole: str) -> tuple[float, list[int]]:
             symbol = match["symbol"] if match else factor
             exact = _SYMBOLS.get(symbol)
             if match and match["power"]:
-                power = int(match["power"])
-        if exact is None:
+                power = int(match["power"][:4])
+        if exact is None or abs(power) > _MOST_POWER:
             raise ParameterError(_unknown(whole, factor))
         scale *= exact[0] ** power
         dimension = [d + power * e for d, e in zip(dimension, exact[1], strict=True)]
@@ -174,7 +204,7 @@ def _product(text: str, whole: str) -> tuple[float, list[int]]:
 
 
 def _unknown(whole: str, factor: str) -> str:
-    if whole in _ABSOLUTE:
+    if split_absolute(whole)[1]:
         return (
             f"unit {whole!r}: pressures are gauge pressures here (subtract the ambient pressure "
             "first)"
@@ -185,6 +215,45 @@ def _unknown(whole: str, factor: str) -> str:
     hint = f"; did you mean {near[0]!r}?" if near else ""
     where = "" if factor == whole else f" in {whole!r}"
     return f"unknown unit {factor!r}{where}{hint}"
+
+
+def _measured_from(unit: str) -> tuple[str, str]:
+    """A unit of pressure, and the word behind it that says what it is measured from, or none."""
+    match = _MEASURED_FROM.fullmatch(unit)
+    if match is None or unit in _SYMBOLS:
+        return unit, ""
+    try:
+        alone = _compound(match["unit"])
+    except ParameterError:
+        return unit, ""
+    if alone.dimension != _PA:
+        return unit, ""
+    return match["unit"], (match["inside"] or match["behind"]).lower()
+
+
+def split_absolute(unit: str) -> tuple[str, bool]:
+    """A unit without the words that make it one of absolute pressure.
+
+    Parameters
+    ----------
+    unit : str
+        Any text.
+
+    Returns
+    -------
+    unit : str
+        For an absolute pressure the unit alone, else what was given.
+    absolute : bool
+        Whether it is one.
+
+    Examples
+    --------
+    >>> split_absolute("bar(a)"), split_absolute("kPa abs"), split_absolute("psi")
+    (('bar', True), ('kPa', True), ('psi', False))
+    """
+    text = unit.strip()
+    alone, measured_from = _measured_from(text)
+    return (alone, True) if measured_from in _FROM_NOTHING else (unit, False)
 
 
 @lru_cache(maxsize=512)
@@ -199,7 +268,7 @@ def parse_unit(unit: str) -> Unit:
     Returns
     -------
     Unit
-        Scale and offset to SI, and the exponents of m, kg, s, K, V and rad.
+        Scale and offset to SI, and the exponents of m, kg, s, K, V, A and rad.
 
     Raises
     ------
@@ -212,6 +281,16 @@ def parse_unit(unit: str) -> Unit:
     if text in _OFFSETS:
         scale, offset = _OFFSETS[text]
         return Unit(scale, offset, _K)
+    pressure, measured_from = _measured_from(text)
+    if measured_from in _FROM_NOTHING:
+        raise ParameterError(_unknown(text, text))
+    return _compound(pressure)
+
+
+def _compound(text: str) -> Unit:
+    """Products and quotients of symbols."""
+    if len(text) > _LONGEST:
+        raise ParameterError(f"unknown unit {text[:_LONGEST]!r}...: it is too long for one")
     top, *below = re.sub(
         r"/\s*\(([^()/]*)\)\s*$", lambda m: "/" + "/".join(m[1].split()), text
     ).split("/")

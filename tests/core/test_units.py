@@ -9,13 +9,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pamrs.errors import PamrsError, ParameterError
-from pamrs.units import DIMENSIONS, from_si, parse_unit, same_dimension, to_si
+from pamrs.units import DIMENSIONS, from_si, parse_unit, same_dimension, split_absolute, to_si
 
 KNOWN = [
     (1.0, "bar", "Pa", 1e5),
     (2.0, "mbar", "pressure", 200.0),
     (1.0, "psi", "pressure", 6894.757293168361),
     (7.0, "barg", "pressure", 7e5),
+    (7.0, "bar(g)", "pressure", 7e5),
+    (7.0, "kPa gauge", "pressure", 7e3),
+    (2.0, "atü", "pressure", 2 * 98066.5),
+    (1.0, "at", "pressure", 98066.5),
+    (1.0, "kgf/cm2", "pressure", 98066.5),
+    (760.0, "Torr", "pressure", 101325.0),
+    (1000.0, "mmHg", "pressure", 133322.387415),
+    (1.0, "mH2O", "pressure", 9806.65),
+    (1.0, "inH2O", "pressure", 249.08891),
+    (4.0, "mA", "current", 4e-3),
     (180.0, "deg", "angle", math.pi),
     (60.0, "rpm", "rad/s", 2 * math.pi),
     (1500.0, "us", "time", 1.5e-3),
@@ -92,10 +102,30 @@ def test_unknown_units_are_named(unit: str) -> None:
 def test_helpful_messages() -> None:
     with pytest.raises(ParameterError, match="did you mean 'bar'"):
         parse_unit("Bar")
-    with pytest.raises(ParameterError, match="gauge"):
-        parse_unit("bara")
+    with pytest.raises(ParameterError, match="too long"):
+        parse_unit("bar " * 40)
     with pytest.raises(ParameterError, match="empty"):
         parse_unit("  ")
+
+
+@pytest.mark.parametrize(
+    ("unit", "alone"),
+    [
+        ("bar(a)", "bar"), ("bara", "bar"), ("bar_abs", "bar"), ("psia", "psi"),
+        ("psi(a)", "psi"), ("kPa abs", "kPa"), ("kPa abs.", "kPa"), ("hPa(a)", "hPa"),
+        ("ata", "at"), ("mmHg absolute", "mmHg"), ("kgf/cm2 (a)", "kgf/cm2"),
+    ],
+)  # fmt: skip
+def test_absolute_pressures_are_told_from_gauge_pressures(unit: str, alone: str) -> None:
+    assert split_absolute(unit) == (alone, True)
+    assert split_absolute(alone) == (alone, False)
+    with pytest.raises(ParameterError, match="gauge pressures here"):
+        parse_unit(unit)
+
+
+@pytest.mark.parametrize("unit", ["a", "m(a)", "V abs", "kg a", "bar(b)", "bar(a)(a)"])
+def test_only_pressures_are_absolute(unit: str) -> None:
+    assert split_absolute(unit) == (unit, False)
 
 
 @given(st.text(max_size=12))
