@@ -7,9 +7,10 @@ from typing import Final
 
 __all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "rate_of", "recorded_as", "unit_of"]
 
-#: SI unit of each channel, recorded or simulated; pressures gauge. Where a rig has several blocks
-#: of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``; behind that
-#: the number of a tube's segment: ``segment_flow.flexor.1``.
+#: SI unit of each channel, recorded or simulated; pressures gauge, but for the ambient one. Where a
+#: rig has several blocks of a kind, the name of the block stands behind a dot:
+#: ``muscle_pressure.flexor``; behind that the number of a tube's segment:
+#: ``segment_flow.flexor.1``.
 UNITS: Final[dict[str, str]] = {
     "time": "s",
     "valve_command": "V",
@@ -24,6 +25,7 @@ UNITS: Final[dict[str, str]] = {
     "joint_torque": "N m",
     "temperature": "K",
     "ambient_temperature": "K",
+    "ambient_pressure": "Pa",
     "reference": "rad",
     "joint_rate": "rad/s",
     "length_rate": "m/s",

@@ -6,8 +6,8 @@ angle, the volt and the ampere count as dimensions of their own, so that a press
 is an error and not a number; inside a compound unit (``N m/rad``) the angle may be left out.
 
 Pressures are gauge pressures, and a unit may say so: ``"bar(g)"``, ``"barg"``, ``"psi gauge"``. An
-absolute one (``"bar(a)"``, ``"psia"``, ``"kPa abs"``) is told by :func:`split_absolute`, and read only
-where there is an ambient pressure to subtract.
+absolute one (``"bar(a)"``, ``"psia"``, ``"kPa abs"``) is told by :func:`measured_from`, and read
+only where there is an ambient pressure to subtract.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ __all__ = [
     "Unit",
     "bar_and_psi",
     "from_si",
+    "measured_from",
     "parse_unit",
     "same_dimension",
-    "split_absolute",
     "to_si",
     "with_unit",
 ]
@@ -204,7 +204,7 @@ def _product(text: str, whole: str) -> tuple[float, list[int]]:
 
 
 def _unknown(whole: str, factor: str) -> str:
-    if split_absolute(whole)[1]:
+    if measured_from(whole)[1] == "absolute":
         return (
             f"unit {whole!r}: pressures are gauge pressures here (subtract the ambient pressure "
             "first)"
@@ -217,22 +217,8 @@ def _unknown(whole: str, factor: str) -> str:
     return f"unknown unit {factor!r}{where}{hint}"
 
 
-def _measured_from(unit: str) -> tuple[str, str]:
-    """A unit of pressure, and the word behind it that says what it is measured from, or none."""
-    match = _MEASURED_FROM.fullmatch(unit)
-    if match is None or unit in _SYMBOLS:
-        return unit, ""
-    try:
-        alone = _compound(match["unit"])
-    except ParameterError:
-        return unit, ""
-    if alone.dimension != _PA:
-        return unit, ""
-    return match["unit"], (match["inside"] or match["behind"]).lower()
-
-
-def split_absolute(unit: str) -> tuple[str, bool]:
-    """A unit without the words that make it one of absolute pressure.
+def measured_from(unit: str) -> tuple[str, str]:
+    """A unit of pressure without the words behind it that say what it is measured from.
 
     Parameters
     ----------
@@ -242,18 +228,27 @@ def split_absolute(unit: str) -> tuple[str, bool]:
     Returns
     -------
     unit : str
-        For an absolute pressure the unit alone, else what was given.
-    absolute : bool
-        Whether it is one.
+        The unit alone; where no such words stand behind a unit of pressure, what was given.
+    kind : str
+        ``"gauge"``, ``"absolute"``, or empty where it does not say.
 
     Examples
     --------
-    >>> split_absolute("bar(a)"), split_absolute("kPa abs"), split_absolute("psi")
-    (('bar', True), ('kPa', True), ('psi', False))
+    >>> measured_from("bar(a)"), measured_from("kPa gauge"), measured_from("psi")
+    (('bar', 'absolute'), ('kPa', 'gauge'), ('psi', ''))
     """
     text = unit.strip()
-    alone, measured_from = _measured_from(text)
-    return (alone, True) if measured_from in _FROM_NOTHING else (unit, False)
+    match = _MEASURED_FROM.fullmatch(text)
+    if match is None or text in _SYMBOLS:
+        return unit, ""
+    try:
+        alone = _compound(match["unit"])
+    except ParameterError:
+        return unit, ""
+    if alone.dimension != _PA:
+        return unit, ""
+    word = (match["inside"] or match["behind"]).lower()
+    return match["unit"], "gauge" if word in _FROM_AMBIENT else "absolute"
 
 
 @lru_cache(maxsize=512)
@@ -281,8 +276,8 @@ def parse_unit(unit: str) -> Unit:
     if text in _OFFSETS:
         scale, offset = _OFFSETS[text]
         return Unit(scale, offset, _K)
-    pressure, measured_from = _measured_from(text)
-    if measured_from in _FROM_NOTHING:
+    pressure, kind = measured_from(text)
+    if kind == "absolute":
         raise ParameterError(_unknown(text, text))
     return _compound(pressure)
 

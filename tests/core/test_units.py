@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pamrs.errors import PamrsError, ParameterError
-from pamrs.units import DIMENSIONS, from_si, parse_unit, same_dimension, split_absolute, to_si
+from pamrs.units import DIMENSIONS, from_si, measured_from, parse_unit, same_dimension, to_si
 
 KNOWN = [
     (1.0, "bar", "Pa", 1e5),
@@ -117,15 +117,16 @@ def test_helpful_messages() -> None:
     ],
 )  # fmt: skip
 def test_absolute_pressures_are_told_from_gauge_pressures(unit: str, alone: str) -> None:
-    assert split_absolute(unit) == (alone, True)
-    assert split_absolute(alone) == (alone, False)
+    assert measured_from(unit) == (alone, "absolute")
+    assert measured_from(alone) == (alone, "")
+    assert measured_from(f"{alone}(g)") == (alone, "gauge")
     with pytest.raises(ParameterError, match="gauge pressures here"):
         parse_unit(unit)
 
 
 @pytest.mark.parametrize("unit", ["a", "m(a)", "V abs", "kg a", "bar(b)", "bar(a)(a)"])
 def test_only_pressures_are_absolute(unit: str) -> None:
-    assert split_absolute(unit) == (unit, False)
+    assert measured_from(unit) == (unit, "")
 
 
 @given(st.text(max_size=12))

@@ -153,6 +153,16 @@ def test_without_clock_or_channel(tmp_path: Path) -> None:
         ("axis/t", "axis/t", ""),
         ("gain_m", "gain_m", ""),
         ("time [zz]", "time", "zz"),
+        ("Comp_P_(mA)", "Comp_P", "mA"),
+        ("p1 {bar}", "p1", "bar"),
+        ("p1 <psi>", "p1", "psi"),
+        ("p1 (bar(a))", "p1", "bar(a)"),
+        ("p1 (counts)", "p1", "counts"),
+        ("p1 (bar/x)", "p1", "bar/x"),
+        ("p1_bar_abs", "p1_bar_abs", "bar abs"),
+        ("p1 psia", "p1 psia", "psia"),
+        ("torque_V", "torque_V", "V"),
+        ("p1 [4..20 mA = 0..6 bar]", "p1", "4..20 mA = 0..6 bar"),
     ],
 )
 def test_headings(heading: str, name: str, unit: str) -> None:
@@ -160,21 +170,28 @@ def test_headings(heading: str, name: str, unit: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "unit", "offset"),
+    ("text", "unit", "absolute"),
     [
-        ("bar", "bar", 0.0), ("PSI", "psi", 0.0), ("[V]", "V", 0.0), ("Seconds", "s", 0.0),
-        ("°C", "°C", 0.0), ("N.m", "N m", 0.0), ("KPA", "kPa", 0.0), ("bara", "bar", -1.01325),
-        ("psia", "psi", -14.695949), ("MPa", "MPa", 0.0), ("mm", "mm", 0.0),
+        ("bar", "bar", None), ("PSI", "psi", None), ("[V]", "V", None), ("Seconds", "s", None),
+        ("°C", "degC", None), ("N.m", "N m", None), ("KPA", "kPa", None), ("bara", "bar", True),
+        ("psia", "psi", True), ("MPa", "MPa", None), ("mm", "mm", None), ("(bar(a))", "bar", True),
+        ("PSI(A)", "psi", True), ("kPa abs.", "kPa", True), ("BARG", "bar", False),
+        ("kg/cm²", "kgf/cm2", None), ("mm Hg", "mmHg", None), ("mH₂O", "mH2O", None),
+        ("atü", "at", False), ("mA", "mA", None), ("N·m", "N·m", None), ("nm", "Nm", None),
     ],
 )  # fmt: skip
-def test_units_as_logs_write_them(text: str, unit: str, offset: float) -> None:
-    known = understood_unit(text)
-    assert known is not None
-    assert known.unit == unit
-    assert known.offset == pytest.approx(offset, rel=1e-6)
+def test_units_as_logs_write_them(text: str, unit: str, absolute: bool | None) -> None:
+    assert understood_unit(text) == (unit, absolute, None)
 
 
-@pytest.mark.parametrize("text", ["", "-", "%", "1", "counts", "foo"])
+@pytest.mark.parametrize(
+    "text", ["4..20 mA = 0..6 bar(a)", "0..6 bar abs = 4..20 mA", "4 – 20 mA -> 0 – 6 bar(a)"]
+)
+def test_a_calibration_is_read_where_a_unit_stands(text: str) -> None:
+    assert understood_unit(text) == ("bar", True, ((4.0, 20.0), (0.0, 6.0)))
+
+
+@pytest.mark.parametrize("text", ["", "-", "%", "1", "counts", "foo", "a", "bar" * 40])
 def test_what_is_no_unit(text: str) -> None:
     assert understood_unit(text) is None
 

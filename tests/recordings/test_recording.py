@@ -560,9 +560,11 @@ def test_sealed_recordings_are_sound(case: Path) -> None:
 
 def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
     header = ",".join(f"{name} [{channel.unit}]" for name, channel in CHANNELS.items())
-    values = {"V": "5", "Pa": "30{}", "K": "300"}
+    values = {"V": "5", "Pa": "100{}", "K": "300", "ambient_pressure": "100{}00"}
     cells = [
-        values.get(channel.unit, "0.5") for name, channel in CHANNELS.items() if name != "time"
+        values.get(name, values.get(channel.unit, "0.5"))
+        for name, channel in CHANNELS.items()
+        if name != "time"
     ]
     rows = "\n".join(
         f"{i}," + ",".join(cell.format(i * 7 % 11) for cell in cells) for i in range(9)

@@ -36,6 +36,7 @@ from pamrs.diagnosis.prepare import (
     begun_alike,
     check_plausible,
     check_sense,
+    noted_units,
     prepare,
     said_of_beginnings,
     suspected_units,
@@ -211,7 +212,7 @@ def diagnose(
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     _check_rig(case)
-    suspected = suspected_units(case)
+    suspected = [*suspected_units(case), *noted_units(case)]
     chosen = DiagnosisSettings() if settings is None else settings
     try:
         case, held = _nominal(case, chosen)

@@ -16,6 +16,7 @@ from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, jo
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._recording import OwnValue, Recording
+from pamrs.recordings._suspicion import ambient_of
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
 from pamrs.units import to_si
@@ -278,11 +279,13 @@ def _recordings(
             )
             continue
         options = {key: entry[key] for key in _FORMAT if key in entry}
+        ambient = None if rig is None else ambient_of(rig)
         try:
             if "channels" in entry:
-                parts = _from_log(file, role, entry, logs)
+                parts = _from_log(file, role, entry, logs, ambient)
             else:
-                whole = load_recording(file, role=role, name=entry.get("name"), **options)
+                options |= {"role": role, "name": entry.get("name"), "ambient_pressure": ambient}
+                whole = load_recording(file, **options)
                 parts = [whole.between(entry.get("start"), entry.get("stop"))]
             recordings += [replace(part, parameters=own) for part in parts]
         except RecordingError as error:
@@ -356,7 +359,11 @@ def _check_logs(home: Path, entries: list[Mapping[str, Any]]) -> None:
 
 
 def _from_log(
-    file: Path, role: str, entry: Mapping[str, Any], logs: dict[Any, Log]
+    file: Path,
+    role: str,
+    entry: Mapping[str, Any],
+    logs: dict[Any, Log],
+    ambient: float | None,
 ) -> list[Recording]:
     """The recordings of an entry that says where its channels are; a file is read once."""
     names = entry.get("columns")
@@ -368,7 +375,7 @@ def _from_log(
     if key not in logs:
         logs[key] = read_log(file, form)
     options = {name: entry[name] for name in _OPTIONS if name in entry}
-    return load_recordings(file, role=role, log=logs[key], **options)
+    return load_recordings(file, role=role, log=logs[key], ambient_pressure=ambient, **options)
 
 
 def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:

@@ -15,13 +15,14 @@ import numpy as np
 from pamrs.channels import channel_of
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._clock import Array
+from pamrs.recordings._gauge import made_gauge
 from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
 from pamrs.recordings._recording import CHANNELS, Issue, Recording
 from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
 from pamrs.recordings._stamps import Ticks, ticks, unit_of_stamps
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
-from pamrs.units import parse_unit, same_dimension, to_si
+from pamrs.units import same_dimension, to_si
 
 __all__ = ["Clocks", "load_recordings", "recordings_of"]
 
@@ -42,6 +43,7 @@ def load_recordings(
     role: str = "fit",
     form: TextFormat | None = None,
     log: Log | None = None,
+    ambient_pressure: float | None = None,
 ) -> list[Recording]:
     """Read recordings out of a log that stays as it is.
 
@@ -51,9 +53,10 @@ def load_recordings(
         Any log that :func:`pamrs.recordings.logs.read_log` reads.
     channels : mapping
         From channels to where they are: ``{"muscle_pressure": {"column": "AI/p1", "unit": "bar",
-        "scale": 2.5}}``. Values are ``scale * raw + offset`` in ``unit``, or on the line through
-        two readings (``"from": [0, 4095], "to": [0, 10]``); ``time`` is a clock of the channel
-        alone, ``hold`` says that it was logged on change.
+        "scale": 2.5}}``. Values are ``scale * raw + offset`` in ``unit``, or on the lines through
+        two or more readings (``"from": [0, 4095], "to": [0, 10]``); ``time`` is a clock of the
+        channel alone, ``hold`` says that it was logged on change. ``{"value": 0.25, "unit": "m"}``
+        is a channel that had this value all the time.
     time : str or mapping, optional
         The series with the times of all channels, ``{"column": "t", "unit": "ms", "offset": 0}``;
         not needed where the log has clocks.
@@ -72,6 +75,9 @@ def load_recordings(
         How a text file is written, where that is not to be found out.
     log : Log, optional
         The log, where it was read before.
+    ambient_pressure : float, optional
+        What is subtracted from absolute pressures (a unit like ``bar(a)``) where no channel
+        ``ambient_pressure`` was recorded [Pa]; by default that of the standard atmosphere.
 
     Returns
     -------
@@ -93,15 +99,50 @@ def load_recordings(
             f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
         )
     sources = read_sources(channels, source)
+    constants = [item for item in sources if not item.column]
+    sources = [item for item in sources if item.column]
+    if not sources:
+        raise RecordingError(f"{source}: every channel has a value; one of the log is needed")
     clock = read_clock(time, source)
     cut = read_split(split, source)
     content = log or read_log(file, form)
     stem = re.sub(r"\.[^.]*$", "", file.name.removesuffix(".gz"))
     found = recordings_of(content, sources, clock, name or stem, role, sample_time, cut, pieces)
-    said = {item.channel: item.unit for item in sources}
-    return [
-        replace(recording, source=source, said=said).between(start, stop) for recording in found
-    ]
+    made = []
+    for recording in found:
+        whole = _completed(replace(recording, source=source), [*sources, *constants])
+        absolute = [item.channel for item in (*sources, *constants) if item.absolute]
+        made.append(made_gauge(whole, absolute, ambient_pressure).between(start, stop))
+    return made
+
+
+def _completed(recording: Recording, sources: Sequence[Source]) -> Recording:
+    """A recording with its constant channels, and what is said of all."""
+    channels, masks = dict(recording.channels), dict(recording.mask)
+    units = dict(recording.units)
+    for item in sources:
+        if not item.column:
+            channels[item.channel] = np.full(len(recording), float(item.si(item.value)))
+            masks[item.channel] = np.ones(len(recording), dtype=bool)
+            units[item.channel] = _si_unit(item)
+    return replace(
+        recording,
+        channels=channels,
+        mask=masks,
+        units=units,
+        said={item.channel: item.unit for item in sources},
+        notes={
+            item.channel: f"is assumed to be in {item.unit}: {item.assumed}"
+            for item in sources
+            if item.assumed
+        },
+    )
+
+
+def _si_unit(item: Source) -> str:
+    if channel_of(item.channel) == "reference" and not same_dimension(item.unit, "rad"):
+        return "Pa"
+    return CHANNELS[channel_of(item.channel)].unit
 
 
 def recordings_of(
@@ -191,11 +232,7 @@ def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
             f"{log.path}: {item.column!r} holds texts like {series.labels[0]!r}, no numbers for "
             f"{item.channel!r}"
         )
-    parsed = parse_unit(item.unit)
-    values = (item.scale * series.values + item.offset) * parsed.scale + parsed.offset
-    unit = CHANNELS[channel_of(item.channel)].unit
-    if channel_of(item.channel) == "reference" and not same_dimension(item.unit, "rad"):
-        unit = "Pa"
+    values, unit = item.si(series.values), _si_unit(item)
     return sampled(item.channel, values, clocks.of(series, clock), unit, item.hold)
 
 

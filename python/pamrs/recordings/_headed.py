@@ -16,11 +16,12 @@ import numpy as np
 from pamrs.channels import channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._clock import Array
+from pamrs.recordings._gauge import made_gauge
 from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS, Issue, Recording
 from pamrs.recordings._several_clocks import recording_of, sampled
 from pamrs.recordings._stamps import Ticks, ticks
 from pamrs.recordings.table import Table, read_table, thousands_of
-from pamrs.units import parse_unit, to_si
+from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["load_recording"]
 
@@ -38,6 +39,7 @@ def load_recording(
     decimal: str = ".",
     name: str | None = None,
     role: str = "fit",
+    ambient_pressure: float | None = None,
 ) -> Recording:
     """Read a recording, check it and lay it on a uniform grid.
 
@@ -60,6 +62,9 @@ def load_recording(
         Decimal mark.
     name, role : str
         Name (default: the file's stem) and role, ``fit`` or ``held_out``.
+    ambient_pressure : float, optional
+        What is subtracted from absolute pressures (``bar(a)``) where the file has no channel
+        ``ambient_pressure`` [Pa]; by default that of the standard atmosphere.
 
     Returns
     -------
@@ -95,14 +100,16 @@ def load_recording(
     remarks = [("time", text) for text in table.remarks]
     raw, units = _si_columns(table, wanted, source, thousands, decimal, remarks)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    said = {channel: unit for channel, (_, unit) in wanted.items() if channel != "time"}
+    said = {channel: unit for channel, (_, unit, _) in wanted.items() if channel != "time"}
     clock = _clock(raw, source, sample_time)
     channels = [sampled(channel, raw[channel], clock, units[channel]) for channel in said]
     remarks += [("time", text) for text in (*clock.remarks, clock.spread[1]) if text]
     remarks += [(channel.name, text) for channel in channels for text in channel.remarks]
     recording = recording_of(name or stem, role, channels, source, sample_time, said)
     issues = [Issue("log", channel, 0.0, recording.duration, text) for channel, text in remarks]
-    return replace(recording, source=source, said=said, issues=[*issues, *recording.issues])
+    recording = replace(recording, source=source, said=said, issues=[*issues, *recording.issues])
+    absolute = [channel for channel, (*_, absolute) in wanted.items() if absolute]
+    return made_gauge(recording, absolute, ambient_pressure)
 
 
 def _clock(raw: dict[str, Array], source: str, sample_time: float | None) -> Ticks:
@@ -150,10 +157,10 @@ def _headings(
     return list(columns)
 
 
-def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
-    """Canonical name -> (column, unit) of every heading that is to be used."""
+def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, bool]]:
+    """Canonical name -> (column, unit, whether absolute) of every heading that is to be used."""
     problems: list[str] = []
-    wanted: dict[str, tuple[int, str]] = {}
+    wanted: dict[str, tuple[int, str, bool]] = {}
     for index, heading in enumerate(headings):
         if not heading.strip():
             continue
@@ -177,10 +184,11 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str]]:
         elif name in wanted:
             problems.append(f"column {heading!r}: the channel {name!r} is there twice")
         else:
-            trouble = _unit_trouble(unit, expected)
+            alone, kind = measured_from(unit.strip())
+            trouble = _unit_trouble(alone, expected)
             if trouble:
                 problems.append(f"column {heading!r}: {trouble}")
-            wanted[name] = (index, unit.strip())
+            wanted[name] = (index, alone, kind == "absolute")
     if not problems and not set(wanted) - {"time"}:
         problems.append("there is no channel to use")
     if problems:
@@ -202,7 +210,7 @@ def _unit_trouble(unit: str, expected: Sequence[str]) -> str | None:
 
 def _si_columns(
     table: Table,
-    wanted: Mapping[str, tuple[int, str]],
+    wanted: Mapping[str, tuple[int, str, bool]],
     source: str,
     thousands: str | Mapping[str, str] | None,
     decimal: str,
@@ -218,7 +226,7 @@ def _si_columns(
             )
     raw: dict[str, Array] = {}
     units: dict[str, str] = {}
-    for name, (index, unit) in wanted.items():
+    for name, (index, unit, _) in wanted.items():
         mark = thousands_of(thousands, name)
         numbers, missing = table.samples(index, f"{name} [{unit}]", source, mark, decimal)
         remarks += [(name, missing)] if missing else []

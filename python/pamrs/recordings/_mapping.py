@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 import difflib
+import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pamrs.channels import channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS
-from pamrs.units import to_si
+from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["Clock", "Source", "read_clock", "read_sources"]
 
-_ENTRY: Final = ("column", "unit", "scale", "offset", "from", "to", "time", "hold")
+_ENTRY: Final = ("column", "unit", "scale", "offset", "from", "to", "time", "hold", "assumed")
+_CONSTANT: Final = ("value", "unit", "assumed")
 _CLOCK: Final = ("column", "unit", "offset")
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -47,24 +54,52 @@ class Source:
     channel : str
         Its name, ``muscle_pressure``.
     column : str
-        The series of the log.
+        The series of the log; empty for a channel that had one value all the time.
     unit : str
         Unit after scale and offset.
+    absolute : bool
+        Whether that is an absolute pressure.
     scale, offset : float
         From the numbers of the log.
+    table : tuple of tuple of float, optional
+        Instead of them: three or more numbers of the log, rising, and the values that they stand
+        for. Straight between neighbours, and beyond the ends as in the last interval.
+    value : float
+        For a channel with one value, that, in `unit`.
     clock : Clock, optional
         Its own; by default that of the recording.
     hold : bool
         It was logged on change: a value holds until the next one.
+    assumed : str
+        Why the unit is assumed, where the log says none.
     """
 
     channel: str
     column: str
     unit: str
+    absolute: bool = False
     scale: float = 1.0
     offset: float = 0.0
+    table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    value: float = math.nan
     clock: Clock | None = None
     hold: bool = False
+    assumed: str = ""
+
+    def si(self, raw: Array | float) -> Array:
+        """Values in SI of numbers of the log; absolute pressures stay absolute."""
+        values = self.scale * np.asarray(raw, dtype=np.float64) + self.offset
+        if self.table is not None:
+            values = _along(np.asarray(raw, dtype=np.float64), *map(np.asarray, self.table))
+        unit = parse_unit(self.unit)
+        return np.asarray(values * unit.scale + unit.offset)
+
+
+def _along(raw: Array, given: Array, stand_for: Array) -> Array:
+    """Values on the lines between neighbours of a table, and on its last ones beyond its ends."""
+    place = np.clip(np.searchsorted(given, raw) - 1, 0, len(given) - 2)
+    slope = np.diff(stand_for) / np.diff(given)
+    return np.asarray(stand_for[place] + slope[place] * (raw - given[place]))
 
 
 def read_sources(channels: Any, source: str) -> list[Source]:
@@ -73,7 +108,8 @@ def read_sources(channels: Any, source: str) -> list[Source]:
     Parameters
     ----------
     channels : mapping
-        From names of channels to tables with ``column``, ``unit`` and what else there is.
+        From names of channels to tables with ``column``, ``unit`` and what else there is, or with
+        ``value`` and ``unit``.
     source : str
         The file, for messages.
 
@@ -106,7 +142,7 @@ def read_sources(channels: Any, source: str) -> list[Source]:
 def _flat(channels: Mapping[str, Any]) -> Iterable[tuple[str, Any]]:
     """``muscle_pressure.flexor = {...}`` is a table in a table for TOML."""
     for name, entry in channels.items():
-        nested = isinstance(entry, Mapping) and "column" not in entry and entry
+        nested = isinstance(entry, Mapping) and not {"column", "value"} & set(entry) and entry
         if nested and all(isinstance(inside, Mapping) for inside in entry.values()):
             yield from ((f"{name}.{block}", inside) for block, inside in entry.items())
         else:
@@ -126,18 +162,40 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     if not isinstance(entry, Mapping):
         problems.append(f'{label} = {entry!r} is not allowed: {{ column = "...", unit = "..." }}')
         return None
-    _strange(problems, label, entry, _ENTRY)
-    for key in ("column", "unit"):
+    constant = "value" in entry
+    _strange(problems, label, entry, _CONSTANT if constant else _ENTRY)
+    for key in ("unit",) if constant else ("column", "unit"):
         if not isinstance(entry.get(key), str) or not entry.get(key):
             problems.append(f"{label}.{key} = {entry.get(key)!r} is not allowed: a text is needed")
             return None
-    _check_unit(problems, label, channel, entry["unit"])
+    assumed = entry.get("assumed", "")
+    if not isinstance(assumed, str):
+        problems.append(f"{label}.assumed = {assumed!r} is not allowed: a text says why")
+        return None
+    unit, kind = measured_from(entry["unit"])
+    _check_unit(problems, label, channel, unit)
+    absolute = kind == "absolute"
+    if constant:
+        value = entry["value"]
+        if not _finite(value):
+            problems.append(f"{label}.value = {value!r} is not allowed: a number is needed")
+            return None
+        return Source(name, "", unit, absolute, value=float(value), assumed=assumed)
     hold = entry.get("hold", False)
     if not isinstance(hold, bool):
         problems.append(f"{label}.hold = {hold!r} is not allowed: true or false is needed")
-    scale, offset = _line(problems, label, entry)
+    line = _line(problems, label, entry)
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
-    return Source(name, entry["column"], entry["unit"], scale, offset, clock, hold is True)
+    return Source(
+        name,
+        entry["column"],
+        unit,
+        absolute,
+        *line,
+        clock=clock,
+        hold=hold is True,
+        assumed=assumed,
+    )
 
 
 def _check_unit(problems: list[str], label: str, channel: str, unit: str) -> None:
@@ -152,8 +210,13 @@ def _check_unit(problems: list[str], label: str, channel: str, unit: str) -> Non
         problems.append(f"{label}.unit: {troubles[0]}")
 
 
-def _line(problems: list[str], label: str, entry: Mapping[str, Any]) -> tuple[float, float]:
-    """Scale and offset, given so or by two readings and what they stand for."""
+_Table = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+def _line(
+    problems: list[str], label: str, entry: Mapping[str, Any]
+) -> tuple[float, float, _Table | None]:
+    """Scale and offset, given so or by two readings and what they stand for; the table of more."""
     if ("from" in entry) != ("to" in entry) or (
         "from" in entry and {"scale", "offset"} & set(entry)
     ):
@@ -161,30 +224,43 @@ def _line(problems: list[str], label: str, entry: Mapping[str, Any]) -> tuple[fl
             f"{label}: from and to belong together, like from = [0, 4095], to = [0, 10], and stand "
             "instead of scale and offset"
         )
-        return 1.0, 0.0
+        return 1.0, 0.0, None
     if "from" in entry:
-        pairs = [entry["from"], entry["to"]]
-        if not all(
-            isinstance(pair, (list, tuple)) and len(pair) == 2 and all(map(_finite, pair))
-            for pair in pairs
-        ):
-            problems.append(
-                f"{label}: from = {pairs[0]!r}, to = {pairs[1]!r} is not allowed: two numbers each"
-            )
-            return 1.0, 0.0
-        (low, high), (first, last) = pairs
-        if low == high or first == last:
-            problems.append(f"{label}: from = {pairs[0]!r}, to = {pairs[1]!r}: two equal numbers")
-            return 1.0, 0.0
-        scale = (last - first) / (high - low)
-        return scale, first - scale * low
+        return _calibration(problems, label, entry["from"], entry["to"])
     for key in ("scale", "offset"):
         value = entry.get(key, 1.0)
         if not _finite(value) or (key == "scale" and value == 0):
             needed = "a number other than zero" if key == "scale" else "a number"
             problems.append(f"{label}.{key} = {value!r} is not allowed: {needed} is needed")
-            return 1.0, 0.0
-    return float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0))
+            return 1.0, 0.0, None
+    return float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0)), None
+
+
+def _calibration(
+    problems: list[str], label: str, given: Any, stand_for: Any
+) -> tuple[float, float, _Table | None]:
+    pairs = [given, stand_for]
+    if not all(
+        isinstance(p, (list, tuple)) and len(p) > 1 and all(map(_finite, p)) for p in pairs
+    ) or len(given) != len(stand_for):
+        problems.append(
+            f"{label}: from = {given!r}, to = {stand_for!r} is not allowed: as many numbers in "
+            "both, two at least"
+        )
+        return 1.0, 0.0, None
+    rises = [b > a for a, b in itertools.pairwise(given)]
+    falls = [b < a for a, b in itertools.pairwise(given)]
+    if not (all(rises) or all(falls)) or min(stand_for) == max(stand_for):
+        problems.append(
+            f"{label}: from = {given!r}, to = {stand_for!r}: two equal numbers, or from neither "
+            "rises nor falls all the way"
+        )
+        return 1.0, 0.0, None
+    if len(given) == 2:
+        scale = (stand_for[1] - stand_for[0]) / (given[1] - given[0])
+        return scale, stand_for[0] - scale * given[0], None
+    way = 1 if rises[0] else -1
+    return 1.0, 0.0, (tuple(map(float, given[::way])), tuple(map(float, stand_for[::way])))
 
 
 def _finite(value: object) -> bool:

@@ -18,7 +18,7 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
 from pamrs.recordings._from_log import Clocks
 from pamrs.recordings._mapping import Clock
-from pamrs.recordings._matching import Match, channels_of, matched, words_of
+from pamrs.recordings._matching import Match, Open, channels_of, matched, words_of
 from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
 from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
@@ -81,6 +81,8 @@ class LogProposal:
         Which of them is which channel.
     time : dict
         The key ``time``; empty where the log has clocks.
+    left : list of Open
+        Series that are called like a channel, but whose unit is left to the user.
     split : str or dict, optional
         The key ``split``.
     pieces : list of int
@@ -95,6 +97,7 @@ class LogProposal:
     listed: list[Listed]
     matches: list[Match]
     time: dict[str, Any] = field(default_factory=dict)
+    left: list[Open] = field(default_factory=list)
     split: str | dict[str, Any] | None = None
     pieces: list[int] = field(default_factory=list)
     short: int = 0
@@ -180,16 +183,27 @@ class Proposal:
             lines.append(f"pieces = {_toml(pieces)}")
         lines.append("[recording.channels]")
         for match in item.matches:
-            entry: dict[str, Any] = {"column": match.series.name, "unit": match.unit}
-            if match.offset:
-                entry["offset"] = float(f"{match.offset:.6g}")
+            unit = f"{match.unit}(a)" if match.absolute else match.unit
+            entry: dict[str, Any] = {"column": match.series.name, "unit": unit}
+            if match.calibration is not None:
+                entry["from"], entry["to"] = map(list, match.calibration)
+            if match.assumed:
+                entry["assumed"] = match.assumed
             if match.time and match.time != item.time:
                 entry["time"] = match.time
             if match.hold:
                 entry["hold"] = True
-            key = _toml(match.channel) if "." in match.channel else match.channel
-            lines.append(f"{key} = {_toml(entry)}")
+            lines.append(f"{_key(match.channel)} = {_toml(entry)}")
+        for each in item.left:
+            entry = {"column": each.series, "unit": each.unit}
+            if each.readings:
+                entry |= {"from": list(each.readings), "to": [0, 1]}
+            lines += [f"# {each.text}:", f"# {_key(each.channel)} = {_toml(entry)}"]
         return lines
+
+
+def _key(channel: str) -> str:
+    return _toml(channel) if "." in channel else channel
 
 
 def _toml(value: Any) -> str:
@@ -247,7 +261,8 @@ def _proposal(
 ) -> LogProposal:
     clocks = _Clocks(log, sample_time)
     candidates = [series for name, series in log.series.items() if name not in clocks.used]
-    matches, remarks = matched(candidates, wanted, rig)
+    matches, left, remarks = matched(candidates, wanted, rig)
+    remarks += [each.text for each in left]
     made = {match.channel: clocks.of(match.series) for match in matches}
     known = {name: clock for name, clock in made.items() if clock is not None}
     laid = {
@@ -275,7 +290,8 @@ def _proposal(
         {m.channel: laid[m.channel].time for m in matches if not m.hold and m.channel in laid}
     )
     remarks += _suspect(matches, rig, laid)
-    missing = [name for name in wanted if name not in made and channel_of(name) not in SLOW]
+    begun = {*made, *(each.channel for each in left)}
+    missing = [name for name in wanted if name not in begun and channel_of(name) not in SLOW]
     if missing and rig is not None:
         told = ", ".join(_spoken(name, rig) for name in missing)
         remarks.append(f"not found in this log: {told}")
@@ -289,7 +305,7 @@ def _proposal(
     read = [*log.remarks, *clocks.remarks]
     read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]
     log = replace(log, remarks=read)
-    return LogProposal(log, listed, matches, shared, split, pieces, short, remarks)
+    return LogProposal(log, listed, matches, shared, left, split, pieces, short, remarks)
 
 
 def _unit(match: Match) -> str:
@@ -428,7 +444,7 @@ def _rates(times: dict[str, Array]) -> list[str]:
 
 def _suspect(matches: Sequence[Match], rig: Rig | None, laid: Mapping[str, Sampled]) -> list[str]:
     values = {m.channel: laid[m.channel].values if m.channel in laid else m.si() for m in matches}
-    said = {match.channel: match.unit for match in matches if match.said}
+    said = {match.channel: match.unit for match in matches if not match.assumed}
     return [found.text for found in suspicions(values, said, rig)]
 
 

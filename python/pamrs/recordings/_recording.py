@@ -47,8 +47,9 @@ class _Channel(NamedTuple):
     upper: float
 
 
-#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge). Where a rig has
-#: several blocks of a kind, the name of the block stands behind a dot: ``muscle_pressure.flexor``.
+#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge, but for the
+#: ambient one). Where a rig has several blocks of a kind, the name of the block stands behind a
+#: dot: ``muscle_pressure.flexor``.
 CHANNELS: Final[dict[str, _Channel]] = {
     name: _Channel(UNITS[name], lower, upper)
     for name, lower, upper in (
@@ -65,6 +66,7 @@ CHANNELS: Final[dict[str, _Channel]] = {
         ("joint_torque", -1e7, 1e7),
         ("temperature", 50.0, 2000.0),
         ("ambient_temperature", 50.0, 2000.0),
+        ("ambient_pressure", 2e4, 1.2e5),
         ("reference", -1e9, 1e9),
     )
 }
@@ -164,6 +166,9 @@ class Recording:
     commands : dict of str to (n * m,) array
         Where each sample is a mean of `m` of the log: the commands of the log, from each sample to
         the next, with holes filled. Empty elsewhere.
+    notes : dict of str to str
+        By channel, a sentence on how its numbers became values where the file alone does not say: a
+        unit that was assumed, an ambient pressure that was subtracted.
     """
 
     name: str
@@ -178,6 +183,7 @@ class Recording:
     parameters: dict[str, OwnValue] = field(default_factory=dict)
     said: dict[str, str] = field(default_factory=dict)
     commands: dict[str, Array] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", shown(self.name))

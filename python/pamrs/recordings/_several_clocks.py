@@ -20,7 +20,7 @@ __all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock", "recording_of", "sampled
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
 #: A diagnosis can do without them: they need not last as long as the others.
-SLOW: Final = frozenset({"temperature", "ambient_temperature"})
+SLOW: Final = frozenset({"temperature", "ambient_temperature", "ambient_pressure"})
 #: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
 UNTOLD: Final = SLOW | COMMANDS
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most

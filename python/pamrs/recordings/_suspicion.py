@@ -13,7 +13,7 @@ from pamrs.channels import channel_of, dotted
 from pamrs.rig import Rig
 from pamrs.units import from_si, parse_unit
 
-__all__ = ["Suspicion", "limits_of", "suspicions", "top_of"]
+__all__ = ["AMBIENT", "Suspicion", "ambient_of", "limits_of", "suspicions", "top_of"]
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,7 @@ _RATED: Final = (0.6, 1.5)  # a tank beside what the rig file says of it
 _OVER: Final = 1.15  # a muscle beside what feeds it
 _CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gauge is believed
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
+_STAYS: Final = 0.8  # of the samples near it that are there: a curve that passes has fewer
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
 
@@ -61,6 +62,11 @@ def top_of(values: Array) -> float:
 def _bottom(values: Array) -> float:
     good = values[np.isfinite(values)]
     return float(np.quantile(good, _LOW)) if good.size else 0.0
+
+
+def ambient_of(rig: Rig) -> float:
+    """The ambient pressure that a rig file says, absolute [Pa]."""
+    return float((rig.model.get("gas") or {}).get("ambient_pressure", AMBIENT))
 
 
 def limits_of(rig: Rig | None, name: str) -> tuple[float, float] | None:
@@ -136,8 +142,8 @@ def _other(values: Array | float, said: str, other: str) -> Array | float:
 def _fed_by(
     name: str, channels: Mapping[str, Array], said: Mapping[str, str], rig: Rig | None
 ) -> tuple[float, str] | None:
-    """The pressure that a channel is judged by, and what it is: of a muscle or a line the lower one
-    of what was recorded of its supply and what the rig file or a command says of it.
+    """The pressure that a channel is judged by, and what it is: of a muscle or a line what was
+    recorded of its supply, or else what the rig file or a command says of it.
 
     A regulator may be set to anything: its largest command says how far, and nothing does where
     that was not recorded.
@@ -146,12 +152,9 @@ def _fed_by(
     if channel_of(name) == "supply_pressure":
         return rated
     recorded = _recorded_supply(channels, said, rig)
-    if rated is None:
-        return (recorded, "the recorded supply") if recorded > 0.0 else None
     # a gauge that is not connected tells nothing of what it should measure
-    if _CONNECTED * rated[0] < recorded < rated[0]:
-        return recorded, "the recorded supply"
-    return rated
+    connected = recorded > 0.0 and (rated is None or recorded > _CONNECTED * rated[0])
+    return (recorded, "the recorded supply") if connected else rated
 
 
 def _recorded_supply(
@@ -197,7 +200,8 @@ def _pressure(
     reference, what = beside or (_HIGHEST, "what pneumatic muscles take")
     least = _RATED[0] if supply and beside else 0.0
     most = (_RATED[1] if supply else _OVER) if beside else 1.0
-    if top > 0.0 and not least <= top / reference <= most:
+    wrong = top > 0.0 and not least <= top / reference <= most
+    if wrong and not _agrees(name, top, unit, channels, said):
         likely = _fitting(top, unit, reference, least if least else 0.02, most)
         if likely:
             turned = float(_other(top, unit, likely))
@@ -210,6 +214,22 @@ def _pressure(
             )
             return
     yield from _absolute(name, unit, values, rig)
+
+
+def _agrees(
+    name: str, top: float, unit: str, channels: Mapping[str, Array], said: Mapping[str, str]
+) -> bool:
+    """Whether another pressure, or its command, goes as far although it was logged in another unit:
+    two units are not wrong by the same factor.
+    """
+    for other, values in channels.items():
+        own = said.get(other, "")
+        if other == name or not own or channel_of(other) not in (*PRESSURES, "supply_command"):
+            continue
+        same = abs(parse_unit(own).scale / parse_unit(unit).scale - 1.0) < 1e-9
+        if not same and top / _OVER < top_of(values) < top * _OVER:
+            return True
+    return False
 
 
 def _fitting(top: float, unit: str, reference: float, least: float, most: float) -> str:
@@ -228,12 +248,13 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
     good = values[np.isfinite(values)]
     if good.size < 20:
         return
-    ambient = AMBIENT
-    if rig is not None:
-        ambient = float((rig.model.get("gas") or {}).get("ambient_pressure", AMBIENT))
+    ambient = AMBIENT if rig is None else ambient_of(rig)
     low, span = _bottom(good), top_of(good) - _bottom(good)
-    rests = float(np.mean(good <= low + 0.02 * max(span, 0.0) + 500.0))
-    if rests < _REST or span < 0.2 * ambient or channel_of(name) == "supply_pressure":
+    near = 0.02 * max(span, 0.0) + 500.0
+    rests, about = (float(np.mean(good <= low + width * near)) for width in (1.0, 2.0))
+    if rests < max(_REST, _STAYS * about) or span < 0.2 * ambient:
+        return
+    if channel_of(name) == "supply_pressure":
         return
     if abs(low - ambient) < _NEAR * ambient:
         yield Suspicion(
@@ -242,7 +263,7 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
             "absolute",
             f"{name} never falls below {_bar(low)} and rests there for {100 * rests:.0f} % of its "
             f"samples: the ambient pressure, so its values are likely absolute and not gauge; "
-            f"offset = {-from_si(ambient, unit, 'pressure'):.6g} in {unit} makes them gauge",
+            f'unit = "{unit}(a)" makes them gauge',
         )
     elif abs(low + ambient) < _NEAR * ambient:
         yield Suspicion(

@@ -8,7 +8,13 @@ import numpy as np
 
 from pamrs import _core
 from pamrs.channels import channel_of
-from pamrs.diagnosis.prepare import AMBIENT, Block, thermometers_of, warm_chambers
+from pamrs.diagnosis.prepare import (
+    AMBIENT,
+    AMBIENT_PRESSURE,
+    Block,
+    thermometers_of,
+    warm_chambers,
+)
 from pamrs.findings import RecordingUsed
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -76,7 +82,7 @@ def data_used(
         unused = {
             name: _why(name, rig, core, left_out)
             for name in recording.channels
-            if name not in needed and channel_of(name) != AMBIENT
+            if name not in needed and channel_of(name) not in (AMBIENT, AMBIENT_PRESSURE)
         }
         found.append(
             RecordingUsed(

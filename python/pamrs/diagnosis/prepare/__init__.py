@@ -13,7 +13,7 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 
 from __future__ import annotations
 
-from pamrs.diagnosis.prepare._ambient import AMBIENT, at_ambient
+from pamrs.diagnosis.prepare._ambient import AMBIENT, AMBIENT_PRESSURE, at_ambient
 from pamrs.diagnosis.prepare._averaging import averaged, averaged_to_need
 from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings
 from pamrs.diagnosis.prepare._blocks import (
@@ -43,10 +43,11 @@ from pamrs.diagnosis.prepare._signals import (
     warm_chambers,
 )
 from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
-from pamrs.diagnosis.prepare._units import suspected_units
+from pamrs.diagnosis.prepare._units import noted_units, suspected_units
 
 __all__ = [
     "AMBIENT",
+    "AMBIENT_PRESSURE",
     "Block",
     "Overlap",
     "Prepared",
@@ -63,6 +64,7 @@ __all__ = [
     "check_sense",
     "implausible",
     "noise_level",
+    "noted_units",
     "overlap",
     "predicted",
     "prepare",

@@ -12,9 +12,11 @@ from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Parameter, Rig
 
-__all__ = ["AMBIENT", "at_ambient"]
+__all__ = ["AMBIENT", "AMBIENT_PRESSURE", "at_ambient"]
 
 AMBIENT = "ambient_temperature"
+AMBIENT_PRESSURE = "ambient_pressure"
+"""Used where a recording is read: it makes absolute pressures gauge pressures."""
 _NAME = "gas.temperature"
 _SAME = 0.1
 """Temperatures that differ by less are told as the same [K]."""

@@ -1,4 +1,4 @@
-"""Units that physics contradicts."""
+"""Units that physics contradicts, and those that no file says."""
 
 from __future__ import annotations
 
@@ -6,7 +6,28 @@ import numpy as np
 
 from pamrs.recordings import Case, suspicions
 
-__all__ = ["suspected_units"]
+__all__ = ["noted_units", "suspected_units"]
+
+
+def noted_units(case: Case) -> list[str]:
+    """How the numbers of a case's files became values where the files alone do not say: units that
+    were assumed, ambient pressures that were subtracted.
+
+    Parameters
+    ----------
+    case : Case
+        Its recordings.
+
+    Returns
+    -------
+    list of str
+        Sentences, with the recordings that they are about.
+    """
+    where: dict[str, list[str]] = {}
+    for recording in case.recordings:
+        for channel, note in recording.notes.items():
+            where.setdefault(f"{channel} {note}", []).append(recording.name)
+    return [f"{', '.join(names)}: {text}" for text, names in where.items()]
 
 
 def suspected_units(case: Case) -> list[str]:

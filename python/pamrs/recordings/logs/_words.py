@@ -6,44 +6,88 @@ import re
 from typing import Final, NamedTuple
 
 from pamrs.errors import ParameterError
-from pamrs.units import parse_unit
+from pamrs.units import measured_from, parse_unit
 
 __all__ = ["Written", "split_heading", "understood_unit"]
 
+_PAIRS: Final = {"[": "]", "(": ")", "{": "}", "<": ">"}
 _BRACKETS = re.compile(
-    r"^\s*(?P<name>.*?)\s*(?:\[(?P<a>[^\[\]]*)\]|\((?P<b>[^()]*(?:\(a\))?)\))\s*$"
+    r"^\s*(?P<name>.*?)[\s_]*(?:\[(?P<square>[^\[\]]*)\]"
+    r"|(?P<other>\((?:[^()]|\([^()]*\))*\)|\{[^{}]*\}|<[^<>]*>))\s*$"
 )
 _SLASH = re.compile(r"^\s*(?P<name>.+?)\s+(?:/|in)\s*(?P<unit>[^\s/]+)\s*$")
-_TAIL = re.compile(r"^\s*(?P<name>.+)[_.](?P<unit>[A-Za-z°]+)\s*$")
-_AMBIENT: Final = 101325.0
-#: Endings of names, ``p_bar``, that are taken for units; single letters are not.
+_TAIL = re.compile(
+    r"^\s*.+?[_.\s-](?P<unit>[A-Za-z°]+(?:[2-3]?[A-Za-z]*)?(?:[_\s-](?:a|g|abs|gauge))?)\s*$"
+)
+_NUMBER: Final = r"\s*(?P<{}>[-+]?\d+(?:[.,]\d+)?)\s*"
+_RANGE: Final = _NUMBER + r"(?:\.{{2,3}}|…|-|–|to|bis|~)" + _NUMBER
+_CALIBRATION = re.compile(
+    _RANGE.format("a", "b")
+    + r"(?P<of>[^\d\s=:>-][^=:>]*?)?\s*(?:=+>?|->|→|:)"
+    + _RANGE.format("c", "d")
+    + r"(?P<unit>\S.*?)\s*"
+)
+_LONGEST: Final = 80  # letters of a unit with its calibration
+#: Endings of names, ``p_bar``, that are taken for units; of single letters only these.
 _TAILS: Final = frozenset(
-    ("bar", "mbar", "kPa", "MPa", "hPa", "Pa", "psi", "psig", "degC", "deg", "rad", "mm", "ms")
-    + ("us", "mV", "Nm", "kN", "sec")
+    ("bar", "mbar", "kPa", "MPa", "hPa", "Pa", "psi", "psig", "psia", "bara", "barg", "Torr")
+    + ("mmHg", "inHg", "inH2O", "mmH2O", "cmH2O", "mH2O", "atm", "degC", "degF", "deg", "rad")
+    + ("mm", "cm", "ms", "us", "ns", "sec", "mV", "mA", "Nm", "kN", "V", "N", "s")
 )
 _WORDS: Final[dict[str, str]] = {
-    "sec": "s", "secs": "s", "second": "s", "seconds": "s",
+    "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s",
     "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "µs": "us",
-    "volt": "V", "volts": "V", "pascal": "Pa", "pascals": "Pa", "bars": "bar",
-    "bar(g)": "bar", "bar g": "bar", "psi(g)": "psi", "bar_g": "bar",
+    "microsecond": "us", "microseconds": "us", "nanosecond": "ns", "nanoseconds": "ns",
+    "volt": "V", "volts": "V", "millivolt": "mV", "millivolts": "mV",
+    "amp": "A", "amps": "A", "ampere": "A", "amperes": "A", "milliamp": "mA", "milliamps": "mA",
+    "milliampere": "mA", "pascal": "Pa", "pascals": "Pa", "kilopascal": "kPa", "bars": "bar",
+    "millibar": "mbar", "atmospheres": "atm",
+    "kg/cm^2": "kgf/cm2", "kgcm2": "kgf/cm2", "lb/in2": "psi", "lbf/in2": "psi", "pounds": "lb",
+    "mmws": "mmWC", "mws": "mWC", "mmaq": "mmWC", "iwc": "inWC", "inaq": "inWC",
     "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad",
     "newton": "N", "newtons": "N", "newton-meters": "N m", "n*m": "N m", "n.m": "N m",
-    "n-m": "N m", "meter": "m", "meters": "m", "metre": "m", "metres": "m",
+    "n-m": "N m", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "lbs": "lb",
     "millimeter": "mm", "millimeters": "mm", "millimetres": "mm", "kelvin": "K",
     "celsius": "degC", "deg c": "degC", "degrees celsius": "degC", "deg_c": "degC",
-    "°c": "degC", "°f": "degF", "fahrenheit": "degF", "grad c": "degC",
+    "°c": "degC", "°f": "degF", "fahrenheit": "degF", "grad c": "degC", "deg f": "degF",
 }  # fmt: skip
-_ABSOLUTE: Final[dict[str, str]] = {
-    "bara": "bar", "bar(a)": "bar", "bar_abs": "bar", "bar abs": "bar", "bar a": "bar",
-    "psia": "psi", "psi(a)": "psi", "kpaa": "kPa", "kpa(a)": "kPa", "mbara": "mbar",
-}  # fmt: skip
+#: Written where a unit stands, and no unit of anything: what a converter gives, or shares.
+_COUNTS: Final = frozenset(
+    ("count", "counts", "raw", "adc", "dac", "lsb", "digit", "digits", "tick", "ticks", "step")
+    + ("steps", "inc", "bit", "bits", "a.u.", "a. u.", "arb", "arb. units", "%", "percent")
+)
+#: In any capitals a pressure is one: PSIA, KPa, MMHG.
+_PRESSURES: Final = (
+    "kgf/cm2",
+    "mmH2O",
+    "cmH2O",
+    "inH2O",
+    "mH2O",
+    "mmHg",
+    "inHg",
+    "mmWC",
+    "inWC",
+    "Torr",
+    "mbar",
+) + ("mWC", "kPa", "MPa", "hPa", "bar", "psi", "atm", "Pa", "at")
 
 
 class Written(NamedTuple):
-    """A unit of the package, and what is added to values in it (absolute pressures)."""
+    """What a log's unit means.
+
+    Attributes
+    ----------
+    unit : str
+        A unit of the package.
+    absolute : bool, optional
+        Whether it is one of absolute pressure; None where it does not say.
+    calibration : tuple of tuple of float, optional
+        Two numbers of the log, and the values in `unit` that they stand for.
+    """
 
     unit: str
-    offset: float = 0.0
+    absolute: bool | None = None
+    calibration: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 
 def understood_unit(text: str) -> Written | None:
@@ -52,33 +96,78 @@ def understood_unit(text: str) -> Written | None:
     Parameters
     ----------
     text : str
-        ``"bar"``, ``"PSI"``, ``"seconds"``, ``"bara"``.
+        ``"bar"``, ``"PSI"``, ``"seconds"``, ``"bara"``, ``"4..20 mA = 0..6 bar"``.
 
     Returns
     -------
     Written or None
         None where it is no unit that is known.
     """
-    plain = text.strip().strip("[]()").strip()
-    if not plain or plain in ("1", "-", "%"):
+    if len(text) > _LONGEST:
         return None
-    absolute = _ABSOLUTE.get(plain.lower())
-    if absolute:
-        return Written(absolute, -_AMBIENT / parse_unit(absolute).scale)
-    for unit in (plain, _WORDS.get(plain.lower(), ""), plain.lower(), plain.capitalize()):
-        if unit in ("", "g", "l"):
-            continue
+    plain = _unwrapped(text.translate(_PLAIN))
+    if not plain or plain == "1" or plain.lower() in _COUNTS or plain in ("a", "g", "l", "-"):
+        return None
+    calibration = _CALIBRATION.fullmatch(plain)
+    if calibration:
+        return _calibrated(calibration)
+    lower, close = plain.lower(), plain.replace(" ", "")
+    usual = (_WORDS.get(lower, ""), *_pressure(plain), *_pressure(close))
+    for unit in (*usual, plain, lower, plain.capitalize()):
+        alone, kind = measured_from(unit)
         try:
-            parse_unit(unit)
+            parse_unit(alone)
         except ParameterError:
             continue
-        return Written(unit)
-    return {"kpa": Written("kPa"), "mpa": Written("MPa"), "nm": Written("Nm")}.get(plain.lower())
+        return Written(alone, {"absolute": True, "gauge": False}.get(kind))
+    return Written("Nm") if lower == "nm" else None
+
+
+_PLAIN: Final = str.maketrans({"²": "2", "³": "3", "₂": "2", "\N{MICRO SIGN}": "u", "μ": "u"})
+
+
+def _unwrapped(text: str) -> str:
+    """A text without brackets around all of it."""
+    plain = text.strip()
+    while len(plain) > 1 and _PAIRS.get(plain[0]) == plain[-1] and _closed(plain[1:-1]):
+        plain = plain[1:-1].strip()
+    return plain
+
+
+def _closed(text: str) -> bool:
+    """Whether every round bracket that is closed was opened before."""
+    return all(
+        text.count("(", 0, end) >= text.count(")", 0, end) for end in range(1, len(text) + 1)
+    )
+
+
+def _pressure(text: str) -> list[str]:
+    """A text that begins with a unit of pressure, with that written as usual."""
+    lower = text.lower()
+    if lower.startswith(("kg/cm2", "kp/cm2")):
+        return ["kgf" + text[2:]]
+    begun = next((unit for unit in _PRESSURES if lower.startswith(unit.lower())), None)
+    return [] if begun is None else [begun + text[len(begun) :]]
+
+
+def _calibrated(match: re.Match[str]) -> Written | None:
+    """``4..20 mA = 0..6 bar``, or the other way round: what is electric is the log's."""
+    numbers = [float(match[name].replace(",", ".")) for name in ("a", "b", "c", "d")]
+    read, stands_for = (numbers[0], numbers[1]), (numbers[2], numbers[3])
+    of, known = understood_unit(match["of"] or ""), understood_unit(match["unit"])
+    if known is not None and of is not None and parse_unit(known.unit).dimension in _ELECTRIC:
+        read, stands_for, known = stands_for, read, of
+    if known is None or known.calibration or read[0] == read[1] or stands_for[0] == stands_for[1]:
+        return None
+    return known._replace(calibration=(read, stands_for))
+
+
+_ELECTRIC: Final = tuple(parse_unit(unit).dimension for unit in ("A", "V"))
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1 / bar``, ``p1 in bar``,
-    ``p1_bar``.
+    """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1_{bar}``, ``p1 / bar``, ``p1 in
+    bar``, ``p1_bar``, ``p1 bar``.
 
     Parameters
     ----------
@@ -88,17 +177,30 @@ def split_heading(heading: str) -> tuple[str, str]:
     Returns
     -------
     name, unit : str
-        The unit as written, empty where none that is known is there.
+        The unit as written, empty where none is there. Any text in square brackets is one; in
+        others what is known, and what is like one.
     """
+    if len(heading) > 10 * _LONGEST:
+        return heading.strip(), ""
     match = _BRACKETS.match(heading)
-    if match:
-        unit = match["a"] if match["a"] is not None else match["b"]
-        if match["name"] and (match["a"] is not None or understood_unit(unit)):
+    if match and match["name"]:
+        unit = match["square"] if match["square"] is not None else match["other"][1:-1]
+        if match["square"] is not None or understood_unit(unit) or _like_a_unit(unit):
             return match["name"], unit.strip()
     match = _SLASH.match(heading)
     if match and understood_unit(match["unit"]):
         return match["name"], match["unit"]
     match = _TAIL.match(heading)
-    if match and match["unit"] in _TAILS:
-        return heading.strip(), match["unit"]
+    if match and re.split(r"[_\s-]", match["unit"])[0] in _TAILS and understood_unit(match["unit"]):
+        return heading.strip(), match["unit"].replace("_", " ")
     return heading.strip(), ""
+
+
+def _like_a_unit(text: str) -> bool:
+    """Whether a text in round brackets is a unit, if one that is not known."""
+    plain = text.strip().lower()
+    return (
+        plain in _COUNTS
+        or "/" in plain
+        or any(plain.startswith(unit.lower()) for unit in _PRESSURES if len(unit) > 2)
+    )
