@@ -4,7 +4,8 @@ A regulator whose outlet has no gauge begins a recording somewhere between what 
 is set to: at rest all three are the same, and a log that begins as a stopcock is opened has them
 bars apart. Along a tube of segments gas stands or flows: at rest its pressure is that of its ends,
 and a log that begins while air flows has a gradient there. What a block predicts from either tells
-the samples that depend on it; these are not judged.
+the samples that depend on it; these are not judged. A gas with a balance of energy that is let
+out, or filled, as a log begins, is not as warm as the room: where it began is fitted.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import dotted
 from pamrs.diagnosis.prepare._before import Before
-from pamrs.diagnosis.prepare._blocks import Block, Tube, predicted
+from pamrs.diagnosis.prepare._blocks import Block, Tube, predicted, residual
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
@@ -45,12 +46,52 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
     Returns
     -------
     Prepared
-        With `unsettled`, the samples by the channel that each such block predicts.
+        With `unsettled`, the samples by the channel that each such block predicts, and
+        `temperatures` of gases that were not at rest.
     """
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
-    return replace(prepared, unsettled=unsettled) if unsettled else prepared
+    prepared = replace(prepared, unsettled=unsettled) if unsettled else prepared
+    warm = [block for block in blocks if block.warm is not None]
+    began = {block.channel: _began_at(block, core, prepared) for block in warm}
+    known = {channel: found for channel, found in began.items() if found is not None}
+    return replace(prepared, temperatures=known) if known else prepared
+
+
+def _began_at(block: Block, core: _core.Rig, prepared: Prepared) -> float | None:
+    """Temperature at which a gas began [K], as its pressure tells by the nominal model; None where
+    it is seen to stand still, or began as warm as the room.
+
+    A log that begins in a transient has a gas that was compressed or let out before: its start is
+    free, and what it does is not linear, so that the first windows begin where they tell.
+    """
+    settings = prepared.settings.prepare
+    rest = block.warm[1] if block.warm is not None else 0.0
+    early = 2 * settings.window_samples_per_state
+    rows = np.flatnonzero(prepared.recording.mask[block.channel][:early])
+    if rows.size < settings.window_samples_per_state:
+        return None
+    if abs(_trend(prepared, block.channel, rows)) <= settings.still_deviations:
+        return None
+    found = rest
+    for _ in range(settings.begun_steps):
+        there = replace(prepared, temperatures={block.channel: found})
+        try:
+            first = residual(block, core, there, [])
+        except SimulationError:
+            return None
+        if not first.begun or first.starts[0][0] > 0 or first.begun[0].size < 2:
+            return None  # nothing of it is seen
+        found = float(np.clip(found + first.begun[0][-1], 0.5 * rest, 2.0 * rest))
+    return found if abs(found - rest) > settings.begun_temperature_error else None
+
+
+def _trend(prepared: Prepared, channel: str, rows: NDArray[np.intp]) -> float:
+    """Trend of some samples of a channel, in its standard deviations."""
+    way = rows - rows.mean()
+    trend = float(way @ prepared.recording.channels[channel][rows]) / float(np.sqrt(way @ way))
+    return trend / prepared.noise[channel]
 
 
 class _Beginnings:
@@ -104,15 +145,12 @@ class _Beginnings:
         recording, settings = self.prepared.recording, self.prepared.settings.prepare
         least = settings.window_samples_per_state
         early = max(2 * least, int(settings.still_delays * tube.delay / self.prepared.dt))
-        most = settings.still_deviations
         names = [name for name in (tube.beginning, tube.end) if name in recording.channels]
         for name in names:
             rows = np.flatnonzero(recording.mask[name][:early])
             if rows.size < least:
                 return False
-            way = rows - rows.mean()
-            trend = float(way @ recording.channels[name][rows]) / float(np.sqrt(way @ way))
-            if abs(trend) > most * self.prepared.noise[name]:
+            if abs(_trend(self.prepared, name, rows)) > settings.still_deviations:
                 return False
         return bool(names)
 
@@ -211,5 +249,15 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             )
             said.append(
                 f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
+            )
+        warm = [p for p in each if block.channel in p.temperatures]
+        if block.warm is not None and warm:
+            told = ", ".join(
+                f"{p.temperatures[block.channel] - block.warm[1]:+.0f} K in {p.recording.name}"
+                for p in warm
+            )
+            said.append(
+                f"block {block.name}: recordings begin in a transient; the temperature of the gas "
+                f"there is fitted, and is about {told} beside the room's"
             )
     return said

@@ -82,6 +82,9 @@ class Block:
         Tubes of segments that begin or end at it.
     thermometer : str
         Channel of the temperature at which its gas begins, where that is measured.
+    warm : tuple of (str, float) or None
+        Channel of the temperature of a gas that has one and no thermometer, and that of the room
+        [K], at which it begins at rest.
     anchor : float or None
         Time after which the pressures that drive it are taken anew inside a window [s]; None:
         never.
@@ -98,6 +101,7 @@ class Block:
     tubes: tuple[Tube, ...] = ()
     thermometer: str = ""
     anchor: float | None = None
+    warm: tuple[str, float] | None = None
 
     @property
     def kind(self) -> str:
@@ -430,7 +434,16 @@ class _Map:
             ("supply",) if unread else (),
             self.tubes_at(full),
             self.thermometers.get(name, ""),
+            warm=self.warm(name),
         )
+
+    def warm(self, name: str) -> tuple[str, float] | None:
+        """Channel of the temperature of a chamber's gas where it has a balance of energy and no
+        thermometer, and the temperature of the room.
+        """
+        if name in self.thermometers or self.rig.tables("chamber")[name]["gas"] != "energy_balance":
+            return None
+        return dotted("temperature", name), float(self.rig.tables("gas")[""]["temperature"])
 
     def temperature(self, chamber: Block | None) -> Block | None:
         """The block of a gas whose temperature is measured: that of its pressure, read off by the
@@ -608,6 +621,9 @@ class Residual:
     starts : list of (a, b, q)
         Windows with an orthonormal basis of what their start can do; what a residual without a
         jacobian is freed of.
+    begun : list of array
+        How far each of them would begin from where it does, by what was measured in it: in units of
+        its states, in the order of the core.
     """
 
     value: Array
@@ -616,6 +632,7 @@ class Residual:
     rows: NDArray[np.bool_]
     noise: float
     starts: list[tuple[int, int, Array]] = field(default_factory=list)
+    begun: list[Array] = field(default_factory=list)
 
     def freed(self, values: Array) -> Array:
         """Values (n,) without what the starts of windows can do, 0 in unusable rows."""
@@ -669,7 +686,17 @@ def begun(block: Block, prepared: Prepared, starts: list[int]) -> dict[str, tupl
         if n == block.thermometer
         or (channel_of(n) in DRIVES and (channel_of(n) != "line_pressure" or n in around))
     }
-    return drives | {name: prepared.begun(name, starts) for name in state if name in drives}
+    own = {name: prepared.begun(name, starts) for name in state if name in drives}
+    return drives | own | _warm(block, prepared)
+
+
+def _warm(block: Block, prepared: Prepared) -> dict[str, tuple[Array, Array]]:
+    """The temperature at which a gas without a thermometer begins, as one would read it there."""
+    if block.warm is None:
+        return {}
+    name, rest = block.warm
+    begins = prepared.temperatures.get(block.channel, rest)
+    return {name: (np.full(prepared.n, begins), np.zeros(prepared.n))}
 
 
 def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
@@ -719,7 +746,8 @@ def predicted(
     if before is not None:
         lead = before.samples
         commands = before.commands(commands, prepared.n)
-        signals = before.signals(signals, prepared)
+        measured = {name: own for name, own in signals.items() if name in prepared.signals}
+        signals = before.signals(measured, prepared)
         # what is measured starts anew at every sample of it
         starts = [*range(lead), *(lead + start for start in starts)]
     prediction, _ = core.predict(
@@ -745,12 +773,19 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
     return sorted(set(each) - set(starts))
 
 
-def _shown(block: Block, start: Array, noise: float, settings: PrepareSettings) -> Array:
+def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     """What the start of a window can do, (n, k): of a pressure without the temperature at which its
-    gas began, once that is forgotten; of a temperature without where a thermometer stood that is
-    not late.
+    gas began, once that is forgotten, or where it began at rest; of a temperature without where a
+    thermometer stood that is not late.
     """
-    if not block.thermometer:
+    noise, settings = prepared.noise[block.channel], prepared.settings.prepare
+    if block.warm is not None:
+        if at > 0 and not prepared.clear(block.drives)[at - 1]:
+            # what drove the gas in the hole before is not known
+            return start[:, start.any(axis=0)]
+        if block.channel not in prepared.temperatures:
+            return start[:, :-1]
+    elif not block.thermometer:
         return start
     if block.kind == "temperature":
         return start[:, start.any(axis=0)]
@@ -812,21 +847,24 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     shifted = prediction.copy()
     k = len(names)
     bases: list[tuple[int, int, Array]] = []
+    moved: list[Array] = []
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
         slopes = jacobian[a:b, :k]
-        start = _shown(block, jacobian[a:b, k:], noise, prepared.settings.prepare)
+        start = _shown(block, jacobian[a:b, k:], a, prepared)
         if np.count_nonzero(rows[a:b]) < least * start.shape[1]:
             rows[a:b] = False
             value[a:b] = 0.0
             slopes[:] = 0.0
             continue
-        q, _ = np.linalg.qr(start)
+        q, triangle = np.linalg.qr(start)
         bases.append((a, b, q))
-        correction = q @ (q.T @ value[a:b])
+        inside = q.T @ value[a:b]
+        moved.append(np.linalg.lstsq(triangle, inside, rcond=None)[0])
+        correction = q @ inside
         value[a:b] -= correction
         shifted[a:b] += correction
         slopes -= q @ (q.T @ slopes)
     jac = jacobian[:, :k] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
-    return Residual(value, jac, shown, rows, noise, bases)
+    return Residual(value, jac, shown, rows, noise, bases, moved)

@@ -73,6 +73,9 @@ class Prepared:
     unsettled : dict of str to int
         First samples of a channel that are not judged, since they show where something that nobody
         measured began.
+    temperatures : dict of str to float
+        Temperature at which a gas without a thermometer began [K], by the channel of its pressure,
+        where the recording begins in a transient; the first windows are freed of it.
     """
 
     recording: Recording
@@ -84,6 +87,7 @@ class Prepared:
     lengths: dict[str, Lengths]
     settings: DiagnosisSettings
     unsettled: dict[str, int] = field(default_factory=dict)
+    temperatures: dict[str, float] = field(default_factory=dict)
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )

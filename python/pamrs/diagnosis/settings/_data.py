@@ -117,8 +117,16 @@ class PrepareSettings(SettingsGroup):
         unit="K",
         above=0.0,
         reason="error of the temperature at which a thermometer says that a gas begins: windows of "
-        "the pressure in which so much would be seen are freed of it",
+        "the pressure in which so much would be seen are freed of it; and how far from that of the "
+        "room one without a thermometer has to begin before it is taken not to have been at rest",
         origin="judgement: a thermocouple is off by two kelvins, and late (docs/decisions/0116)",
+    )
+    begun_steps: int = setting(
+        6,
+        unit="count",
+        least=1,
+        reason="steps by which the temperature is found at which a gas begins that is not at rest",
+        origin="judgement: Newton's, of one number",
     )
     bridged_samples: int = setting(
         3,
