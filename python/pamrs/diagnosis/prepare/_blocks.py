@@ -622,8 +622,8 @@ class Residual:
         Windows with an orthonormal basis of what their start can do; what a residual without a
         jacobian is freed of.
     begun : list of array
-        How far each of them would begin from where it does, by what was measured in it: in units of
-        its states, in the order of the core.
+        How far each of them would begin from where it does, by what was measured in it, in the
+        order of the core; only of gases that are warm (`Block.warm`).
     """
 
     value: Array
@@ -794,6 +794,13 @@ def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     return start if told else start[:, :-1]
 
 
+def _begun_off(triangle: Array, inside: Array) -> Array:
+    """How far a window would begin from where it does; nothing of a model that ran away."""
+    if not (np.isfinite(triangle).all() and np.isfinite(inside).all()):
+        return np.zeros(inside.size)
+    return np.asarray(np.linalg.pinv(triangle) @ inside, dtype=np.float64)
+
+
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
     """Predict a block's output over a recording and compare.
 
@@ -859,7 +866,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         q, triangle = np.linalg.qr(start)
         bases.append((a, b, q))
         inside = q.T @ value[a:b]
-        moved.append(np.linalg.lstsq(triangle, inside, rcond=None)[0])
+        moved.append(_begun_off(triangle, inside) if block.warm is not None else inside[:0])
         correction = q @ inside
         value[a:b] -= correction
         shifted[a:b] += correction
