@@ -220,6 +220,13 @@ CLOCKS = {
     ),
     "midnight": Case(table("Uhrzeit", date("%H:%M:%S.%f", datetime(2022, 11, 9, 23, 59, 58)))),
     "colons": Case(table("clock", date("%H:%M:%S:%f"))),
+    "names of months": Case(table("when", date("%d-%b-%Y %H:%M:%S.%f"))),
+    "names of months first": Case(
+        table("when", lambda i: '"' + date("%b %d, %Y %I:%M:%S.%f %p")(i) + '"')
+    ),
+    "minutes, as Excel saves them": Case(
+        table("when", date("%M:%S.%f", datetime(2022, 11, 9, 23, 59, 58), digits=2))
+    ),
     "date beside time": Case(table("Date,Time", date("%d.%m.%Y,%H:%M:%S.%f"))),
     "16 bits": Case(
         table("millis", lambda i: f"{(64_536 + 20 * i) % 65_536}"), ("a clock of 16 bits: 1",)
@@ -289,6 +296,21 @@ CELLS = {
     "labels": Case(labelled("t:{t:.2f},valve:{u:g},p_muscle:{p:.4f},angle:{a:.3f}")),
     "labels with units": Case(
         labelled("t = {t:.2f} s; valve = {u:g} V; p_muscle = {p:.4f} bar; angle = {a:.3f} deg")
+    ),
+    "labels in lines of their own": Case(
+        labelled("t: {t:.2f}\nvalve: {u:g}\np_muscle: {p:.4f}\nangle: {a:.3f}")
+    ),
+    "decimal commas in quotes": Case(
+        "\n".join(
+            [
+                '"' + line.replace(".", ",").replace(";", '","') + '"'
+                for line in table("time [s]", plain, ";").splitlines()
+            ]
+        )
+    ),
+    "the rest of an earlier run above the headings": Case(
+        "3,0.5211,31.22\n4.98,3,0.5211,31.22\n" + table("time [s]", plain),
+        ("lines above the headings: 2",),
     ),
     "objects": Case(
         labelled('{{"t": {t:.2f}, "valve": {u:g}, "p_muscle": {p:.4f}, "angle": {a:.3f}}}')

@@ -15,16 +15,40 @@ from pamrs.recordings.logs._log import Array
 __all__ = ["is_moment", "moments"]
 
 _MOMENT: Final = re.compile(
-    r"(?:(\d{1,4})([-./])(\d{1,2})\2(\d{1,4})(?:,? +|T))?"
-    r"(\d{1,2}):(\d{2})(?::(\d{2}(?:[.,:]\d+)?))?"
-    r"(?: ?([AaPp])\.?[Mm]\.?)?(Z|[+-]\d{2}:?\d{2})?"
+    r"(?:(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})(?:,? +|T))?"
+    r"(?:(?P<hour>\d{1,2}):(?P<minute>\d{2})(?::(?P<second>\d{2}(?:[.,:]\d+)?))?"
+    r"|(?P<minutes>\d{1,2}):(?P<seconds>\d{2}[.,]\d+))"
+    r"(?: ?(?P<half>[AaPp])\.?[Mm]\.?)?(?: ?UTC| ?GMT|Z|(?P<zone>[+-]\d{2}:?\d{2}))?"
 )
+_NAMED: Final = re.compile(
+    r"(?:(?P<d>\d{1,2})\.?[- ](?P<m>[^\W\d]{3})[^\W\d]*\.?,?[- ]"
+    r"|(?P<n>[^\W\d]{3})[^\W\d]*\.? (?P<e>\d{1,2}),? )(?P<y>\d{4})"
+)
+_MONTHS: Final = {
+    word: number
+    for number, words in enumerate(
+        ("jan", "feb", "mar mär mrz", "apr", "may mai", "jun", "jul", "aug", "sep", "oct okt")
+        + ("nov", "dec dez"),
+        start=1,
+    )
+    for word in words.split()
+}
 _DAY: Final = 86400.0
+
+
+def _match(cell: str) -> re.Match[str] | None:
+    """Parts of a moment, whose month may have a name: 22-Nov-2022, Nov 22, 2022."""
+    if any(letter.isalpha() for letter in cell[:6]):
+        named = _NAMED.match(cell)
+        month = _MONTHS.get((named["m"] or named["n"]).lower(), 0) if named else 0
+        if named and month:
+            cell = f"{named['y']}-{month}-{named['d'] or named['e']}{cell[named.end() :]}"
+    return _MOMENT.fullmatch(cell)
 
 
 def is_moment(cell: str) -> bool:
     """Whether a text is a time of day, perhaps with a date before it."""
-    return _MOMENT.fullmatch(cell) is not None
+    return _match(cell) is not None
 
 
 def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
@@ -43,7 +67,7 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
         How dates are read that may be read in two ways; empty where there are none.
     None where fewer than half of the cells are such texts.
     """
-    found = [_MOMENT.fullmatch(cell) for cell in cells]
+    found = [_match(cell) for cell in cells]
     there = [match for match in found if match is not None]
     if 2 * len(there) <= len(cells):
         return None
@@ -51,16 +75,17 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
     seconds = np.full(len(cells), math.nan)
     days: dict[tuple[str, str, str], float] = {}
     passed, before = 0.0, -math.inf
+    whole = 3600.0 if there[0]["minutes"] else _DAY
     for row, match in enumerate(found):
         if match is None:
             continue
         value = _seconds_of_day(match)
-        if match[1] is None:
-            if value + passed < before - 0.5 * _DAY:
-                passed += _DAY  # a clock of times of day ran past midnight
+        if match["a"] is None:
+            if value + passed < before - 0.5 * whole:
+                passed += whole  # a clock of times of day ran past midnight
             seconds[row] = before = value + passed
             continue
-        written = (match[1], match[3], match[4])
+        written = (match["a"], match["b"], match["c"])
         if written not in days:
             days[written] = _day(written, month_first)
         seconds[row] = days[written] * _DAY + value
@@ -70,7 +95,9 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
 
 def _order(there: dict[str, re.Match[str]]) -> tuple[bool, str]:
     """Whether months stand before days, which only days above 12 show; else a slash means so."""
-    dates = {(m[1], m[2], m[3], m[4]) for m in there.values() if m[1] and len(m[1]) < 4}
+    dates = {
+        (m["a"], m["mark"], m["b"], m["c"]) for m in there.values() if m["a"] and len(m["a"]) < 4
+    }
     if not dates:
         return False, ""
     first, second = (max(int(each[place]) for each in dates) for place in (0, 2))
@@ -100,15 +127,15 @@ def _day(written: tuple[str, str, str], month_first: bool) -> float:
 
 def _seconds_of_day(match: re.Match[str]) -> float:
     """Seconds since midnight, UTC where the text says its zone."""
-    hour = int(match[5])
-    if match[8]:
-        hour = hour % 12 + (12 if match[8] in "Pp" else 0)
-    seconds = 0.0
-    if match[7]:
-        seconds = float(match[7].replace(",", ".").replace(":", "."))
-    value = hour * 3600.0 + int(match[6]) * 60.0 + seconds
-    zone = match[9]
-    if zone and zone != "Z":
+    if match["minutes"]:
+        return int(match["minutes"]) * 60.0 + float(match["seconds"].replace(",", "."))
+    hour = int(match["hour"])
+    if match["half"]:
+        hour = hour % 12 + (12 if match["half"] in "Pp" else 0)
+    seconds = float((match["second"] or "0").replace(",", ".").replace(":", "."))
+    value = hour * 3600.0 + int(match["minute"]) * 60.0 + seconds
+    zone = match["zone"]
+    if zone:
         away = int(zone[1:3]) * 3600.0 + int(zone[-2:]) * 60.0
         value -= away if zone[0] == "+" else -away
     return value

@@ -68,7 +68,8 @@ def labelled_rows(
     Returns
     -------
     rows : list of list of str
-        Headings, then one row for each line; empty where a line does not have a label.
+        Headings, then rows, each of which ends where a label comes again; empty where a label is
+        missing.
     remarks : list of str
         What was left out.
     None where most lines are not so.
@@ -85,12 +86,14 @@ def labelled_rows(
     before = ["time"] if times is not None else []
     rows = [[*before, *(f"{name} [{unit}]" if unit else name for name, unit in columns.items())]]
     strange = []
+    filled: set[str] = set(columns)  # the first label begins a row
     for number, pairs in enumerate(found, start=1):
         if pairs is None:
             strange.append(number)
-            continue
-        row = [""] * len(columns)
-        for name, value, _ in pairs:
-            row[place[name]] = value.replace(",", ".")
-        rows.append(row if times is None else [times[number - 1], *row])
+        for name, value, _ in pairs or ():
+            if name in filled:
+                filled.clear()
+                rows.append([*(times[number - 1] for _ in before if times), *[""] * len(columns)])
+            filled.add(name)
+            rows[-1][len(before) + place[name]] = value.replace(",", ".")
     return rows, told_rows(strange, "lines without labels and numbers")

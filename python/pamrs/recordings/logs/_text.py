@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final, NamedTuple
 
@@ -32,6 +32,7 @@ _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for
 _UNNAMED: Final = "column "
 _LINES: Final = 400  # in which the dialect is looked for
 _HEAD: Final = 5000  # rows above the table, at most
+_BEGUN: Final = 20  # rows of an earlier run that may stand above the headings
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
 _CUT: Final = 20  # one row in so many may be cut short; more are rows whose last cells are empty
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
@@ -272,7 +273,7 @@ def _dialect(lines: list[str], form: TextFormat, path: Path) -> _Dialect:
     for mark, decimal in _PAIRS:
         if form.delimiter not in (None, mark) or form.decimal not in (None, decimal):
             continue
-        if mark == "," and decimal == ",":
+        if mark == "," and decimal == "," and '"' not in sample:
             continue
         rows = [_stripped(row) for row in split_rows(sample, mark)]
         cells = [cell for row in rows for cell in row if cell.lower() not in NO_VALUE]
@@ -306,8 +307,23 @@ def _first_row(
     typical = sorted(map(useful, middle))[len(middle) // 2] if middle else 0
     for index, row in enumerate(head):
         if width / 2 < len(row) <= width and useful(row) >= max(1, (typical + 1) // 2):
+            if form.header is None:
+                index += _begun_before(head[index : index + _BEGUN], width, useful)
             return (max(index, 1) if form.header else index), width
     return 0, width
+
+
+def _begun_before(rows: list[list[str]], width: int, useful: Callable[[list[str]], int]) -> int:
+    """How many rows come before headings that a logger wrote after what was left of its last run,
+    with those headings; 0 where there are none.
+    """
+    last = 0
+    for place, row in enumerate(rows):
+        if len(row) == width > 1 and all(row) and useful(row) == 0 and len(set(row)) == width:
+            last = place + 1
+        elif last:
+            break
+    return last
 
 
 def _last_comment(lines: list[str], dialect: _Dialect) -> list[str] | None:
