@@ -186,7 +186,7 @@ def _sets(entries: Iterable[Any]) -> list[set[str]]:
 
 
 def _told(result: dict[str, Any]) -> _Told:
-    groups = list(result.get("blocks") or [])
+    groups = [g for g in result.get("blocks") or [] if g.get("verdict") != "not_judged"]
     verdict = str(result["verdict"])
     effects = list(result.get("effects") or [])
     named = [family(str(e["id"])) for e in effects] if verdict == "effects" else []

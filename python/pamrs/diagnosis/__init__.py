@@ -30,16 +30,21 @@ from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
+    Unjudged,
     at_ambient,
-    available_blocks,
     averaged_to_need,
     begun_alike,
+    blocks_beside_tanks,
     check_plausible,
     check_sense,
     noted_units,
     prepare,
     said_of_beginnings,
+    said_of_tanks,
     suspected_units,
+    unjudged_blocks,
+    unread_tanks,
+    with_tanks,
     without_copies,
     without_impossible,
     without_poor_thermometers,
@@ -124,7 +129,7 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
         )
         if shift > most:
             found[block.name] = (
-                f"block {block.name} was left out: only the difference of two measured pressures "
+                "only the difference of two measured pressures "
                 f"tells the regulator's flow, and their noise would move its droop by {shift:.2g} "
                 f"standard deviations; at most {most:g} is allowed (a flow meter would settle it)"
             )
@@ -220,15 +225,16 @@ def diagnose(
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
     case, clipped, masked = _sound(case, chosen)
-    seen = available_blocks(case.rig, case.channels, chosen.prepare)
+    seen = blocks_beside_tanks(case.rig, case.channels, chosen.prepare)
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
-    inner, outer, left_out = _problems(case, chosen, _asked(case.rig, consider))
+    inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
     motion = [b for b in inner.blocks if b.mechanical]
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     with _in_range(case.name):
         groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
+        every = inner.blocks
         inner, outer = _judged_only(inner, outer, groups)
         groups = [calibrated(group, chosen.verdict) for group in groups]
         unsettled = _unsettled(case.rig) if motion else []
@@ -236,9 +242,9 @@ def diagnose(
         if unsettled:
             groups = [_capped(group, factor) for group in groups]
         say("putting the answer together")
-        diagnosis = assemble(case, inner, outer, groups)
-    begun = said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
-    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *left_out, *begun]
+        unjudged += _lost(every, inner)
+        diagnosis = assemble(case, inner, outer, groups, unjudged)
+    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *begun]
     warnings += diagnosis.warnings
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
@@ -250,14 +256,7 @@ def diagnose(
         )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    data = data_used(
-        case.recordings,
-        counts,
-        inner.blocks,
-        case.rig,
-        inner.core,
-        left_out=bool(left_out or inner.losses.told),
-    )
+    data = data_used(case.recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(
         diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
     )
@@ -270,6 +269,12 @@ def _judged_only(inner: Problem, outer: Problem, groups: list[Group]) -> tuple[P
         raise DiagnosisError("; ".join(inner.losses.told))
     kept = replace(inner, blocks=[b for b in inner.blocks if b.name in judged])
     return kept, kept if outer is inner else replace(outer, blocks=kept.blocks)
+
+
+def _lost(every: Sequence[Block], judged: Problem) -> list[Unjudged]:
+    """Blocks whose judgement failed."""
+    kept = {block.name for block in judged.blocks}
+    return [Unjudged(b.name, b.covers, "its judgement failed") for b in every if b.name not in kept]
 
 
 def _check_rig(case: Case) -> None:
@@ -388,15 +393,26 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
 
 def _problems(
     case: Case, settings: DiagnosisSettings, asked: tuple[tuple[str, ...], ...]
-) -> tuple[Problem, Problem, list[str]]:
-    """Recordings to fit and held-out ones (the same where there are no others) by block, and which
-    blocks were left out, and why.
+) -> tuple[Problem, Problem, list[Unjudged], list[str]]:
+    """Recordings to fit and held-out ones (the same where there are no others) by block, blocks
+    that are not judged, and what is to be said of beginnings that nobody measured.
     """
     rig = case.rig
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
     channels, least = case.channels, settings.prepare.least_block_share
-    blocks, core = available_blocks(rig, channels, settings.prepare), core_rig(rig)
+    blocks, core = blocks_beside_tanks(rig, channels, settings.prepare), core_rig(rig)
+    tanks = unread_tanks(rig, channels, settings.prepare)
+    fitted, held = ([with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held))
+    judged = {b.name for b in blocks}
+    every_block = unjudged_blocks(rig, channels, settings.prepare)
+    without = [
+        replace(block, why=f"{block.why}: its simulated pressure drives what it feeds")
+        if any(gauge == dotted("supply_pressure", block.name.partition(".")[2]) for gauge in tanks)
+        else block
+        for block in every_block
+        if block.name not in judged
+    ]
     fitted, held = ([begun_alike(blocks, core, p) for p in part] for part in (fitted, held))
     thin = {
         b.name: share
@@ -404,6 +420,7 @@ def _problems(
         if (share := min(_usable_share(b, part) for part in (fitted, held) if part)) < least
     }
     begun = said_of_beginnings([b for b in blocks if b.name in thin], [*fitted, *held])
+    every = blocks
     blocks = [b for b in blocks if b.name not in thin]
     if thin and not blocks:
         raise DiagnosisError(
@@ -420,13 +437,17 @@ def _problems(
     inner = Problem(blocks, fitted, core, settings, considered=asked)
     with _in_range(case.name):
         drowned = _drowned(inner, rig)
+    left_out = [b for b in every if b.name in thin or b.name in drowned]
     inner = replace(inner, blocks=[b for b in blocks if b.name not in drowned])
     if not inner.blocks:
-        raise DiagnosisError(f"case {case.name!r}: {'; '.join(drowned.values())}")
+        told = "; ".join(f"block {name}: {reason}" for name, reason in drowned.items())
+        raise DiagnosisError(f"case {case.name!r}: {told}")
     check_sense(inner.blocks, [*fitted, *held], inner.core, case.name)
-    left_out = [
-        f"block {name} was left out: only {100 * share:.0f} % of its samples are usable"
-        for name, share in thin.items()
-    ]
+    why = {
+        name: f"only {100 * share:.0f} % of its samples are usable" for name, share in thin.items()
+    } | drowned
+    unjudged = [*without, *(Unjudged(b.name, b.covers, why[b.name]) for b in left_out)]
     outer = replace(inner, recordings=held) if held else inner
-    return inner, outer, [*left_out, *begun, *drowned.values()]
+    begun += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
+    begun += said_of_tanks(rig, inner.blocks)
+    return inner, outer, unjudged, begun

@@ -251,7 +251,7 @@ class Diagnosis(Findings):
             rows = words.ranked_probabilities(block.probabilities, 5)
             if rows:
                 lines.append("")
-            if rows and len(self.blocks) > 1 and block.blocks:
+            if rows and len(self.judged) > 1 and block.blocks:
                 lines.append(f"{words.blocks_label(block)}:")
             names = [words.hypothesis_label(name) for name, _ in rows]
             width = min(max(38, *map(len, names)), 56) if names else 38

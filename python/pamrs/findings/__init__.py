@@ -4,9 +4,9 @@ Entries have attributes and can be read like dictionaries. This package computes
 below reports and diagnosis, so that neither has to know the other to name what lies between them.
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
-`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`; `to_plain` and
-`told`, by which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by which a schema
-comes of them.
+`WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
+`to_plain` and `told`, by which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by
+which a schema comes of them.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from pamrs.findings._details import (
 )
 from pamrs.findings._entries import (
     HEALTHY,
+    NOT_JUDGED,
     VERDICTS,
     BlockMismatch,
     BlockVerdict,
@@ -53,6 +54,7 @@ from pamrs.findings._trace import ModelFile, Trace
 __all__ = [
     "DEFINITIONS",
     "HEALTHY",
+    "NOT_JUDGED",
     "VERDICTS",
     "BlockMismatch",
     "BlockResidual",

@@ -10,6 +10,7 @@ from pamrs.findings._entry import Entry, told
 
 __all__ = [
     "HEALTHY",
+    "NOT_JUDGED",
     "VERDICTS",
     "BlockMismatch",
     "BlockVerdict",
@@ -31,9 +32,11 @@ __all__ = [
 ]
 
 VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+"""Allowed verdicts."""
 HEALTHY: Final = VERDICTS[:2]
 """Verdicts, and hypotheses, by which no physics is missing."""
-"""Allowed verdicts."""
+NOT_JUDGED: Final = "not_judged"
+"""What stands in the place of a verdict for a block that these recordings cannot judge."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +236,15 @@ class BlockMismatch(Entry):
 
 @dataclass(frozen=True, eq=False)
 class BlockVerdict(Entry):
-    """The verdict of a group of blocks that is judged by itself.
+    """The verdict of a group of blocks that is judged by itself, or that a block is not judged.
 
     Attributes
     ----------
     blocks : list of str
         Names of its blocks.
     verdict : str
-        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+        ``none``, ``parameters``, ``effects`` or ``unlisted``; ``not_judged`` of a block that these
+        recordings cannot judge.
     probabilities : dict of str to float
         Over its hypotheses: effects by id, wrong parameters by dotted name, sets joined by ``+``.
     effects, wrong_parameters : list of str
@@ -249,10 +253,14 @@ class BlockVerdict(Entry):
         Sets that the data cannot separate.
     mismatch : list of BlockMismatch
         What each block misses.
+    covers : str
+        Of a block that is not judged, what of the rig it stands for, in words.
+    reason : str
+        Why it is not judged; empty where it is.
     """
 
     blocks: list[str] = field(metadata=told("names of its blocks"))
-    verdict: str = field(metadata=told(enum=VERDICTS))
+    verdict: str = field(metadata=told(enum=(*VERDICTS, NOT_JUDGED)))
     probabilities: dict[str, float] = field(
         metadata=told(
             "over its hypotheses: effects by id, wrong parameters by dotted name, sets joined by +",
@@ -263,6 +271,15 @@ class BlockVerdict(Entry):
     wrong_parameters: list[str] = field(metadata=told("parameters that are named"))
     ambiguity: list[list[str]]
     mismatch: list[BlockMismatch] = field(default_factory=list)
+    covers: str = field(
+        default="",
+        metadata=told(
+            "of a block that is not judged: what of the rig it stands for", required=False
+        ),
+    )
+    reason: str = field(
+        default="", metadata=told("why it is not judged; empty where it is", required=False)
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,7 +291,8 @@ class Unexplained(Entry):
     block, channel, unit : str
         The block, the channel that it predicts, and its SI unit.
     noises, size : float
-        How large it is, in units of the noise and in the unit of the channel.
+        Error of the channel with what is named (refitted, where nothing is), noise included, as
+        the table of errors has it: in units of the noise, and in the unit of the channel.
     verdict : str
         Of its group of blocks.
     share : float or None
@@ -520,6 +538,11 @@ class FreeRunError(Entry):
         the simulation left its range.
     cut_before, cut_after : float or None
         Of the block driven by its measured neighbours; None where no block predicts the channel.
+    noise : float or None
+        Sample noise of the channel.
+    off : bool
+        Whether `after` is many noise levels, and more than the values of the rig, as far as they
+        are known, explain: evidence that something is missing, whatever the blocks say.
     """
 
     unit: str
@@ -527,6 +550,22 @@ class FreeRunError(Entry):
     after: float = field(metadata=told("with what was found, driven by its commands alone"))
     cut_before: float | None = field(metadata=told("nominal block, driven by what was measured"))
     cut_after: float | None = field(metadata=told("the same with what was found"))
+    noise: float | None = field(
+        default=None, metadata=told("sample noise of the channel", required=False)
+    )
+    off: bool = field(
+        default=False,
+        metadata=told(
+            "whether the whole rig with what was found misses the channel by many noise levels, "
+            "and by more than its values, as far as they are known, explain",
+            required=False,
+        ),
+    )
+
+    @property
+    def noises(self) -> float:
+        """`after` in units of the noise; NaN where that is not known."""
+        return self.after / self.noise if self.noise else math.nan
 
 
 @dataclass(frozen=True, eq=False)

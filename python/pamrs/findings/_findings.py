@@ -14,12 +14,14 @@ from pamrs.findings._details import (
     Tried,
 )
 from pamrs.findings._entries import (
+    NOT_JUDGED,
     VERDICTS,
     BlockVerdict,
     BudgetTerm,
     EffectFound,
     FitErrors,
     FreeRun,
+    FreeRunError,
     ParameterFound,
     Unexplained,
     Where,
@@ -53,7 +55,7 @@ class Findings:
         ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something
         is missing and nothing has a name). Those of each block are in ``blocks``.
     blocks : list of BlockVerdict
-        The verdict of each group of blocks.
+        The verdict of each group of blocks, then those that were not judged, each with the reason.
     budget : list of BudgetTerm
         What of the nominal model's excess over the noise each term takes, block by block.
     unexplained : list of Unexplained
@@ -119,7 +121,10 @@ class Findings:
     )
     blocks: list[BlockVerdict] = field(
         default_factory=list,
-        metadata=told("the verdict of each group of blocks that is judged by itself"),
+        metadata=told(
+            "the verdict of each group of blocks that is judged by itself, then blocks that were "
+            "not judged"
+        ),
     )
     budget: list[BudgetTerm] = field(
         default_factory=list,
@@ -174,6 +179,29 @@ class Findings:
     def __post_init__(self) -> None:
         if self.verdict not in VERDICTS:
             raise ValueError(f"verdict is {self.verdict!r}; allowed are {', '.join(VERDICTS)}")
+
+    @property
+    def off(self) -> dict[str, FreeRunError]:
+        """Channels that the whole rig misses from its commands alone by more than noise and the
+        uncertainty of its values explain, the worst recording of each, by channel.
+        """
+        found: dict[str, FreeRunError] = {}
+        for run in self.free_run or []:
+            for channel, error in run.channels.items():
+                worst = found.get(channel)
+                if error.off and (worst is None or error.noises > worst.noises):
+                    found[channel] = error
+        return dict(sorted(found.items(), key=lambda item: -item[1].noises))
+
+    @property
+    def judged(self) -> list[BlockVerdict]:
+        """The groups of blocks that were judged."""
+        return [block for block in self.blocks if block.verdict != NOT_JUDGED]
+
+    @property
+    def not_judged(self) -> list[BlockVerdict]:
+        """The blocks of the rig that these recordings cannot judge."""
+        return [block for block in self.blocks if block.verdict == NOT_JUDGED]
 
     @property
     def model(self) -> str:

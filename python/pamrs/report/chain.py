@@ -188,7 +188,7 @@ def _middle(rows: list[float], otherwise: float) -> float:
 def _mark(parts: dict[str, _Part], diagnosis: Findings) -> None:
     """What was found, at the blocks that it acts in."""
     named = diagnosis.effects if diagnosis.verdict == "effects" else []
-    open_ = {n for b in diagnosis.blocks if len(b.ambiguity) > 1 for s in b.ambiguity for n in s}
+    open_ = {n for b in diagnosis.judged if len(b.ambiguity) > 1 for s in b.ambiguity for n in s}
     for effect in named:
         kind = EFFECTS[effect.id].block if effect.id in EFFECTS else ""
         doubt = "perhaps " if effect.term in open_ else ""
@@ -268,7 +268,7 @@ class _Drawing:
 
     def _judged(self) -> list[tuple[str, list[str], BlockMismatch | None]]:
         """Blocks of the diagnosis, each with the boxes in it."""
-        own = {m.block: m for b in self.diagnosis.blocks for m in b.mismatch}
+        own = {m.block: m for b in self.diagnosis.judged for m in b.mismatch}
         names = own or dict.fromkeys(self.diagnosis.residuals)
         found = []
         for name in names:
@@ -316,7 +316,7 @@ class _Drawing:
         title = low - 8.0 if under else y + 17.0
         lit = name == self.diagnosis.where.block
         verdict = next(
-            (b.verdict for b in self.diagnosis.blocks if name in b.blocks), "effects" if lit else ""
+            (b.verdict for b in self.diagnosis.judged if name in b.blocks), "effects" if lit else ""
         )
         exceeds = mismatch is not None and mismatch.fitted.refit.more_than_noise
         size = "" if mismatch is None else "fits to the noise"

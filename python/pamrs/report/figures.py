@@ -7,6 +7,7 @@ import math
 import re
 import textwrap
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import matplotlib as mpl
@@ -32,8 +33,8 @@ from pamrs.report.text import (
     noise_alone,
     ranked_probabilities,
     spoken_name,
-    term_label,
     told_probabilities,
+    told_terms,
 )
 
 __all__ = [
@@ -418,7 +419,7 @@ def budget_svg(diagnosis: Findings, prefix: str = "budget") -> str | None:
     blocks = budgets(diagnosis)
     if not blocks:
         return None
-    heights = [len(own) + 1 for own in blocks.values()]
+    heights = [len(told_terms(own)) + 1 for own in blocks.values()]
     rows = sum(heights)
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(7.2, 0.5 + 0.3 * rows + 0.45 * len(blocks)), layout="constrained")
@@ -440,7 +441,8 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm], *, noise_o
     names = ["model without what it holds" if held else "nominal model"]
     axes.barh(0, 100.0, color="#d1d5db", height=0.62)
     left = 1.0
-    for row, term in enumerate(terms, 1):
+    for row, (name, told) in enumerate(told_terms(terms), 1):
+        term = replace(told, share=min(2.5, told.share))
         rest = term.kind == "unexplained"
         begin = 0.0 if rest else left - term.share
         colour = colours.get(term.kind, COLOURS["after"])
@@ -453,8 +455,8 @@ def _draw_budget(axes: Axes, block: str, terms: Sequence[BudgetTerm], *, noise_o
         side = 100.0 * max(begin, begin + term.share)
         if not rest:
             side = max(side, *ends)
-        _beside(axes, side, row, format_share(term.share))
-        names.append("left, no more than noise" if rest and noise_only else term_label(term))
+        _beside(axes, side, row, format_share(told.share))
+        names.append("left, no more than noise" if rest and noise_only else name)
     axes.set_yticks(range(len(names)), names)
     axes.set_ylim(len(names) - 0.5, -0.5)
     low, high = min(reached), max(reached)
@@ -617,7 +619,7 @@ def _draw_right(right: Any, diagnosis: Findings) -> None:
     parts = right.subfigures(int(above) + int(below) or 1, 1, squeeze=False)[:, 0]
     if above:
         _draw_probabilities(parts[0].subplots(), diagnosis)
-        of = f", {blocks_label(told)}" if len(diagnosis.blocks) > 1 and told.blocks else ""
+        of = f", {blocks_label(told)}" if len(diagnosis.judged) > 1 and told.blocks else ""
         _head(parts[0], textwrap.shorten(f"Probability of each hypothesis{of}", 60))
     if content and diagnosis.condition_map is not None:
         _head(parts[-1], "When: residual over two conditions")

@@ -106,7 +106,7 @@ def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
 def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
     """The verdict of each group of blocks, and what each block misses before and after."""
     rows = []
-    for entry in diagnosis.blocks:
+    for entry in diagnosis.judged:
         found = [*entry.effects, *entry.wrong_parameters]
         leading, chance = max(
             entry.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan)
@@ -145,6 +145,14 @@ def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
             }
         )
     return rows
+
+
+def _not_judged(diagnosis: Findings) -> list[dict[str, str]]:
+    """Blocks that were not judged, and why."""
+    return [
+        {"block": words.blocks_label(b), "covers": b.covers, "why": b.reason}
+        for b in diagnosis.not_judged
+    ]
 
 
 def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
@@ -281,7 +289,7 @@ def _sets(diagnosis: Findings) -> list[tuple[str, str]]:
     """The sets that are left, each with its probability: as the headline has it, by the one group
     of blocks that is open, else that of the case.
     """
-    is_open = [b for b in diagnosis.blocks if len(b.ambiguity) > 1]
+    is_open = [b for b in diagnosis.judged if len(b.ambiguity) > 1]
     own = is_open[0].probabilities if len(is_open) == 1 else {}
     found = []
     for names in diagnosis.ambiguity:
@@ -349,7 +357,7 @@ def _probabilities(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]
     """The bars of each group of blocks with a mismatch, under its name where there are several
     groups.
     """
-    several = len(diagnosis.blocks) > 1
+    several = len(diagnosis.judged) > 1
     return [
         (
             words.blocks_label(block) if several else "",
@@ -526,6 +534,7 @@ _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
     "probabilities": _probabilities,
     "effects": _effects,
     "verdicts": _blocks,
+    "not_judged": _not_judged,
     "budgets": _budgets,
     "wrong": _wrong,
     "kept": lambda diagnosis: [words.kept_details(u) for u in diagnosis.unexplained],

@@ -6,6 +6,7 @@ import math
 import os
 import re
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeGuard
 
 from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
@@ -48,6 +49,7 @@ __all__ = [
     "is_named",
     "is_number",
     "is_open",
+    "judged_place",
     "kept_details",
     "kept_sentence",
     "label",
@@ -56,6 +58,8 @@ __all__ = [
     "moved_parameters",
     "name_chance",
     "noise_alone",
+    "not_judged_words",
+    "off_sentence",
     "ranked_probabilities",
     "sentence_of",
     "set_label",
@@ -66,6 +70,7 @@ __all__ = [
     "told_apart",
     "told_blocks",
     "told_pairs",
+    "told_terms",
     "told_probabilities",
 ]
 
@@ -76,6 +81,12 @@ _LABELS = {
     "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
+
+TELLING = 1.0
+"""How far below nothing or above everything a share is still told by itself."""
+
+FARTHEST = 3.0
+"""How large an end of a share's interval is still told as a number."""
 
 SETTLED = 0.75
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
@@ -231,7 +242,7 @@ def told_probabilities(diagnosis: Findings) -> list[BlockVerdict]:
     """
     blocks = told_blocks(diagnosis)
     found = [b for b in blocks if b.verdict not in HEALTHY or b.wrong_parameters or b.ambiguity]
-    if not diagnosis.blocks or not found:
+    if not diagnosis.judged or not found:
         names = [w.name for w in diagnosis.wrong_parameters]
         effects = [e.term for e in diagnosis.effects if diagnosis.verdict == "effects"]
         whole = BlockVerdict([], diagnosis.verdict, diagnosis.probabilities, effects, names, [])
@@ -317,7 +328,7 @@ def kept_sentence(kept: Unexplained) -> str:
 def kept_details(kept: Unexplained) -> str:
     """The same with its share of the budget and the conditions under which it is largest."""
     text = kept_sentence(kept)
-    if is_number(kept.share) and kept.interval is not None:
+    if is_number(kept.share) and kept.interval is not None and _tellable(kept.share):
         text += (
             f"; {format_share(kept.share)} of what the nominal model misses "
             f"({_span(kept.interval)})"
@@ -401,31 +412,87 @@ def _shared(one: str, other: str) -> int:
 
 
 def headline(diagnosis: Findings) -> str:
-    """One sentence that states the verdict: what was found in each block, then what stays
-    unexplained.
+    """One sentence that states the verdict: what is found, in the order of :func:`claim`, what
+    stays unexplained, and what was not judged.
     """
-    blocks = told_blocks(diagnosis)
-    open_ = {n for b in blocks if b.verdict == "unlisted" and b.ambiguity for n in b.blocks}
-    kept = [
-        kept_sentence(u)
-        for u in diagnosis.unexplained
-        if u.verdict == "unlisted" and u.block not in open_
-    ]
-    return "; ".join([claim(diagnosis), *kept[:2]])
+    told = [claim(diagnosis)]
+    kept = [kept_sentence(u) for u in _kept(diagnosis)[:2]]
+    told += [text for text in kept if text.casefold() not in told[0].casefold()]
+    return "; ".join([*told, *not_judged_words(diagnosis)])
 
 
 def claim(diagnosis: Findings) -> str:
-    """The headline without what stays unexplained."""
+    """The headline without what stays unexplained beside it, and without what was not judged: what
+    the whole rig misses from its commands alone, then the blocks, that with the largest mismatch
+    first.
+    """
+    off = off_sentence(diagnosis)
+    found = _claims(diagnosis)
+    # where something has no name anyway, that is the answer, and the whole rig stands beside it
+    told = [found, off] if diagnosis.verdict == "unlisted" else [off, found]
+    text = "; ".join(filter(None, told))
+    return text[:1].upper() + text[1:]
+
+
+def _claims(diagnosis: Findings) -> str:
+    """What is found in each block, the largest mismatch first; blocks without a name up to the last
+    that has one.
+    """
     blocks = told_blocks(diagnosis)
     named = [b for b in blocks if b.effects or b.wrong_parameters]
     doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
     if not named and not doubtful:
         return _unnamed(diagnosis)
     found = [
-        _found(diagnosis, *blocks) for blocks in _alike(sorted(named, key=lambda b: not b.effects))
+        (max(map(_size, blocks)), _found(diagnosis, *blocks))
+        for blocks in _alike(sorted(named, key=lambda b: not b.effects))
     ]
-    text = "; ".join(dict.fromkeys([*found, *(_found(diagnosis, block) for block in doubtful)]))
-    return text[:1].upper() + text[1:]
+    found += [(_size(block), _found(diagnosis, block)) for block in doubtful]
+    least = min(size for size, _ in found)
+    found += [(u.noises, kept_sentence(u)) for u in _kept(diagnosis)[:2] if u.noises > least]
+    return "; ".join(dict.fromkeys(text for _, text in sorted(found, key=lambda own: -own[0])))
+
+
+def _kept(diagnosis: Findings) -> list[Unexplained]:
+    """What blocks without a name keep, where no sets of names are left open instead."""
+    open_ = {n for b in told_blocks(diagnosis) if len(b.ambiguity) > 1 for n in b.blocks}
+    return [u for u in diagnosis.unexplained if u.verdict == "unlisted" and u.block not in open_]
+
+
+def _size(block: BlockVerdict) -> float:
+    """The largest mismatch of a group before anything is named, in noise levels: nothing of what
+    is no more than noise; without bound where a result does not say.
+    """
+    sizes = [m.fitted.refit for m in block.mismatch]
+    own = [size.noises for size in sizes if size.more_than_noise]
+    return max(own, default=0.0 if sizes else math.inf)
+
+
+def off_sentence(diagnosis: Findings) -> str:
+    """What the whole rig misses from its commands alone, in words; empty where it misses no more
+    than noise and the uncertainty of its values explain.
+    """
+    told = []
+    for channel, error in diagnosis.off.items():
+        unit, factor = display_unit(error.unit, error.after)
+        size = f"{format_number(error.after * factor, 2, unicode=False)} {unit}"
+        times = format_number(error.noises, 2, unicode=False)
+        told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level)")
+    if not told:
+        return ""
+    return f"the whole rig from its commands alone misses {' and '.join(told)}".replace("°", "deg")
+
+
+def not_judged_words(diagnosis: Findings) -> list[str]:
+    """Blocks that were not judged, by their reasons: ``not judged: supply (supply_pressure is not
+    in every recording)``.
+    """
+    reasons: dict[str, list[str]] = {}
+    for block in diagnosis.not_judged:
+        own = block.covers or blocks_label(block)
+        reasons.setdefault(block.reason, []).append(own)
+    told = [f"{' and '.join(names)} ({why})" for why, names in reasons.items()]
+    return [f"not judged: {'; '.join(told)}"] if told else []
 
 
 def _alike(blocks: Sequence[BlockVerdict]) -> list[list[BlockVerdict]]:
@@ -444,7 +511,7 @@ def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
     them apart.
     """
     if diagnosis.blocks:
-        return diagnosis.blocks
+        return diagnosis.judged
     block = diagnosis.where.block
     return [
         BlockVerdict(
@@ -581,7 +648,8 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
     if not names:
         found = [chance_of(probabilities, [key]) for key in HEALTHY]
         known = [p for p in found if is_number(p)]
-        return "no physics is missing", sum(known) if known else math.nan
+        answer = f"no physics is missing{judged_place(diagnosis)}"
+        return answer, sum(known) if known else math.nan
     own = [b for b in told_blocks(diagnosis) if b.effects or b.wrong_parameters]
     if len(own) == 1:
         return set_label(names), _of_names(diagnosis, own[0])
@@ -614,7 +682,7 @@ def gap_sentence(diagnosis: Findings, by: str) -> str:
     gap, errors = diagnosis.fit.gap_closed, diagnosis.fit.held_out or diagnosis.fit.channels
     if not is_number(gap):
         return ""
-    named = [b for b in diagnosis.blocks if b.effects or b.wrong_parameters]
+    named = [b for b in diagnosis.judged if b.effects or b.wrong_parameters]
     own = [m.channel for b in named for m in b.mismatch if m.channel in errors]
     every = ", ".join(map(spoken_name, errors))
     text = (
@@ -630,10 +698,11 @@ def gap_sentence(diagnosis: Findings, by: str) -> str:
 
 
 def is_open(diagnosis: Findings) -> bool:
-    """Whether the answer is not settled: several sets are left, or no name is given and an effect
-    outside the catalogue is not probable enough to be said.
+    """Whether the answer is not settled: several sets are left, the whole rig misses a channel
+    whatever the blocks say, or no name is given and an effect outside the catalogue is not probable
+    enough to be said.
     """
-    if len(diagnosis.ambiguity) > 1:
+    if len(diagnosis.ambiguity) > 1 or diagnosis.off:
         return True
     return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < SETTLED
 
@@ -690,8 +759,8 @@ def _unnamed(diagnosis: Findings) -> str:
     beside = _beside_held(diagnosis)
     if diagnosis.verdict == "none":
         return (
-            f"Nothing is missing{beside}: the model explains these recordings down to the noise "
-            "level"
+            f"Nothing is missing{judged_place(diagnosis)}{beside}: the model explains these "
+            "recordings down to the noise level"
         )
     if diagnosis.verdict == "parameters" and doubtful:
         return (
@@ -701,11 +770,21 @@ def _unnamed(diagnosis: Findings) -> str:
     if diagnosis.verdict == "parameters":
         moved = [spoken_name(n) for n in moved_parameters(diagnosis)[:3]]
         which = f": {', '.join(moved)}" if moved else ""
-        return f"No physics is missing{beside}; parameter values explain the difference{which}"
+        place = judged_place(diagnosis)
+        return (
+            f"No physics is missing{place}{beside}; parameter values explain the difference{which}"
+        )
     if len(doubtful) > 1:
         apart = told_apart(doubtful, diagnosis.probabilities)
         return f"Physics is missing{place}: these recordings cannot tell {apart}"
     return _outside(diagnosis, place)
+
+
+def judged_place(diagnosis: Findings) -> str:
+    """Where nothing is missing: in the blocks that were judged, where not all of them were."""
+    if not diagnosis.not_judged:
+        return ""
+    return f" in the {' and '.join(blocks_label(block) for block in diagnosis.judged)}"
 
 
 def _beside_held(diagnosis: Findings) -> str:
@@ -777,7 +856,7 @@ def noise_alone(diagnosis: Findings, block: str) -> bool:
     """Whether noise could be as large as what a block keeps with the final model, on the recordings
     of its budget; False where a result does not say.
     """
-    own = [m for b in diagnosis.blocks for m in b.mismatch if m.block == block]
+    own = [m for b in diagnosis.judged for m in b.mismatch if m.block == block]
     return bool(own) and not (own[0].held_out or own[0].fitted).after.more_than_noise
 
 
@@ -791,19 +870,44 @@ def budget_sentences(diagnosis: Findings) -> list[tuple[str, str]]:
 
 def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) -> str:
     """The budget of one block in words; what is left is told as noise where it is no more."""
+    *before, (_, last) = told_terms(terms)
     told = [
-        f"{term_label(term)} {format_share(term.share)} ({_span(term.interval)})"
-        for term in terms[:-1]
+        f"{name} {format_share(term.share)} ({_span(term.interval)})"
+        for name, term in before
+        if _tellable(term.share)
     ]
-    last = terms[-1]
     unit, factor = display_unit(last.unit, abs(last.size))
+    share = format_share(last.share) if _tellable(last.share) else "more than the nominal model has"
     left = (
-        f"{format_share(last.share)} unexplained: {format_number(last.noises, 2)} noise levels, "
+        f"{share} unexplained: {format_number(last.noises, 2)} noise levels, "
         f"{format_number(last.size * factor, 2)} {unit}"
         if last.noises > 0.0 and not noise_only
         else "only noise is left"
     )
     return "; ".join([*told, left]) + "."
+
+
+def told_terms(terms: Sequence[BudgetTerm]) -> list[tuple[str, BudgetTerm]]:
+    """The terms of a block's budget that are told, each with its name: as they are; together, where
+    one takes back what another one spoils, so that shares of single ones say nothing.
+    """
+    *before, last = terms
+    if all(_tellable(term.share) for term in before):
+        return [(term_label(term), term) for term in terms]
+    low, high = last.interval  # of every draw all shares add up to 1
+    whole = replace(
+        before[-1],
+        kind=next((t.kind for t in before if t.kind != "parameters"), "parameters"),
+        share=1.0 - last.share,
+        interval=[1.0 - high, 1.0 - low],
+    )
+    names = " and ".join(dict.fromkeys(map(term_label, before)))
+    return [(f"{names} together" if len(before) > 1 else names, whole), (term_label(last), last)]
+
+
+def _tellable(share: float) -> bool:
+    """Whether a share says something by itself."""
+    return -TELLING <= share <= 1.0 + TELLING
 
 
 def format_share(share: float) -> str:
@@ -814,7 +918,9 @@ def format_share(share: float) -> str:
 
 
 def _percent(share: float) -> str:
-    """Whole percent, without a sign of zero."""
+    """Whole percent, without a sign of zero; far outside of all there is, that it is outside."""
+    if abs(share) > FARTHEST:
+        return f"below {_percent(-FARTHEST)}" if share < 0.0 else f"above {_percent(FARTHEST)}"
     text = f"{100.0 * share:.0f}"
     return "0" if text == "-0" else text.replace("-", "\u2212")
 

@@ -3,9 +3,9 @@
 Public: `Candidate`, `Group`, `Attempts`, `significant`, `doubted`, `autocorrelation_of`,
 `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits); `weigh`, `explains`,
 `log_weight`, `share_left`, `same_recordings`, `probability_cap`, `capped`, `penalty`, `price`,
-`room_beside`, `stands`, `unlikely`, `visited`, `Ranges` (their weights); `Judged`, `judge`,
-`case_verdict`, `calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of`
-(verdicts).
+`room_beside`, `stands`, `unlikely`, `visited`, `Ranges` (their weights); `determined`,
+`undetermined`, `stated`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`,
+`calibrated`, `case_probabilities`, `case_ambiguity`, `is_parameter`, `symptoms_of` (verdicts).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from pamrs.diagnosis.evidence._candidates import (
     start_of,
     without_autocorrelation,
 )
+from pamrs.diagnosis.evidence._determined import determined, put_aside, stated, undetermined
 from pamrs.diagnosis.evidence._verdicts import (
     Judged,
     calibrated,
@@ -60,6 +61,7 @@ __all__ = [
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
+    "determined",
     "doubted",
     "explains",
     "is_parameter",
@@ -68,14 +70,17 @@ __all__ = [
     "parts_of",
     "penalty",
     "price",
+    "put_aside",
     "probability_cap",
     "room_beside",
     "same_recordings",
     "share_left",
     "significant",
+    "stated",
     "stands",
     "start_of",
     "symptoms_of",
+    "undetermined",
     "unlikely",
     "visited",
     "weigh",

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
@@ -20,21 +22,25 @@ from pamrs.diagnosis.evidence import (
     case_ambiguity,
     case_probabilities,
     case_verdict,
+    determined,
     is_parameter,
     judge,
     parts_of,
+    put_aside,
     share_left,
     start_of,
+    stated,
     symptoms_of,
 )
 from pamrs.diagnosis.explain import _words as words
-from pamrs.diagnosis.explain._block_entries import block_entries, unexplained
+from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
 from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.explain._free_run import free_run, said_of_constants
+from pamrs.diagnosis.explain._free_run import Known, free_run, said_of_constants
 from pamrs.diagnosis.explain._next import next_experiment
 from pamrs.diagnosis.explain._owners import owners_of_effects, owners_of_parameters
+from pamrs.diagnosis.explain._words import spoiled
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Events,
@@ -47,12 +53,11 @@ from pamrs.diagnosis.fit import (
     form_in,
     known_parameters,
     residuals,
-    spread_over_pieces,
     with_entry,
     with_known,
 )
 from pamrs.diagnosis.noise import NoiseLevel
-from pamrs.diagnosis.prepare import Residual
+from pamrs.diagnosis.prepare import Residual, Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, info_of, is_effect, place_of, term_in
@@ -79,8 +84,16 @@ from pamrs.rig import Rig
 
 __all__ = ["assemble"]
 
+Array = NDArray[np.float64]
 
-def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) -> Diagnosis:
+
+def assemble(
+    case: Case,
+    fitted: Problem,
+    held: Problem,
+    groups: list[Group],
+    unjudged: Sequence[Unjudged] = (),
+) -> Diagnosis:
     """Build the diagnosis from the groups of blocks.
 
     Parameters
@@ -91,21 +104,21 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of Group
         Gas blocks and arm, examined.
+    unjudged : sequence of Unjudged
+        Blocks of the rig that are not judged.
     """
     nominal, settings = case.rig, fitted.settings
-    judged = judge(groups, settings)
-    verdict, probabilities = case_verdict(judged), case_probabilities(judged, settings.verdict)
-    ambiguity = case_ambiguity(judged, settings.verdict)
-    models = _models(nominal, fitted, judged, verdict)
-    judged = models.judged
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
-    fit_found = models.residuals(fitted)
-    out_found = fit_found if held is fitted else models.residuals(held)
+    models, fit_found, out_found = _sound_models(nominal, fitted, held, groups, noise_level)
+    judged, verdict = models.judged, models.verdict
+    probabilities = case_probabilities(judged, settings.verdict)
+    ambiguity = case_ambiguity(judged, settings.verdict)
     located, part = _located(judged, settings), fitted.losses.part
     picture = _picture(located, nominal, fitted, fit_found, noise_level)
     fit_table = _table(fitted, fit_found, noise_level)
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
     table = held_table or fit_table
+    errors = {"fit": fit_table, "held_out": held_table}
     named = any(j.named or j.wrong for j in judged)
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
@@ -116,7 +129,8 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
-    running = partial(free_run, held, out_found, nominal, models.final, models.events)
+    uncertain = _known(models, settings)
+    running = partial(free_run, held, out_found, nominal, models.final, models.events, uncertain)
     nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
     runs, runs_note = part("the free run", running, nothing)
     effects = _effects(judged, verdict, fitted)
@@ -141,9 +155,9 @@ def assemble(case: Case, fitted: Problem, held: Problem, groups: list[Group]) ->
         if verdict == "none"
         else _with_std(models.final, nominal, models.chosen, models.owners),
         traces=_traces(fitted, held, fit_found, out_found),
-        blocks=blocks,
+        blocks=[*blocks, *map(not_judged, unjudged)],
         budget=terms,
-        unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal),
+        unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal, errors),
         wrong_parameters=_wrong(models, fitted, table),
         measured=list(case.channels),
         residuals=_block_table(groups),
@@ -177,6 +191,64 @@ def _picture(
         lambda: describe(block, fitted.recordings, nominal, *stages, noise_level),
         Picture(),
     )
+
+
+def _sound_models(
+    nominal: Rig,
+    fitted: Problem,
+    held: Problem,
+    groups: list[Group],
+    noise_level: dict[Key, NoiseLevel],
+) -> tuple[_Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
+    """The rig at every stage with names that spoil no channel, and the residuals of the recordings
+    to fit and of the held-out ones.
+
+    What leads a group and predicts a channel worse than the model without it does is put aside, and
+    the group is judged again without it.
+    """
+    settings = fitted.settings
+    groups = [determined(group, fitted) for group in groups]
+    while True:
+        judged = judge(groups, settings)
+        models = _models(nominal, fitted, judged, case_verdict(judged))
+        inside = models.residuals(fitted)
+        outside = inside if held is fitted else models.residuals(held)
+        problem, found = (fitted, inside) if held is fitted else (held, outside)
+        spoilt = spoiled(_table(problem, found, noise_level), settings.warnings)
+        blamed = _blamed(models.judged, spoilt)
+        if not blamed:
+            return models, inside, outside
+        groups = [
+            _without_name(group, models.judged[k]) if k in blamed else group
+            for k, group in enumerate(groups)
+        ]
+
+
+def _without_name(group: Group, judged: Judged) -> Group:
+    """A group without what it adds to the model: its name, or the form of what has none."""
+    if judged.named:
+        return put_aside(group, judged.chosen.key)
+    return replace(group, closure=None)
+
+
+def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
+    """Groups that add to the model what spoils a channel: those that have the channel, else those
+    whose additions act in its block.
+    """
+    added = {k: _additions(j) for k, j in enumerate(judged) if _additions(j)}
+    blamed: set[int] = set()
+    for channel in spoilt:
+        own = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
+        blocks = [b for j in judged for b in j.group.blocks if b.channel == channel]
+        acting = {k for k in added if any(depends(b, n) for b in blocks for n in added[k])}
+        blamed |= own or acting
+    return blamed
+
+
+def _additions(judged: Judged) -> tuple[str, ...]:
+    """Effects that a group adds to the model."""
+    closure = judged.group.closure if judged.verdict == "unlisted" else None
+    return judged.named or (closure.effects if closure is not None else ())
 
 
 def _worded(
@@ -217,6 +289,8 @@ class _Models:
         Of each parameter the group whose value the final model has.
     nominal, baseline, final : Rig
         As the rig file has it, refitted inside its tolerances, and with what was found.
+    verdict : str
+        Of the case.
     """
 
     judged: list[Judged]
@@ -226,6 +300,7 @@ class _Models:
     nominal: Rig
     baseline: Rig
     final: Rig
+    verdict: str
 
     @property
     def added(self) -> bool:
@@ -255,7 +330,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
         final = nominal if verdict == "none" else baseline
         return _Models(
-            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final
+            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final, verdict
         )
     wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
     ended = _settled(nominal, fitted, judged, wanted)
@@ -265,7 +340,31 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
         for j, c in zip(judged, chosen, strict=True)
     ]
     final = _merged(nominal, ended)
-    return _Models(judged, starts, chosen, owners_of_parameters(ended), nominal, baseline, final)
+    owners = owners_of_parameters(ended)
+    return _Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
+
+
+def _known(models: _Models, settings: DiagnosisSettings) -> Known:
+    """What is known of the values of the final model: as they were fitted, with what goes together,
+    and of others what the rig file says.
+    """
+    of_file = {n: p for n, p in known_parameters(models.nominal, settings.fit).items() if p.tol > 0}
+    names, values, parts = list[str](), list[float](), list[Array]()
+    for k, candidate in enumerate(models.chosen):
+        found = candidate.fit
+        every = list(found.scales)
+        own = [n for n in every if models.owners.get(n, k) == k and math.isfinite(found.std[n])]
+        at = [every.index(n) for n in own]
+        fitted = np.sqrt(np.maximum(np.diag(found.covariance)[at], 1e-300))
+        wide = np.array([found.std[n] for n in own]) / fitted
+        size, axes = np.linalg.eigh(found.covariance[np.ix_(at, at)] * np.outer(wide, wide))
+        parts.append(axes * np.sqrt(np.maximum(size, 0.0)))
+        names += own
+        values += [found.values[n] for n in own]
+    rest = [n for n in of_file if n not in names]
+    parts.append(np.diag([of_file[n].tol for n in rest]))
+    values += [of_file[n].value for n in rest]
+    return Known((*names, *rest), np.array(values), block_diag(*parts))
 
 
 def _warnings(
@@ -476,20 +575,7 @@ def _settled(
 
 def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
     """The fits of the groups with the standard deviations that are stated."""
-    return [_stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
-
-
-def _stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
-    """A fit with standard deviations that hold for residuals that are no noise; and, of what no
-    prior holds, for equations that are not quite the rig's.
-    """
-    own, factor = replace(problem, blocks=group.blocks), problem.settings.verdict.spread_factor
-    known = candidate.fit.held_by_prior
-    std = {
-        name: spread * (1.0 if name in known else factor)
-        for name, spread in spread_over_pieces(own, candidate.fit).items()
-    }
-    return replace(candidate, fit=replace(candidate.fit, std=std))
+    return [stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
@@ -537,12 +623,12 @@ def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[
 
 
 def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
-    """The block that the answer is about: of those with a name first, else of those that keep
-    something, else one at a wall.
+    """The block that the answer is about: that with the largest mismatch, of groups with a name or
+    without one; else one with a signature below the noise, else one at a wall.
     """
-    named = [j.group for j in judged if j.named or j.wrong]
-    missing = [j.group for j in judged if j.verdict == "unlisted"]
-    for groups in (named, missing, [j.group for j in judged]):
+    told = [j for j in judged if j.named or j.wrong or j.verdict == "unlisted"]
+    above = [j.group for j in told if not j.group.below_noise]
+    for groups in (above, [j.group for j in told], [j.group for j in judged]):
         found = [
             (g.candidates[0].held_out[g.mismatch.name].ratio, g.mismatch.name)
             for g in groups
@@ -610,7 +696,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
             elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
                 best = max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
-                found[effect] = p, _stated(problem, j.group, best)
+                found[effect] = p, stated(problem, j.group, best)
     return [
         EffectFound(
             id=id_of(effect),

@@ -11,11 +11,13 @@ from pamrs.diagnosis.evidence import Judged, significant
 from pamrs.diagnosis.explain._conditions import describe
 from pamrs.diagnosis.fit import Key, Problem
 from pamrs.diagnosis.noise import NoiseLevel, excess
-from pamrs.diagnosis.prepare import Block, Residual
+from pamrs.diagnosis.prepare import Block, Residual, Unjudged
 from pamrs.findings import (
+    NOT_JUDGED,
     BlockMismatch,
     BlockVerdict,
     BudgetTerm,
+    ChannelError,
     Condition,
     MismatchSize,
     MismatchStages,
@@ -23,7 +25,7 @@ from pamrs.findings import (
 )
 from pamrs.rig import Rig
 
-__all__ = ["block_entries", "unexplained"]
+__all__ = ["block_entries", "not_judged", "unexplained"]
 
 Stages = dict[str, dict[Key, Residual]]
 
@@ -69,6 +71,20 @@ def block_entries(
     ]
 
 
+def not_judged(block: Unjudged) -> BlockVerdict:
+    """The entry of a block that nobody can judge by these recordings."""
+    return BlockVerdict(
+        blocks=[block.name],
+        verdict=NOT_JUDGED,
+        probabilities={},
+        effects=[],
+        wrong_parameters=[],
+        ambiguity=[],
+        covers=block.covers,
+        reason=block.why,
+    )
+
+
 def _sizes(
     block: Block, problem: Problem, found: Stages, noise_level: dict[Key, NoiseLevel]
 ) -> MismatchStages:
@@ -92,6 +108,7 @@ def unexplained(
     terms: list[BudgetTerm],
     forms: Mapping[str, str],
     nominal: Rig,
+    errors: Mapping[str, Mapping[str, ChannelError]],
 ) -> list[Unexplained]:
     """Blocks with a mismatch beside what is named, or without a name, the largest first.
 
@@ -113,6 +130,8 @@ def unexplained(
         Words of the form of what is missing, by block.
     nominal : Rig
         The model of the rig file.
+    errors : mapping
+        Error of each channel, by the role of the recordings: the size is that of this table.
 
     Returns
     -------
@@ -130,15 +149,17 @@ def unexplained(
             left = _left(own, entry.verdict, stages)
             if left is None:
                 continue
-            size, problem, residual, role = left
+            stage, problem, residual, role = left
+            error = errors[role][own.channel]
+            size = error[stage]
             share, interval = _rest(own.block, terms)
             found.append(
                 Unexplained(
                     own.block,
                     own.channel,
                     own.unit,
-                    size.noises,
-                    size.size,
+                    size / error.noise,
+                    size,
                     entry.verdict,
                     share,
                     interval,
@@ -152,9 +173,9 @@ def unexplained(
 
 def _left(
     own: BlockMismatch, verdict: str, stages: list[tuple[Problem, Stages]]
-) -> tuple[MismatchSize, Problem, dict[Key, Residual], str] | None:
-    """What a block keeps, and the recordings that show it with their role; None where it is no more
-    than noise.
+) -> tuple[str, Problem, dict[Key, Residual], str] | None:
+    """The stage by which a block keeps something, and the recordings that show it with their role;
+    None where it is no more than noise.
     """
     # a form without a name takes up what no name explains, and is no explanation
     stage = "refit" if verdict == "unlisted" else "after"
@@ -163,7 +184,7 @@ def _left(
     for (part, role), (problem, residuals) in zip(there, stages, strict=True):
         size: MismatchSize = part[stage]
         if size.more_than_noise:
-            return size, problem, residuals[stage], role
+            return stage, problem, residuals[stage], role
     return None
 
 

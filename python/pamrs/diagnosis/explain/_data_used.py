@@ -12,6 +12,7 @@ from pamrs.diagnosis.prepare import (
     AMBIENT,
     AMBIENT_PRESSURE,
     Block,
+    Unjudged,
     thermometers_of,
     warm_chambers,
 )
@@ -51,8 +52,7 @@ def data_used(
     blocks: Sequence[Block],
     rig: Rig,
     core: _core.Rig,
-    *,
-    left_out: bool,
+    unjudged: Sequence[Unjudged],
 ) -> list[RecordingUsed]:
     """What of each recording the answer rests on.
 
@@ -68,8 +68,8 @@ def data_used(
         The nominal model.
     core : _core.Rig
         The same, compiled.
-    left_out : bool
-        Whether a block was left out.
+    unjudged : sequence of Unjudged
+        The blocks that were not.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def data_used(
     found = []
     for recording, count in zip(recordings, counts, strict=True):
         unused = {
-            name: _why(name, rig, core, left_out)
+            name: _why(name, rig, core, unjudged)
             for name in recording.channels
             if name not in needed and channel_of(name) not in (AMBIENT, AMBIENT_PRESSURE)
         }
@@ -110,7 +110,7 @@ def data_used(
     return found
 
 
-def _why(name: str, rig: Rig, core: _core.Rig, thinned: bool) -> str:
+def _why(name: str, rig: Rig, core: _core.Rig, unjudged: Sequence[Unjudged]) -> str:
     """Why a channel is not used."""
     kind, _, block = name.partition(".")
     if kind == "temperature" and name in core.channels and block not in thermometers_of(rig):
@@ -118,8 +118,8 @@ def _why(name: str, rig: Rig, core: _core.Rig, thinned: bool) -> str:
         return why.format(chamber=qualified("chamber", block))
     table = _BELONGS.get(channel_of(name), "")
     if name in core.channels or name in core.inputs:
-        after = " or its block was left out" if thinned else ""
-        return f"no block that is judged needs it{after}"
+        names = ", ".join(block.name for block in unjudged)
+        return "no block that is judged needs it" + f"; not judged: {names}" * bool(names)
     if table and (not rig.model.get(table) or block):
         return f"the rig has no block [{table}{'.' + block if block else ''}]"
     return f"no block of the model has a {kind.replace('_', ' ')} to compare it with"

@@ -4,16 +4,20 @@ measured: what each block's error comes to when nothing measured corrects it.
 
 from __future__ import annotations
 
+import contextlib
 import math
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.stats import chi2
 
 from pamrs.channels import channel_of, recorded_as, unit_of
-from pamrs.diagnosis.fit import Events, Key, Problem
-from pamrs.diagnosis.prepare import Residual
-from pamrs.diagnosis.settings import WarningSettings
+from pamrs.diagnosis.fit import Events, Key, Problem, with_known
+from pamrs.diagnosis.prepare import Prepared, Residual
+from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.effects import info_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
@@ -21,16 +25,50 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import differences, replay
 
-__all__ = ["free_run", "said_of_constants"]
+__all__ = ["Known", "free_run", "said_of_constants"]
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known of the values of a rig.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Dotted names, k of them.
+    values : (k,) array
+        SI.
+    root : (k, k) array
+        A square root of their covariance: values plus `root` times normal numbers are as likely.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    root: Array
+
 
 _FREED = ("muscle_force", "joint_torque", "temperature")
 """Channels whose constant is fitted to each recording."""
+
+_COMMANDS = ("valve_command", "supply_command", "pressure_command")
+"""Channels that drive a free run."""
+_LATE = 0.5
+"""Standard deviation of when a command takes effect [samples]."""
+_ROWS = 2000
+"""Samples of a channel by which what a free run misses is compared."""
 
 Stages = dict[str, dict[Key, Residual]]
 
 
 def free_run(
-    problem: Problem, found: Stages, nominal: Rig, final: Rig, events: Events | None
+    problem: Problem,
+    found: Stages,
+    nominal: Rig,
+    final: Rig,
+    events: Events | None,
+    known: Known | None = None,
 ) -> tuple[list[FreeRun] | None, str]:
     """Errors of free-running simulations of every recording.
 
@@ -48,6 +86,8 @@ def free_run(
         The model of the rig file, and the one with what was found.
     events : Events or None
         What happened in single recordings, in the place of what `final` says.
+    known : Known, optional
+        What is known of the values of `final`; without it no channel is said to be off.
 
     Returns
     -------
@@ -59,7 +99,9 @@ def free_run(
     for prepared in problem.recordings:
         recording = prepared.recording
         try:
-            runs.append(_of(recording, problem, found, nominal, _with(final, events, recording)))
+            there = _with(final, events, recording)
+            run = _of(prepared, problem, found, nominal, there)
+            runs.append(_judged(run, prepared, there, known, problem.settings))
         except RecordingError as error:  # it lacks a command
             missing.append(str(error))
     if not runs:
@@ -72,8 +114,9 @@ def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
     return rig if events is None else events.put_into(rig, recording.name)
 
 
-def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, final: Rig) -> FreeRun:
+def _of(prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final: Rig) -> FreeRun:
     """The free run of one recording."""
+    recording = prepared.recording
     before, why = _errors(nominal, recording)
     after, why_after = (before, why) if final is nominal else _errors(final, recording)
     notes = [f"nominal model: {why}"] if why else []
@@ -99,11 +142,123 @@ def _of(recording: Recording, problem: Problem, found: Stages, nominal: Rig, fin
                 after=after.get(channel, math.nan),
                 cut_before=cut("before", channel),
                 cut_after=cut("after", channel),
+                noise=prepared.noise.get(recorded_as(channel)),
             )
             for channel in before | after
         },
         note="; ".join(notes),
     )
+
+
+def _judged(
+    run: FreeRun,
+    prepared: Prepared,
+    final: Rig,
+    known: Known | None,
+    settings: DiagnosisSettings,
+) -> FreeRun:
+    """A free run with what it misses by more than noise and what is known of the values explain."""
+    far = settings.warnings.off_noises
+    doubtful = [name for name, e in run.channels.items() if e.noises > far]
+    if known is None or not doubtful:
+        return run
+    left = _left(prepared, final, known, settings.warnings)
+    off = {
+        name
+        for name in doubtful
+        if left.get(name, math.inf) > far and channel_of(name) not in _FREED
+    }
+    return replace(run, channels={n: replace(e, off=n in off) for n, e in run.channels.items()})
+
+
+def _left(
+    prepared: Prepared, final: Rig, known: Known, settings: WarningSettings
+) -> dict[str, float]:
+    """What a free run misses of each channel [noise levels], at the least, where the values of the
+    rig are as far from what is known of them as is likely, and its commands come up to a sample
+    earlier or later.
+
+    Steps of Gauss and Newton inside that distance, each tried by a simulation.
+    """
+    logged = _as_logged(prepared.recording)
+
+    def run(moved: Array) -> dict[str, Array]:
+        values = dict(zip(known.names, known.values + known.root @ moved[:-1], strict=True))
+        late = _late(logged, _LATE * float(moved[-1]))
+        return _misses(with_known(final, values), late, logged, prepared.noise)
+
+    at, least = np.zeros(len(known.names) + 1), dict[str, float]()
+    with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
+        for _ in range(settings.off_steps + 1):
+            now = run(at)
+            sizes = {name: float(np.sqrt(np.mean(v**2))) for name, v in now.items()}
+            least = {name: min(size, least.get(name, size)) for name, size in sizes.items()}
+            if max(least.values()) <= settings.off_noises:
+                break
+            at = _moved(run, at, now, settings)
+    return least
+
+
+def _moved(
+    run: Callable[[Array], dict[str, Array]],
+    at: Array,
+    now: dict[str, Array],
+    settings: WarningSettings,
+) -> Array:
+    """Values, as likely as they may be, at which what a free run misses is least, as far as it is
+    linear in them.
+    """
+    here = np.concatenate(list(now.values()))
+    slopes = np.zeros((here.size, at.size))
+    for k in range(at.size):
+        step = np.zeros(at.size)
+        step[k] = -0.5 if at[k] > 0.0 else 0.5
+        with contextlib.suppress(PamrsError, ArithmeticError):  # it has no slope there
+            there = run(at + step)
+            slopes[:, k] = (np.concatenate([there[n] for n in now]) - here) / step[k]
+    left, size, right = np.linalg.svd(slopes, full_matrices=False)
+    wanted = left.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
+    # as far as a draw is in as many directions as are seen
+    seen = int(np.sum(size > settings.off_noises * math.sqrt(here.size / len(now))))
+    most = float(chi2.isf(settings.off_chance, max(1, seen)))
+
+    def far(ridge: float) -> Array:
+        return np.asarray(size * wanted / (size**2 + ridge))
+
+    tiny = float(size[0] ** 2) * 1e-12 + 1e-300
+    low, high = math.log(tiny), math.log(tiny * 1e24)
+    if float(np.sum(far(tiny) ** 2)) > most:
+        low = brentq(lambda r: float(np.sum(far(math.exp(r)) ** 2)) - most, low, high)
+    return np.asarray(right.T @ far(math.exp(low)))
+
+
+def _misses(
+    rig: Rig, driving: Recording, logged: Recording, noise: Mapping[str, float]
+) -> dict[str, Array]:
+    """What a free run misses of each measured channel, in units of its noise, thinned."""
+    result = replay(rig, driving)
+    out = {}
+    for name in differences(result, logged):
+        channel = recorded_as(name)
+        rows = np.flatnonzero(logged.mask[channel])
+        rows = rows[:: max(1, rows.size // _ROWS)]
+        level = noise.get(channel, 0.0)
+        if level > 0.0:
+            out[name] = (result[name][rows] - logged.channels[channel][rows]) / level
+    return out
+
+
+def _late(recording: Recording, samples: float) -> Recording:
+    """A recording whose commands come some samples later (or earlier)."""
+    if samples == 0.0:
+        return recording
+    at = np.arange(len(recording), dtype=np.float64)
+    moved = {
+        name: np.interp(at - samples, at, values)
+        for name, values in recording.channels.items()
+        if channel_of(name) in _COMMANDS
+    }
+    return replace(recording, channels=recording.channels | moved)
 
 
 def said_of_constants(

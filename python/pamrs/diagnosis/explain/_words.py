@@ -20,9 +20,12 @@ from pamrs.report.text import (
     gap_sentence,
     is_number,
     is_open,
+    judged_place,
     kept_sentence,
     leading,
     name_chance,
+    not_judged_words,
+    off_sentence,
     sentence_of,
     spoken_block,
     spoken_name,
@@ -34,6 +37,7 @@ from pamrs.rig.schema import qualified
 __all__ = [
     "absolute",
     "reservations",
+    "spoiled",
     "unknown_volumes",
     "verdict",
     "warnings",
@@ -126,15 +130,36 @@ def verdict(
     *,
     sought: bool,
 ) -> str:
-    """The verdict in a few sentences; ``forms`` say what a mismatch without a name is a function
-    of, if that was ``sought``.
+    """The verdict in a few sentences, behind what the whole rig misses from its commands alone, and
+    what was not judged; ``forms`` say what a mismatch without a name is a function of, if that was
+    ``sought``.
     """
+    text = _of_blocks(diagnosis, case, forms, settings, sought=sought)
+    off = off_sentence(diagnosis)
+    if off:
+        text = (
+            f"{_capital(off)}. The values of the rig, as far as they are known, do not explain "
+            f"that: something is not as the model has it, and nothing is settled. {text}"
+        )
+    told = [_capital(words) + "." for words in not_judged_words(diagnosis)]
+    return "\n\n".join([text, *told])
+
+
+def _of_blocks(
+    diagnosis: Findings,
+    case: Case,
+    forms: list[str],
+    settings: WarningSettings,
+    *,
+    sought: bool,
+) -> str:
+    """The verdict of the blocks, in a few sentences."""
     kind = diagnosis.verdict
-    missing = [b for b in diagnosis.blocks if b.verdict == "unlisted"]
+    missing = [b for b in diagnosis.judged if b.verdict == "unlisted"]
     if kind == "none":
         text = (
-            "These recordings show no missing physics: the nominal model predicts every block down "
-            "to the noise level."
+            f"These recordings show no missing physics{judged_place(diagnosis)}: the nominal model "
+            f"predicts {_every(diagnosis)} down to the noise level."
         )
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
@@ -147,9 +172,10 @@ def verdict(
         shifted = sorted(diagnosis.parameters.items(), key=lambda kv: -abs(kv[1].moved_sigmas))[:3]
         moved = ", ".join(f"{n} by {p.moved_sigmas:+.1f} tolerances" for n, p in shifted)
         return (
-            "These recordings show no missing physics, but parameters differ from their nominal "
-            "values. With values inside their tolerances the model predicts every block down to "
-            f"the noise level. Moved most: {moved}." + _unsettled(diagnosis)
+            f"These recordings show no missing physics{judged_place(diagnosis)}, but parameters "
+            "differ from their nominal values. With values inside their tolerances the model "
+            f"predicts {_every(diagnosis)} down to the noise level. Moved most: {moved}."
+            + _unsettled(diagnosis)
         )
     place = diagnosis.where.text
     if kind == "unlisted":
@@ -178,7 +204,11 @@ def verdict(
         f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e)})"
         for e in diagnosis.effects
     )
-    text = f"{_opening(diagnosis, 'the model leaves out')}: {names}. {place}"
+    text = f"{_opening(diagnosis, 'the model leaves out')}: {names}."
+    if any(diagnosis.where.block in b.blocks for b in missing):  # it leads with the larger mismatch
+        text = f"{place} No listed effect explains it. Beside it: {text}"
+    else:
+        text += f" {place}"
     it = "it" if len(diagnosis.effects) == 1 else "them"
     text += _closed(diagnosis, f"With {it},", case)
     if diagnosis.wrong_parameters:
@@ -190,6 +220,11 @@ def verdict(
             "volume of the rig file."
         )
     return text + _beside(diagnosis, missing, forms, sought=sought)
+
+
+def _every(diagnosis: Findings) -> str:
+    """The blocks that the verdict is about."""
+    return "every block that was judged" if diagnosis.not_judged else "every block"
 
 
 def _opening(diagnosis: Findings, claim: str) -> str:
@@ -373,16 +408,25 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
     refitted one.
     """
     out = []
-    for channel, error in table.items():
+    for channel in spoiled(table, settings):
+        error = table[channel]
         better, which = min((error.before, "nominal"), (error.refit, "refitted"))
-        if error.after > settings.spoiled * max(better, error.noise):
-            unit, factor = display_unit(unit_of(channel), error.after)
-            now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
-            out.append(
-                f"the new model misses {spoken_name(channel)} by {now} {unit}, the {which} "
-                f"one by {was} {unit}: what was added spoils this channel".replace("°", "deg")
-            )
+        unit, factor = display_unit(unit_of(channel), error.after)
+        now, was = (format_number(v * factor, 3, unicode=False) for v in (error.after, better))
+        out.append(
+            f"the new model misses {spoken_name(channel)} by {now} {unit}, the {which} "
+            f"one by {was} {unit}: the values of this fit spoil the channel".replace("°", "deg")
+        )
     return out
+
+
+def spoiled(table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
+    """Channels that the model with what was added predicts worse than the one without it."""
+    return [
+        channel
+        for channel, error in table.items()
+        if error.after > settings.spoiled * max(min(error.before, error.refit), error.noise)
+    ]
 
 
 def reservations(

@@ -577,7 +577,7 @@ def experiments_of(
             if name in r.channels and np.isfinite(r.channels[name]).any()
         ]
         if peaks:  # of one that nobody filled as well: it is filled no further
-            limits[chain] = max(1.05 * max(peaks), settings.least_highest)
+            limits[chain] = max(*peaks, settings.least_highest)
     if limits:
         # what has no gauge is moved no higher than what has one
         highest = max(limits.values())

@@ -68,7 +68,7 @@ class Excess:
     ratio : float
         Variance of bin means over that of the noise level; 1 when only noise is left.
     systematic : float
-        Standard deviation of what is not noise, in units of the noise.
+        Standard deviation of what is not noise, over all recordings, in units of `noise`.
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the noise levels.
     limit : float
@@ -248,7 +248,7 @@ def _pooled(
 ) -> Excess:
     """Bin means of a block over its recordings against their noise levels."""
     keys: list[Key] = []
-    ratios, weights, squares, noises = [], [], [], []
+    ratios, weights, squares, noises, beyond_noise = [], [], [], [], []
     pieces: list[tuple[float, int]] = []
     for prepared, (key, (means, counts)) in zip(recordings, bins.items(), strict=True):
         r = found[key]
@@ -264,14 +264,12 @@ def _pooled(
         keys.append(key)
         ratios.append(float(np.mean(means**2)) / noise_level[key].binned ** 2)
         weights.append(means.size)
+        beyond_noise.append(float(np.mean(means**2)) - noise_level[key].binned ** 2)
         squares.append(float(np.mean(r.value[r.rows] ** 2)))
         noises.append(noise_level[key].sample ** 2)
     if not ratios:
         return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
     ratio = float(np.average(ratios, weights=weights))
-    share = float(
-        np.mean([noise_level[key].binned ** 2 / noise_level[key].sample ** 2 for key in keys])
-    )
     shares = np.array(weights) / sum(weights)
     # noise levels are means of as many realisations, and their scatter is known from no more
     random = [(1.0 - noise_level[key].stated) * noise_level[key].scatter for key in keys]
@@ -285,12 +283,13 @@ def _pooled(
     larger = 1.0 + stated * (float(chi2.isf(settings.chance, few)) / few - 1.0)
     scatter = math.hypot(scatter, stated * math.sqrt(2.0 / few))
     margin = settings.margin * larger
+    noise = math.sqrt(float(np.average(noises, weights=weights)))
     return Excess(
         ratio,
-        math.sqrt(max(0.0, (ratio - 1.0) * share)),
+        math.sqrt(max(0.0, float(np.average(beyond_noise, weights=weights)))) / noise,
         float(chance.sf(math.log(max(ratio, 1e-300) / margin) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
-        math.sqrt(float(np.average(noises, weights=weights))),
+        noise,
         min(settings.most_limit * larger, margin * math.exp(beyond)),
         scatter,
         tuple(pieces),

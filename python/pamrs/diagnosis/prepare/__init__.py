@@ -7,8 +7,10 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `check_plausible`, `check_sense`, `implausible`, `without_impossible`, `without_rails`,
 `suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
 `smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
-`available_blocks`, `begun`, `change`, `predicted`, `residual` (blocks and their residuals),
-`begun_alike`, `said_of_beginnings` (beginnings that nobody measured).
+`available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
+`change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
+(beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`, `with_tanks`,
+`said_of_tanks` (tanks without a gauge, which are simulated).
 """
 
 from __future__ import annotations
@@ -19,11 +21,13 @@ from pamrs.diagnosis.prepare._beginning import begun_alike, said_of_beginnings
 from pamrs.diagnosis.prepare._blocks import (
     Block,
     Residual,
+    Unjudged,
     available_blocks,
     begun,
     change,
     predicted,
     residual,
+    unjudged_blocks,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
 from pamrs.diagnosis.prepare._plausible import (
@@ -44,6 +48,12 @@ from pamrs.diagnosis.prepare._signals import (
 )
 from pamrs.diagnosis.prepare._thermometers import without_poor_thermometers
 from pamrs.diagnosis.prepare._units import noted_units, suspected_units
+from pamrs.diagnosis.prepare._unread import (
+    blocks_beside_tanks,
+    said_of_tanks,
+    unread_tanks,
+    with_tanks,
+)
 
 __all__ = [
     "AMBIENT",
@@ -52,6 +62,7 @@ __all__ = [
     "Overlap",
     "Prepared",
     "Residual",
+    "Unjudged",
     "at_ambient",
     "available_blocks",
     "averaged",
@@ -59,6 +70,7 @@ __all__ = [
     "begun",
     "begun_alike",
     "binned",
+    "blocks_beside_tanks",
     "change",
     "check_plausible",
     "check_sense",
@@ -70,12 +82,16 @@ __all__ = [
     "prepare",
     "residual",
     "said_of_beginnings",
+    "said_of_tanks",
     "smoothed",
     "suspected_units",
     "thermometers_of",
+    "unjudged_blocks",
+    "unread_tanks",
     "warm_chambers",
     "without_copies",
     "without_impossible",
     "without_poor_thermometers",
     "without_rails",
+    "with_tanks",
 ]

@@ -27,10 +27,12 @@ __all__ = [
     "Block",
     "Residual",
     "Tube",
+    "Unjudged",
     "available_blocks",
     "change",
     "predicted",
     "residual",
+    "unjudged_blocks",
 ]
 
 Array = NDArray[np.float64]
@@ -85,6 +87,9 @@ class Block:
     warm : tuple of (str, float) or None
         Channel of the temperature of a gas that has one and no thermometer, and that of the room
         [K], at which it begins at rest.
+    floating : tuple of str
+        Drives that were simulated, since nobody measured them (a tank's pressure), and whose level
+        is free in each recording.
     anchor : float or None
         Time after which the pressures that drive it are taken anew inside a window [s]; None:
         never.
@@ -102,6 +107,7 @@ class Block:
     thermometer: str = ""
     anchor: float | None = None
     warm: tuple[str, float] | None = None
+    floating: tuple[str, ...] = ()
 
     @property
     def kind(self) -> str:
@@ -125,6 +131,30 @@ class Block:
     def mechanical(self) -> bool:
         """Whether muscles and what they move make its output, and not air alone."""
         return self.kind in ("arm", "pull")
+
+
+@dataclass(frozen=True)
+class Unjudged:
+    """A block of a rig that the channels do not tell from the others.
+
+    Attributes
+    ----------
+    name, covers : str
+        As of a :class:`Block`.
+    why : str
+        Why it is not judged, in words.
+    """
+
+    name: str
+    covers: str
+    why: str
+
+
+def _not_recorded(names: Iterable[str]) -> str:
+    """Why a block is not judged that needs channels which not every recording has."""
+    named = list(dict.fromkeys(names))
+    few = len(named) == 1
+    return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
 
 
 _SUPPLY = (
@@ -338,8 +368,15 @@ class _Map:
         ends = {block, *(end for way in self.around(block) for end in way.ends)}
         return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
 
-    def supply(self, name: str) -> Block | None:
-        """The block of one supply; none of an inlet whose regulator feeds a line."""
+    def lacking(self, name: str, covers: str, needed: Iterable[str]) -> Unjudged | None:
+        """That a block is not judged without channels that it needs; None where all are there."""
+        missing = [channel for channel in needed if channel not in self.has]
+        return Unjudged(name, covers, _not_recorded(missing)) if missing else None
+
+    def supply(self, name: str) -> Block | Unjudged | None:
+        """The block of one supply; none where its pressure is what the rig file says, or simulated
+        with what it feeds.
+        """
         full, table = qualified("supply", name), self.rig.tables("supply")[name]
         behind = self.behind(full)
         unread = [one for one in behind if self._unread(qualified("supply", one), "regulator")]
@@ -354,17 +391,6 @@ class _Map:
             *(dotted("supply_command", one) for one in (*own, *unread)),
         )
         drives = tuple(dict.fromkeys(drives))
-        if not any(self.around(node) for node in nodes):
-            return None
-        if any(not way.command for node in nodes[1:] for way in self.around(node)):
-            return None  # noise of two gauges at a line goes both ways, and is drawn one way
-        if not {self.pressure(full), *drives, *self.angles} <= self.has:
-            return None
-        names = {
-            f"{node}.{key}" for node in (full, *(nodes[1:] if unread else ())) for key in _SUPPLY
-        }
-        for node in nodes:
-            names |= self.of_ways(node) | self.zeros(self.chambers_at(node), ())
         covers = "regulator" if table["kind"] == "regulator" else "supply"
         covers += (
             " and regulator"
@@ -373,6 +399,22 @@ class _Map:
             if self.commands(full)
             else (" and line" if table["kind"] != "regulator" else "")
         )
+        covers += _called(name)
+        if not any(self.around(node) for node in nodes) or self._unread(
+            full, "constant", "regulator"
+        ):
+            return None
+        if any(not way.command for node in nodes[1:] for way in self.around(node)):
+            # noise of two gauges at a line goes both ways, and is drawn one way
+            why = "a regulator that it feeds has a line behind it, and no valve"
+            return Unjudged(full, covers, why)
+        if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
+            return lacking
+        names = {
+            f"{node}.{key}" for node in (full, *(nodes[1:] if unread else ())) for key in _SUPPLY
+        }
+        for node in nodes:
+            names |= self.of_ways(node) | self.zeros(self.chambers_at(node), ())
         window, step = self.settings.supply_window, self.settings.gas_step
         return Block(
             full,
@@ -381,14 +423,14 @@ class _Map:
             window,
             frozenset(names),
             step,
-            covers + _called(name),
+            covers,
             ("supply",) if unread else (),
             tubes=self.tubes_at(full),
         )
 
-    def chamber(self, name: str) -> Block | None:
-        """The block of one chamber; none where nothing feeds it although it moves a joint: its
-        pressure is then what is given.
+    def chamber(self, name: str) -> Block | Unjudged:
+        """The block of one chamber; not judged where nothing feeds it although it moves a joint:
+        its pressure is then what is given.
         """
         full = qualified("chamber", name)
         unread = self.unread(full)
@@ -398,8 +440,16 @@ class _Map:
                 self.joint_of[m] for m, chamber in self.pulling.items() if chamber == name
             )
         )
+        covers = (
+            ("valve, line and chamber" if self.commands(full) else "line and chamber")
+            if fed
+            else "chamber"
+        )
+        covers = (f"regulator, {covers}" if unread else covers) + _called(name)
         if self.angles and not self.rig.tables("valve") and not self.rig.tables("supply"):
-            return None
+            return Unjudged(
+                full, covers, "nothing feeds it: its pressure is what drives the muscle"
+            )
         drives = (
             *self.neighbours(full),
             *self.commands(full),
@@ -407,20 +457,14 @@ class _Map:
             *(channel for supply in unread for channel in self.in_front(supply)),
             *(a for a in self.angles if a.partition(".")[2] in joints),
         )
-        if not {self.pressure(full), *drives, *self.angles} <= self.has:
-            return None
+        if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
+            return lacking
         names = (
             self.of_ways(full)
             | {f"{full}.{key}" for key in _CHAMBER}
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
             | self.zeros(self.chambers_at(full), joints or [""])
         )
-        covers = (
-            ("valve, line and chamber" if self.commands(full) else "line and chamber")
-            if fed
-            else "chamber"
-        )
-        covers = f"regulator, {covers}" if unread else covers
         step = self.settings.gas_step if fed else self.settings.sealed_step
         window = self.settings.chamber_window if fed else None
         return Block(
@@ -430,7 +474,7 @@ class _Map:
             window,
             frozenset(names),
             step,
-            covers + _called(name),
+            covers,
             ("supply",) if unread else (),
             self.tubes_at(full),
             self.thermometers.get(name, ""),
@@ -445,12 +489,12 @@ class _Map:
             return None
         return dotted("temperature", name), float(self.rig.tables("gas")[""]["temperature"])
 
-    def temperature(self, chamber: Block | None) -> Block | None:
+    def temperature(self, chamber: Block | Unjudged) -> Block | None:
         """The block of a gas whose temperature is measured: that of its pressure, read off by the
         thermometer. The pressure is taken anew as often as its own windows begin, so that it does
         not drift; the temperature goes on.
         """
-        if chamber is None or not chamber.thermometer:
+        if isinstance(chamber, Unjudged) or not chamber.thermometer:
             return None
         name = chamber.name.partition(".")[2]
         return replace(
@@ -464,7 +508,7 @@ class _Map:
             anchor=chamber.window,
         )
 
-    def inlet(self, name: str) -> Block | None:
+    def inlet(self, name: str) -> Block | Unjudged | None:
         """The block of a valve alone: what it feeds into a line at whose inlet a gauge stands."""
         full = qualified("line", name)
         if self.pressure(full) not in self.has or not self.commands(full):
@@ -476,8 +520,9 @@ class _Map:
             *(dotted("supply_command", supply) for supply in unread),
             *(channel for supply in unread for channel in self.in_front(supply)),
         )
-        if not {*drives, *self.angles} <= self.has:
-            return None
+        covers = ("regulator and valve" if unread else "valve and line inlet") + _called(name)
+        if lacking := self.lacking(full, covers, (*drives, *self.angles)):
+            return lacking
         names = (
             self.of_ways(full)
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
@@ -490,18 +535,19 @@ class _Map:
             self.settings.chamber_window,
             frozenset(names),
             self.settings.gas_step,
-            ("regulator and valve" if unread else "valve and line inlet") + _called(name),
+            covers,
             ("supply",) if unread else (),
             self.tubes_at(full),
         )
 
-    def arm(self, joint: str) -> Block | None:
+    def arm(self, joint: str) -> Block | Unjudged:
         """The block of one joint: muscles' pressures to its angle."""
         drives = tuple(
             dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
         )
-        if not {*drives, *self.angles} <= self.has:
-            return None
+        name, covers = qualified("arm", joint), "muscle, joint and arm" + _called(joint)
+        if lacking := self.lacking(name, covers, (*drives, *self.angles)):
+            return lacking
         names = {f"arm.{key}" for key in _ARM} | {
             f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
         }
@@ -514,26 +560,25 @@ class _Map:
             f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK
         }
         names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
-        name = qualified("arm", joint)
-        covers = "muscle, joint and arm" + _called(joint)
         window, step = self.settings.arm_window, self.settings.arm_step
         return Block(
             name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers
         )
 
-    def load(self) -> Block | None:
+    def load(self) -> Block | Unjudged:
         """The block of a hanging load: muscles' pressures to their length."""
         drives = tuple(
             dict.fromkeys(dotted("muscle_pressure", chamber) for chamber in self.pulling.values())
         )
-        if not {*drives, *self.angles} <= self.has:
-            return None
+        covers = "muscle and load"
+        if lacking := self.lacking("load", covers, (*drives, *self.angles)):
+            return lacking
         names = {f"load.{key}" for key in _LOAD} | {
             f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
         }
         names |= self.zeros(self.pulling.values(), ())
         window, step = self.settings.arm_window, self.settings.arm_step
-        return Block("load", "length", drives, window, frozenset(names), step, "muscle and load")
+        return Block("load", "length", drives, window, frozenset(names), step, covers)
 
     def pull(self, joint: str) -> Block | None:
         """The block of what the muscles put on a joint or a load, where that is measured: their
@@ -587,17 +632,44 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
     -------
     list of Block
     """
+    return [block for block in _all_blocks(rig, channels, settings) if isinstance(block, Block)]
+
+
+def unjudged_blocks(
+    rig: Rig, channels: tuple[str, ...], settings: PrepareSettings
+) -> list[Unjudged]:
+    """The blocks of a rig that these channels cannot tell apart, each with the reason; arguments as
+    of :func:`available_blocks`.
+
+    What nobody has to measure (the inlet of a line, a force, the temperature of a gas) and what the
+    rig file settles (a constant supply) is none of them.
+    """
+    return [block for block in _all_blocks(rig, channels, settings) if isinstance(block, Unjudged)]
+
+
+def _all_blocks(
+    rig: Rig, channels: tuple[str, ...], settings: PrepareSettings
+) -> list[Block | Unjudged]:
+    """Every block of a rig, judged or not."""
     have = _Map(rig, channels, settings)
     # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
     closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
     whole = _Map(rig, closed, settings)
-    found = [have.supply(name) for name in rig.tables("supply")]
-    found += [have.inlet(name) for name in rig.tables("line")]
-    chambers = [whole.chamber(name) or have.chamber(name) for name in rig.tables("chamber")]
-    found += [*chambers, *(have.temperature(chamber) for chamber in chambers)]
-    found += [have.arm(name) for name in rig.tables("joint")] if rig.tables("arm") else []
-    found += [have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else []
-    found += [have.pull(name) for name in pulls_of(rig)]
+
+    def chamber(name: str) -> Block | Unjudged:
+        found = whole.chamber(name)
+        return found if isinstance(found, Block) else have.chamber(name)
+
+    chambers = [chamber(name) for name in rig.tables("chamber")]
+    found = [
+        *(have.supply(name) for name in rig.tables("supply")),
+        *(have.inlet(name) for name in rig.tables("line")),
+        *chambers,
+        *(have.temperature(own) for own in chambers),
+        *((have.arm(name) for name in rig.tables("joint")) if rig.tables("arm") else ()),
+        *([have.load()] if (rig.model["load"] or {}).get("kind") == "mass" else ()),
+        *(have.pull(name) for name in pulls_of(rig)),
+    ]
     return [block for block in found if block is not None]
 
 
@@ -801,6 +873,33 @@ def _begun_off(triangle: Array, inside: Array) -> Array:
     return np.asarray(np.linalg.pinv(triangle) @ inside, dtype=np.float64)
 
 
+def _levels(
+    block: Block,
+    core: _core.Rig,
+    prepared: Prepared,
+    prediction: Array,
+    rows: NDArray[np.bool_],
+    starts: list[tuple[int, int, Array]],
+) -> Array:
+    """What the levels of simulated drives can do to a prediction, (n, k), orthonormal, beside what
+    the starts of windows can; `core` is the rig as it was in the recording.
+    """
+    columns = []
+    for name in block.floating:
+        value, slope = prepared.signals[name]
+        step = 1e-3 * max(1.0, float(np.abs(value).max()))
+        there = prepared.shaken({name: (value + step, slope)})
+        bare = replace(there, recording=replace(there.recording, parameters={}))
+        column = np.where(rows, (predicted(block, core, bare) - prediction) / step, 0.0)
+        for a, b, q in starts:
+            column[a:b] -= q @ (q.T @ column[a:b])
+        if column.any():
+            columns.append(column / np.linalg.norm(column))
+    if not columns:
+        return np.zeros((prepared.n, 0))
+    return np.asarray(np.linalg.qr(np.array(columns).T)[0])
+
+
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
     """Predict a block's output over a recording and compare.
 
@@ -871,6 +970,13 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         value[a:b] -= correction
         shifted[a:b] += correction
         slopes -= q @ (q.T @ slopes)
+    levels = _levels(block, core, prepared, prediction, rows, bases)
+    if levels.size:
+        correction = levels @ (levels.T @ value)
+        value -= correction
+        shifted += correction
+        jacobian[:, :k] -= levels @ (levels.T @ jacobian[:, :k])
+        bases.append((0, prepared.n, levels))
     jac = jacobian[:, :k] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted

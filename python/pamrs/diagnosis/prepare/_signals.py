@@ -76,6 +76,8 @@ class Prepared:
     temperatures : dict of str to float
         Temperature at which a gas without a thermometer began [K], by the channel of its pressure,
         where the recording begins in a transient; the first windows are freed of it.
+    simulated : tuple of str
+        Channels among the signals that nobody measured: pressures of tanks without a gauge.
     """
 
     recording: Recording
@@ -88,6 +90,7 @@ class Prepared:
     settings: DiagnosisSettings
     unsettled: dict[str, int] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
+    simulated: tuple[str, ...] = ()
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
@@ -117,7 +120,8 @@ class Prepared:
             settings = self.settings.prepare
             reach = round(0.5 * settings.smoothing_time / self.dt)
             out = np.ones(self.n, dtype=bool)
-            mask = self.recording.valid(*drives) if drives else out
+            measured = [name for name in drives if name not in self.simulated]
+            mask = self.recording.valid(*measured) if measured else out
             for a, b in _long_holes(mask, settings.bridged_samples):
                 out[max(0, a - reach) : b + reach] = False
             out.flags.writeable = False

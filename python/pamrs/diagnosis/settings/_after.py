@@ -319,6 +319,31 @@ class WarningSettings(SettingsGroup):
         "constant before that is said",
         origin="judgement",
     )
+    off_noises: float = setting(
+        5.0,
+        unit="noise levels",
+        above=0.0,
+        reason="what the whole rig misses of a channel from its commands alone, beyond what is "
+        "known of its values, from which nothing is settled",
+        origin="judgement: several noise levels; a true model with its fitted values stays at one",
+    )
+    off_chance: float = setting(
+        0.05,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="chance with which the values of the rig are farther, all together, from what is "
+        "known of them than they may be to explain what the whole rig misses",
+        origin="judgement",
+    )
+    off_steps: int = setting(
+        2,
+        unit="1",
+        least=1,
+        reason="steps in which values as likely as that are looked for by which the whole rig "
+        "misses less",
+        origin="judgement",
+    )
     missed_noises: float = setting(
         3.0,
         unit="noise levels",

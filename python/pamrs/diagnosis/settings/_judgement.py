@@ -226,6 +226,14 @@ class EvidenceSettings(SettingsGroup):
         reason="standard deviations within which a value is not told from zero",
         origin="judgement",
     )
+    determined_stds: float = setting(
+        1.0,
+        unit="standard deviations",
+        least=0.0,
+        reason="stated standard deviations within which the sizes of a name are not told from "
+        "none: a stated one is twice what the pieces of the recordings tell",
+        origin="judgement: the same from which a value is said not to be determined",
+    )
     unseen_lengths: float = setting(
         3.0,
         unit="recordings",

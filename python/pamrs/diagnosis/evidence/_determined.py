@@ -1,0 +1,124 @@
+"""Names whose values the recordings do not determine, and names that are put aside."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from pamrs.diagnosis.evidence._candidates import Candidate, Group
+from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
+from pamrs.diagnosis.settings import EvidenceSettings
+from pamrs.effects import info_of
+
+__all__ = ["determined", "put_aside", "stated", "undetermined"]
+
+
+def stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
+    """A fit with standard deviations that hold for residuals that are no noise; and, of what no
+    prior holds, for equations that are not quite the rig's.
+    """
+    own, factor = replace(problem, blocks=group.blocks), problem.settings.verdict.spread_factor
+    known = candidate.fit.held_by_prior
+    std = {
+        name: spread * (1.0 if name in known else factor)
+        for name, spread in spread_over_pieces(own, candidate.fit).items()
+    }
+    return replace(candidate, fit=replace(candidate.fit, std=std))
+
+
+def determined(group: Group, problem: Problem) -> Group:
+    """A group in which no name leads, and none stands beside another one, whose values are not told
+    from none by the standard deviations that are stated.
+
+    A set falls to what is left of it without such names, where that was fitted; a name alone keeps
+    half of its probability, and the other half falls to ``unlisted``: something acts there, and
+    what it is was not told (to nothing, where no more than noise was left).
+
+    Parameters
+    ----------
+    group : Group
+        Examined.
+    problem : Problem
+        Its recordings to fit.
+
+    Returns
+    -------
+    Group
+        With other probabilities; the same where every name is determined.
+    """
+    settings = problem.settings
+    if group.mismatch is None:
+        return group
+    keys = {frozenset(c.names): c.key for c in group.candidates if c.names}
+    found = dict(group.probabilities)
+    for candidate in group.candidates:
+        chance = group.probabilities.get(candidate.key, 0.0)
+        if not candidate.effects or chance < settings.verdict.in_set:
+            continue
+        own = stated(problem, group, candidate)
+        unknown = set(undetermined(own, settings.evidence))
+        if not unknown:
+            continue
+        rest = keys.get(frozenset(candidate.names) - unknown)
+        moved = chance if rest else 0.5 * chance
+        found[candidate.key] -= moved
+        to = rest or _without_name(group)
+        found[to] = found.get(to, 0.0) + moved
+    return replace(group, probabilities=found)
+
+
+def undetermined(candidate: Candidate, settings: EvidenceSettings) -> list[str]:
+    """Effects of a set whose sizes, all together, are not told from none by its standard
+    deviations: with their shapes as uncertain as they are.
+
+    What happened at times of its own in single recordings is told by when it happened.
+    """
+    found = candidate.fit
+    if found.events is not None:
+        return []
+    names, sealed = list(found.scales), found.rig.model["valve"] is None
+    out = []
+    for effect in candidate.effects:
+        form = info_of(effect).form(form_in(found.rig, effect))
+        sizes = [
+            f"{effect}.{p.name}"
+            for p in form.parameters
+            if p.role_in(sealed=sealed) == "size" and p.neutral == 0.0
+        ]
+        at = [names.index(name) for name in sizes if name in names]
+        if not at:
+            continue
+        own = np.array([found.values[names[k]] for k in at])
+        std = np.array([found.std[names[k]] for k in at])
+        spread = found.covariance[np.ix_(at, at)]
+        narrow = np.sqrt(np.diag(spread))
+        if not (np.isfinite(std).all() and (narrow > 0.0).all()):
+            out += [effect] * (not np.isfinite(std).any())
+            continue
+        spread = spread * np.outer(std / narrow, std / narrow)
+        distance = own @ np.linalg.pinv(spread, hermitian=True) @ own
+        if chi2.sf(distance, len(at)) > chi2.sf(settings.determined_stds**2, 1):
+            out.append(effect)
+    return out
+
+
+def put_aside(group: Group, key: str) -> Group:
+    """A group without one of its hypotheses: the others are as probable as they are where it is
+    known not to hold; ``unlisted`` where there is none, and nothing where no more than noise was
+    left.
+    """
+    found = {name: p for name, p in group.probabilities.items() if name != key}
+    total = sum(found.values())
+    if total > 0.0:
+        found = {name: p / total for name, p in found.items()}
+    else:
+        found[_without_name(group)] = 1.0
+    kept = [c for c in group.candidates if c.key != key]
+    return replace(group, candidates=kept, probabilities=found)
+
+
+def _without_name(group: Group) -> str:
+    """What is left of a name that does not hold: a signature below the noise is nothing then."""
+    return "" if group.below_noise else "unlisted"

@@ -1,0 +1,246 @@
+"""What a diagnosis says it looked at, and in which order: blocks that were not judged, the whole
+rig from its commands alone, names that are not determined or spoil a channel.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs import report
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_aside
+from pamrs.diagnosis.explain import _assemble, _free_run
+from pamrs.diagnosis.fit import Problem, fit, known_parameters, residuals
+from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
+from pamrs.diagnosis.result import schema
+from pamrs.findings import (
+    BlockVerdict,
+    BudgetTerm,
+    FreeRun,
+    FreeRunError,
+    Unexplained,
+)
+from pamrs.report import text as words
+from pamrs.simulation import core_rig
+from tests.diagnosis.test_assemble import NAMES, recorded
+from tests.report.test_words import group, seen, stages
+
+SETTINGS = DiagnosisSettings()
+RIG = pamrs.rigs.shoulder()
+
+
+def found_without(true: pamrs.Rig, leave_out: str) -> pamrs.diagnosis.Diagnosis:
+    """The diagnosis of two logs of a shoulder that lack a channel."""
+    roles = ("fit", "held_out")
+    records = [
+        recorded(true, f"r{k}", role, leave_out=leave_out, seed=k) for k, role in enumerate(roles)
+    ]
+    return pamrs.diagnose(pamrs.Case("lacking", RIG, records, Path()))
+
+
+def test_blocks_that_were_not_judged_are_said_everywhere() -> None:
+    found = found_without(RIG, "valve_command")
+    assert found.verdict in ("none", "parameters")
+    told = {b.blocks[0]: b for b in found.not_judged}
+    assert list(told) == ["supply", "chamber"]
+    assert [b.blocks for b in found.judged] == [["arm"]]
+    assert told["chamber"].covers == "valve, line and chamber"
+    assert told["chamber"].reason == "valve_command is not in every recording"
+    content = json.loads(found.to_json())
+    jsonschema.validate(content, schema())
+    assert [b["verdict"] for b in content["blocks"][1:]] == ["not_judged", "not_judged"]
+    for text in (found.headline, found.text, found.summary()):
+        flat = " ".join(text.split())
+        assert "valve, line and chamber (valve_command is not in every recording)" in flat
+        assert "in the arm" in flat  # nothing is missing of what was judged
+    assert words.leading(found)[0] == "no physics is missing in the arm"
+    page = report.render_html(found)
+    assert "not judged" in page
+    assert "valve_command is not in every recording" in page
+
+
+def test_every_block_of_a_full_log_is_judged() -> None:
+    assert unjudged_blocks(RIG, NAMES, SETTINGS.prepare) == []
+    lacking = tuple(name for name in NAMES if name != "joint_angle")
+    assert [b.name for b in unjudged_blocks(RIG, lacking, SETTINGS.prepare)] == [
+        "supply",
+        "chamber",
+        "arm",
+    ]
+
+
+@pytest.mark.parametrize("what", ["area", "leak", "nothing", "level"])
+def test_valve_and_chamber_are_judged_without_a_gauge_at_the_tank(what: str) -> None:
+    name = "valve.discharge_area_max"
+    area, level = RIG.parameter(name), RIG.parameter("supply.initial_pressure")
+    true = {
+        "area": RIG.with_parameters({name: 0.75 * area.value}),
+        "leak": RIG.with_effect("leak_muscle", {"conductance": 1e-9}),
+        "nothing": RIG,
+        "level": RIG.with_parameters({level.name: level.value + 1.5 * level.tol}),
+    }[what]
+    found = found_without(true, "supply_pressure")
+    judged = {name for b in found.judged for name in b.blocks}
+    assert judged == {"chamber", "arm"}
+    assert [b.blocks for b in found.not_judged] == [["supply"]]
+    assert any("supply_pressure was not recorded: chamber" in w for w in found.warnings)
+    if what == "area":
+        (wrong,) = found.wrong_parameters
+        assert wrong.name == name
+        assert wrong.value == pytest.approx(0.75 * area.value, rel=0.05)
+    elif what == "leak":
+        assert [e.id for e in found.effects] == ["leak_muscle"]
+        told = found.effects[0].parameters["conductance"]
+        assert told.value == pytest.approx(1e-9, rel=0.1)
+    else:
+        assert found.verdict in ("none", "parameters")
+        assert found.wrong_parameters == []
+
+
+def known_of(rig: pamrs.Rig) -> _free_run.Known:
+    """What the rig file says of the values."""
+    own = {n: p for n, p in known_parameters(rig, SETTINGS.fit).items() if p.tol > 0.0}
+    tols = np.diag([p.tol for p in own.values()])
+    return _free_run.Known(tuple(own), np.array([p.value for p in own.values()]), tols)
+
+
+@pytest.mark.parametrize(("strength", "off"), [(0.0, False), (3e-9, True)])
+def test_a_free_run_beyond_what_is_known_of_the_values_is_off(strength: float, off: bool) -> None:
+    moved = {"valve.discharge_area_max": 1.0, "supply.initial_pressure": -1.0}
+    true = RIG.with_parameters(
+        {n: RIG.parameter(n).value + far * RIG.parameter(n).tol for n, far in moved.items()}
+    )
+    true = true.with_effect("leak_muscle", {"conductance": strength}) if strength else true
+    prepared = prepare(recorded(true, "a", "fit"), RIG, SETTINGS)
+    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
+    own = residuals(problem, RIG)
+    runs, _ = _free_run.free_run(
+        problem, {"before": own, "after": own}, RIG, RIG, None, known_of(RIG)
+    )
+    assert runs is not None
+    error = runs[0].channels["muscle_pressure"]
+    assert error.noises > SETTINGS.warnings.off_noises  # the nominal values miss it in both cases
+    assert error.off is off
+
+
+def ran(noises: float, *, off: bool) -> FreeRun:
+    error = FreeRunError("Pa", 3e4, 400.0 * noises, 800.0, 400.0, 400.0, off)
+    return FreeRun("log", "held_out", 10.0, {"muscle_pressure": error})
+
+
+def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
+    own = group("arm", "joint_angle", 0.98, effects=["muscle_creep"])
+    quiet = seen(own, free_run=[ran(57.0, off=False)])
+    loud = seen(own, free_run=[ran(57.0, off=True)])
+    assert not words.is_open(quiet)
+    assert words.is_open(loud)
+    begin = (
+        "The whole rig from its commands alone misses muscle pressure by 23 kPa (57 times the "
+        "noise level); the model leaves out: muscle creep"
+    )
+    assert loud.headline.startswith(begin)
+    assert "whole rig" not in quiet.headline
+    assert "not settled" in report.render_html(loud)
+
+
+def block_of(name: str, channel: str, noises: float, *, more: bool, **named: Any) -> BlockVerdict:
+    own = group(name, channel, 0.9, **named)
+    (mismatch,) = own.mismatch
+    sized = replace(mismatch, fitted=stages(noises, more=more), held_out=None)
+    verdict = "effects" if named else "unlisted"
+    return replace(own, mismatch=[sized], verdict=verdict)
+
+
+def test_the_largest_mismatch_leads_the_headline() -> None:
+    below = block_of("chamber", "muscle_pressure", 0.3, more=False, effects=["muscle_creep"])
+    large = block_of("arm", "joint_angle", 175.0, more=True)
+    kept = [Unexplained("arm", "joint_angle", "rad", 175.0, 0.05, "unlisted", role="held_out")]
+    told = seen(below, large, unexplained=kept).headline
+    assert told.startswith("The residual of the arm is 180 times the noise level")
+    assert told.index("180 times") < told.index("the model leaves out")
+    # what is larger has a name: it leads
+    named = block_of("chamber", "muscle_pressure", 300.0, more=True, effects=["muscle_creep"])
+    told = seen(named, large, unexplained=kept).headline
+    assert told.startswith("The model leaves out")
+    assert told.count("180 times the noise level") == 1
+
+
+def term(kind: str, share: float, name: str = "") -> BudgetTerm:
+    wide = [share - 0.1, share + 0.1]
+    return BudgetTerm("arm", kind, name, "", share, wide, None, 3.0, 0.001, "rad")
+
+
+def test_shares_that_cancel_are_told_together() -> None:
+    rest = term("unexplained", 0.37)
+    told = words.budget_sentence(
+        [term("parameters", -8.33), term("effect", 8.96, "muscle_creep"), rest]
+    )
+    assert told.startswith(
+        "parameters inside tolerance and muscle creep together 63 % (53 to 73); 37 % unexplained"
+    )
+    worse = words.budget_sentence(
+        [term("effect", -8.33, "muscle_creep"), term("unexplained", 9.33)]
+    )
+    assert "%" not in worse
+    assert "more than the nominal model has unexplained: 3.0 noise levels" in worse
+
+
+def leak_group(strength: float) -> tuple[Problem, Group]:
+    """A chamber's group with the leak that its log has, fitted, and a companion beside it."""
+    true = RIG.with_effect("leak_muscle", {"conductance": strength})
+    prepared = prepare(recorded(true, "all", "fit"), RIG, SETTINGS)
+    (chamber,) = [b for b in available_blocks(RIG, NAMES, SETTINGS.prepare) if b.name == "chamber"]
+    problem = Problem([chamber], [prepared], core_rig(RIG), SETTINGS)
+    free = {"leak_muscle.conductance": strength}
+    base = fit(problem, RIG, (), {}, {"chamber": 1.0})
+    found = fit(problem, RIG, ("leak_muscle",), free, {"chamber": 1.0})
+    candidates = [Candidate((), base, {}, {}, 0.0), Candidate(("leak_muscle",), found, {}, {}, 1.0)]
+    chances = {"leak_muscle": 0.9, "unlisted": 0.1}
+    return problem, Group([chamber], {}, {}, candidates, chances, chamber, {}, [chamber])
+
+
+def test_a_name_that_is_determined_stands() -> None:
+    problem, own = leak_group(3e-9)
+    assert determined(own, problem).probabilities == own.probabilities
+
+
+def test_a_name_whose_value_is_not_determined_does_not_lead() -> None:
+    problem, own = leak_group(1e-13)  # far below what the log could tell
+    after = determined(own, problem)
+    assert after.probabilities == pytest.approx({"leak_muscle": 0.45, "unlisted": 0.55})
+    (judged,) = judge([after], SETTINGS)
+    assert judged.verdict == "unlisted"
+    # a companion that is not told from none stands in no set: its set falls to the rest
+    base, leak = own.candidates
+    pair = replace(leak, effects=("leak_muscle",), wrong=("chamber.dead_volume",))
+    alone = replace(base, wrong=("chamber.dead_volume",))
+    chances = {pair.key: 0.6, alone.key: 0.3, "unlisted": 0.1}
+    both = replace(own, candidates=[base, leak, pair, alone], probabilities=chances)
+    after = determined(both, problem)
+    assert after.probabilities == pytest.approx({pair.key: 0.0, alone.key: 0.9, "unlisted": 0.1})
+
+
+def test_a_name_that_spoils_a_channel_is_put_aside() -> None:
+    _, own = leak_group(3e-9)
+    (judged,) = judge([own], SETTINGS)
+    assert judged.named == ("leak_muscle",)
+    assert _assemble._blamed([judged], ["muscle_pressure"]) == {0}
+    assert _assemble._blamed([judged], ["joint_angle"]) == set()  # it acts nowhere there
+    after = put_aside(own, "leak_muscle")
+    assert after.probabilities == {"unlisted": 1.0}
+    assert [c.key for c in after.candidates] == [""]
+    more = replace(own, probabilities=own.probabilities | {"x": 0.3})
+    assert put_aside(more, "leak_muscle").probabilities == pytest.approx(
+        {"unlisted": 0.25, "x": 0.75}
+    )
+    below = replace(own, probabilities={"leak_muscle": 1.0}, below_noise=True)
+    assert put_aside(below, "leak_muscle").probabilities == {"": 1.0}
