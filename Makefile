@@ -47,7 +47,7 @@ export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
-        test-python-all snapshots deny format bench convergence recruitment effects golden lock clean
+        test-python-all snapshots hostile fuzz deny format bench convergence recruitment effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -132,6 +132,16 @@ test-python-all: build
 snapshots: build  ## write the files of the work done anew, where it has changed on purpose
 	PAMRS_SNAPSHOTS=write $(BIN)/python -m pytest -q tests/work
 	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --test work
+
+hostile: build  ## the table of hostile inputs that were tried, and what each came to
+	$(BIN)/python -m tests.hostile
+
+# Seconds of it are in `make test`.
+EXAMPLES ?= 20000
+fuzz: export PROPTEST_CASES = $(EXAMPLES)
+fuzz: build  ## rigs, commands, states and bytes of logs changed at random (EXAMPLES=100000 for hours)
+	PAMRS_FUZZ=$(EXAMPLES) $(BIN)/python -m pytest -q tests/hostile/test_fuzz.py
+	$(CARGO) test --quiet --release -p pam-core $(LOCKED) --test fuzz
 
 deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
 	@command -v cargo-deny > /dev/null || { echo "cargo-deny is not installed; it is with: cargo install --locked cargo-deny"; exit 1; }

@@ -13,7 +13,13 @@ from typing import Any, Final
 
 __all__ = [
     "MOST_BYTES",
+    "MOST_CELLS",
+    "MOST_COLUMNS",
     "MOST_DEPTH",
+    "MOST_NAME",
+    "MOST_PARTS",
+    "MOST_ROWS",
+    "MOST_SIZE",
     "MOST_TOML_BYTES",
     "check_regular",
     "found_outside",
@@ -30,7 +36,21 @@ MOST_BYTES: Final = 512 << 20
 MOST_TOML_BYTES: Final = 4 << 20
 """Bytes of a description in TOML."""
 MOST_DEPTH: Final = 32
-"""Tables and lists inside each other in TOML."""
+"""Tables and lists inside each other in TOML, groups in HDF5."""
+MOST_PARTS: Final = 100_000
+"""Groups and data sets of one HDF5 file."""
+MOST_ROWS: Final = 5_000_000
+"""Samples of a channel: some hours at 1 kHz."""
+MOST_CELLS: Final = 20_000_000
+"""Numbers of one file."""
+MOST_COLUMNS: Final = 10_000
+"""Channels of one file."""
+MOST_SIZE: Final = 1e150
+"""Size of a number that may be a measurement: the square of a larger one is none."""
+MOST_NAME: Final = 200
+"""Characters of a name."""
+_MADE: Final = ("/proc", "/sys")
+"""Where the system makes files as they are read, without an end or a size."""
 _KINDS: Final = (
     (stat.S_ISDIR, "a folder"),
     (stat.S_ISFIFO, "a pipe"),
@@ -41,16 +61,18 @@ _KINDS: Final = (
 
 
 def check_regular(path: str | os.PathLike[str]) -> None:
-    """Refuse what is no regular file, such as a device or a pipe.
+    """Refuse what is no regular file, such as a device, a pipe or what is in ``/proc``.
 
     Raises
     ------
     OSError
         If it is not there or of another kind.
     """
-    mode = os.stat(path).st_mode
-    if not stat.S_ISREG(mode):
-        kind = next((name for matches, name in _KINDS if matches(mode)), "a special file")
+    there = os.stat(path)
+    made = any(os.path.ismount(one) and os.stat(one).st_dev == there.st_dev for one in _MADE)
+    if made or not stat.S_ISREG(there.st_mode):
+        kinds = (name for matches, name in _KINDS if matches(there.st_mode))
+        kind = next(kinds, "made by the system as it is read" if made else "a special file")
         raise OSError(f"it is {kind}; a regular file is needed, copy what it gives into one")
 
 

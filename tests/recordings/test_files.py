@@ -17,7 +17,7 @@ import pamrs
 from pamrs import _files
 from pamrs._files import parse_toml, read_file
 from pamrs.errors import CaseError, RecordingError, RigError
-from pamrs.recordings import load_case, load_recording, table
+from pamrs.recordings import _gate, load_case, load_recording
 from pamrs.recordings.logs import read_log
 from pamrs.recordings.logs._hdf import leads_elsewhere
 from tests.recordings.written import N, mapping, written
@@ -51,7 +51,7 @@ def test_logs_have_the_limits_of_tables(tmp_path: Path, monkeypatch: pytest.Monk
     file = tmp_path / "long.npz"
     np.savez(file, time=np.arange(300.0), force=np.zeros(300))
     assert len(read_log(file).series) == 2
-    monkeypatch.setattr(table, "MOST_CELLS", 500)
+    monkeypatch.setattr(_gate, "MOST_CELLS", 500)
     with pytest.raises(RecordingError, match=r"long.npz: about 600 cells; at most 500 are read"):
         read_log(file)
 
@@ -87,11 +87,11 @@ def test_rows_and_cells_are_limited(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     file = tmp_path / "long.csv"
     file.write_text(HEADER + "".join(f"{0.1 * k:.1f},{k % 7}\n" for k in range(100)))
     assert len(load_recording(file)) == 100
-    monkeypatch.setattr(table, "MOST_ROWS", 50)
+    monkeypatch.setattr(_gate, "MOST_ROWS", 50)
     with pytest.raises(RecordingError, match=r"long.csv: about 102 rows; at most 50 are read"):
         load_recording(file)
-    monkeypatch.setattr(table, "MOST_ROWS", 500)
-    monkeypatch.setattr(table, "MOST_CELLS", 150)
+    monkeypatch.setattr(_gate, "MOST_ROWS", 500)
+    monkeypatch.setattr(_gate, "MOST_CELLS", 150)
     with pytest.raises(RecordingError, match=r"about 203 cells; at most 150"):
         load_recording(file)
 
@@ -258,7 +258,7 @@ def test_numbers_that_lie_in_another_file_are_not_read(tmp_path: Path) -> None:
     assert list(log.series) == ["own"]
     assert log.unread["raw"] == log.unread["virtual"]
     assert "its numbers lie in another file; copy them into this one" in log.unread["raw"]
-    assert list(log.unread) == ["link", "raw", "virtual", "daq/link"]
+    assert list(log.unread) == ["daq/link", "link", "raw", "virtual"]
     for name in ("link", "daq/link"):
         assert re.search(r"it is a link to '.*secret.h5'; copy what", log.unread[name])
         with pytest.raises(RecordingError, match=f"'{name}' cannot be used: it is a link to"):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from pamrs.recordings import LogProposal
 
 __all__ = ["import_command"]
+
+_MOST_STEP: Final = 86_400.0
+"""Longest spacing of samples [s]."""
 
 
 def import_command(
@@ -61,11 +64,12 @@ def import_command(
         form = TextFormat(columns=tuple(name.strip() for name in columns.split(",")))
     model = None if rig is None else rig_named(rig)
     step = None if sample_time is None else exact("sample_time", sample_time, "time")
-    if step is not None and not 0.0 < step < math.inf:
+    if step is not None and not 0.0 < step <= _MOST_STEP:
         from pamrs.errors import ParameterError
 
         raise ParameterError(
-            f"{as_given('sample_time', sample_time or '')} is not allowed: a time above zero"
+            f"{as_given('sample_time', sample_time or '')} is not allowed: above zero, a day at "
+            "most"
         )
     with progress(f"reading {len(log)} log{'s' if len(log) > 1 else ''}"):
         proposal = propose(log, model, sample_time=step, form=form)

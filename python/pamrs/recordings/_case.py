@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs._files import found_outside, parse_toml, read_toml, resolved, shown
+from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
@@ -68,7 +68,7 @@ class Case:
     description: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", shown(self.name))
+        object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])
         object.__setattr__(self, "description", shown(self.description, lines=True))
 
     @property

@@ -7,9 +7,10 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._files import MOST_ROWS
 from pamrs.errors import RecordingError
 
-__all__ = ["GAP", "Event", "Grid", "gaps", "lay_grid", "usual_interval"]
+__all__ = ["GAP", "Event", "Grid", "check_samples", "gaps", "lay_grid", "usual_interval"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,6 +30,28 @@ class Event(NamedTuple):
     start: float
     stop: float
     text: str
+
+
+def check_samples(length: float, step: float, source: str) -> None:
+    """Refuse a grid that no memory holds.
+
+    Parameters
+    ----------
+    length, step : float
+        Its length and the distance of its samples [s].
+    source : str
+        The recording, for messages.
+
+    Raises
+    ------
+    RecordingError
+        If it has more samples than a recording may have.
+    """
+    if not length / step <= MOST_ROWS:
+        raise RecordingError(
+            f"{source}: {length:.4g} s have about {length / step:.3g} samples of {step:.4g} s, and "
+            f"at most {MOST_ROWS} are read: give another sample_time, or cut it into parts"
+        )
 
 
 class Grid:
@@ -170,6 +193,7 @@ def lay_grid(stamps: Array, source: str, sample_time: float | None) -> Grid:
             Event("clock_jump", first_at, last_at, f"{further} further steps of the clock")
         )
     events += gaps(placed, elapsed, jumps, usual)
+    check_samples(float(placed[-1]), step, source)
     return Grid(placed, rows, step, usual, events)
 
 

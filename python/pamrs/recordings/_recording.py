@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._files import shown
+from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
 from pamrs.errors import RecordingError
@@ -186,7 +186,7 @@ class Recording:
     notes: dict[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "name", shown(self.name))
+        object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])
 
     def __len__(self) -> int:
         return len(self.time)

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
-from pamrs.recordings._clock import GAP, Array, Event, Grid, Mask, gaps, usual_interval
+from pamrs.recordings._clock import (
+    GAP,
+    Array,
+    Event,
+    Grid,
+    Mask,
+    check_samples,
+    gaps,
+    usual_interval,
+)
 from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, assemble, judged
 from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
@@ -326,6 +335,7 @@ def _common(channels: Sequence[Sampled], step: float, source: str) -> tuple[floa
     """When all channels have begun, and the grid from there to where the first one ends."""
     start = max(float(channel.time[0]) for channel in channels)
     stop = min(float(channel.time[-1]) for channel in channels)
+    check_samples(max(stop - start, 0.0), step, source)
     count = int(np.floor((stop - start) / step + 0.05)) + 1
     if stop <= start or count < 2:
         spans = "; ".join(

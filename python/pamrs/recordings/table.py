@@ -7,7 +7,6 @@ value" become NaN.
 from __future__ import annotations
 
 import csv
-import importlib
 import io
 import math
 import zlib
@@ -18,13 +17,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._files import MOST_BYTES, read_file
+from pamrs._files import MOST_BYTES, MOST_SIZE, read_file
 from pamrs.errors import RecordingError
+from pamrs.recordings._gate import admit_arrow, check_size
 
 __all__ = [
     "NO_VALUE",
     "Table",
-    "check_size",
     "is_text",
     "numbers_in",
     "numbers_of_cells",
@@ -37,10 +36,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-MOST_ROWS: Final = 5_000_000
-"""Rows of a table."""
-MOST_CELLS: Final = 20_000_000
-"""Cells of a table."""
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
 _TEXT = (".csv", ".tsv", ".txt", ".dat", "")
 
@@ -159,7 +154,7 @@ def numbers_of_cells(
                     values[row] = float(text)
                 except ValueError:
                     strange.append(row)
-    values[~np.isfinite(values)] = math.nan
+    values[~(np.abs(values) < MOST_SIZE)] = math.nan
     return values, strange
 
 
@@ -256,19 +251,11 @@ def read_text(path: Path) -> str:
     return text
 
 
-def check_size(rows: int, cells: int, source: str) -> None:
-    """Refuse tables that no memory holds."""
-    for count, most, what in ((rows, MOST_ROWS, "rows"), (cells, MOST_CELLS, "cells")):
-        if count > most:
-            raise RecordingError(
-                f"{source}: about {count} {what}; at most {most} are read: cut it into parts, or "
-                "keep only the rows and columns that are needed"
-            )
-
-
 def _parse(text: str, source: str, delimiter: str, header: bool, decimal: str) -> Table:
     lines = text.count("\n") + 1
-    check_size(lines, lines + (text.count(delimiter) if delimiter != " " else 0), source)
+    marks = 0 if delimiter == " " else text.count(delimiter)
+    width = 1 + text[: text.find("\n") % (len(text) + 1)].count(delimiter)
+    check_size(lines, lines + marks, source, width)
     quick = _quick(text, delimiter, header, decimal)
     if quick is not None:
         return quick
@@ -373,15 +360,6 @@ def _usual_width(rows: list[list[str]]) -> int:
     return max(set(widths), key=widths.count)
 
 
-def _parquet_size(path: Path) -> tuple[int, int]:
-    """Rows and cells by the file's own account; none where pyarrow is missing or cannot tell."""
-    try:
-        told = importlib.import_module("pyarrow.parquet").read_metadata(path)
-    except Exception:  # what is wrong with the file is said when it is read
-        return 0, 0
-    return int(told.num_rows), int(told.num_rows) * int(told.num_columns)
-
-
 def _parquet(path: Path) -> Table:
     if not path.is_file():
         what = "it is not a regular file" if path.exists() else "no such file"
@@ -395,7 +373,7 @@ def _parquet(path: Path) -> Table:
             f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
         ) from error
     try:
-        check_size(*_parquet_size(path), str(path))
+        admit_arrow(path)
         frame = pd.read_parquet(path)
     except RecordingError:
         raise

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs._files import parse_toml, shown
+from pamrs._files import MOST_NAME, parse_toml, shown
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
 from pamrs.rig._model_error import read_model_error
@@ -122,7 +122,7 @@ class Reader:
         if not isinstance(name, str) or not name.strip():
             self.problem(f"name = {_shown(name)} is not allowed: a text is needed")
             name = "rig"
-        name = shown(name)
+        name = shown(name)[:MOST_NAME]
         case = document.get("case", "")
         if not isinstance(case, str):
             self.problem(f"case = {_shown(case)} is not allowed: the path of a case is needed")

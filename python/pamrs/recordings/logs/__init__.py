@@ -14,6 +14,7 @@ from typing import Final, NamedTuple
 
 from pamrs._files import check_regular
 from pamrs.errors import MissingPackageError, PamrsError, RecordingError
+from pamrs.recordings._gate import check_size
 from pamrs.recordings.logs._hdf import read_hdf
 from pamrs.recordings.logs._log import Log, Series, TextFormat
 from pamrs.recordings.logs._matlab import read_matlab
@@ -23,7 +24,6 @@ from pamrs.recordings.logs._sheets import read_sheets
 from pamrs.recordings.logs._tables import read_arrow, read_numpy
 from pamrs.recordings.logs._text import read_text_log
 from pamrs.recordings.logs._words import Written, split_heading, understood_unit
-from pamrs.recordings.table import check_size
 
 __all__ = [
     "ENDINGS",

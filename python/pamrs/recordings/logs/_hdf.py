@@ -8,10 +8,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from pamrs._files import MOST_DEPTH, MOST_PARTS
+from pamrs.errors import RecordingError
+from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 from pamrs.recordings.logs._tables import series_of_matrix
 
-__all__ = ["leads_elsewhere", "read_hdf"]
+__all__ = ["leads_elsewhere", "members", "read_hdf"]
 
 _UNITS: Final = ("unit", "units", "Unit", "Units", "UNIT")
 _RATES: Final = ("sample_rate", "sampling_rate", "fs", "rate", "SampleRate")  # [Hz]
@@ -39,6 +42,7 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
 
     found: list[Series] = []
     unread: dict[str, str] = {}
+    gate = Gate(path)
 
     def take(name: str, item: Any) -> None:
         if not isinstance(item, h5py.Dataset) or _elsewhere(item):
@@ -49,13 +53,15 @@ def read_hdf(path: Path, form: TextFormat) -> Log:
         if item.ndim == 2 and min(item.shape) > _MOST_COLUMNS:
             unread[name] = f"it has the shape {item.shape}, which is no table"
             return
+        gate.admit_array(item.shape, item.dtype)
         for made in series_of_matrix(name, item[()], form.columns, unread, path):
             unit = made.unit or _unit(item)
             found.append(Series(made.name, made.values, unit, _clock(item, len(made.values))))
 
     with h5py.File(path, "r") as file:
         unread |= leads_elsewhere(file)
-        file.visititems(take)
+        for name, item in members(file):
+            take(name, item)
     return collected(path, found, unread)
 
 
@@ -95,24 +101,58 @@ def leads_elsewhere(group: Any) -> Iterator[tuple[str, str]]:
     """
     import h5py
 
+    for name, item in members(group):
+        if isinstance(item, h5py.ExternalLink):
+            why = f"it is a link to {item.filename!r}; copy what that holds into this file"
+            yield name, why
+        elif isinstance(item, h5py.Dataset) and (why := _elsewhere(item)):
+            yield name, why
+
+
+def members(group: Any) -> Iterator[tuple[str, Any]]:
+    """Everything in a group and below it, once each, in the order of the names.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        Of a file that is open.
+
+    Yields
+    ------
+    name, item : str, object
+        The path from `group`; a group, a data set or a link to another file.
+
+    Raises
+    ------
+    RecordingError
+        If groups are nested too deep, or there are too many parts.
+    """
+    import h5py
+
     def address(of: Any) -> int:
         return int(h5py.h5o.get_info(of.id).addr)
 
     seen = {address(group)}
-    left = [("", group)]
+    left = [("", group, iter(group))]
     while left:
-        path, inside = left.pop()
-        for own in inside:
-            name, link = path + own, inside.get(own, getlink=True)
-            if isinstance(link, h5py.ExternalLink):
-                why = f"it is a link to {link.filename!r}; copy what that holds into this file"
-                yield name, why
-            elif isinstance(link, h5py.HardLink) and address(item := inside[own]) not in seen:
-                seen.add(address(item))
-                if isinstance(item, h5py.Group):
-                    left.append((f"{name}/", item))
-                elif isinstance(item, h5py.Dataset) and (why := _elsewhere(item)):
-                    yield name, why
+        path, inside, names = left[-1]
+        own = next(names, None)
+        if own is None:
+            left.pop()
+            continue
+        name, link = path + own, inside.get(own, getlink=True)
+        if isinstance(link, h5py.ExternalLink):
+            yield name, link
+        elif isinstance(link, h5py.HardLink) and address(item := inside[own]) not in seen:
+            seen.add(address(item))
+            yield name, item
+            if isinstance(item, h5py.Group):
+                left.append((f"{name}/", item, iter(item)))
+        if len(left) > MOST_DEPTH or len(seen) > MOST_PARTS:
+            raise RecordingError(
+                f"{group.file.filename}: its groups are nested more than {MOST_DEPTH} deep, or it "
+                f"has more than {MOST_PARTS} parts, and at most that is read"
+            )
 
 
 def _unit(item: Any) -> str:

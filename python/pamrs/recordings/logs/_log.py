@@ -12,7 +12,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
+from pamrs.recordings._gate import check_size
 
 __all__ = ["Log", "Series", "TextFormat", "collected", "numbers_of"]
 
@@ -159,6 +161,7 @@ def collected(
     RecordingError
         If there is no series with a number in it.
     """
+    check_size(0, 0, str(path), len(found))
     series: dict[str, Series] = {}
     for item in found:
         name, again = item.name, 2
@@ -257,5 +260,5 @@ def numbers_of(values: Any) -> Array | None:
     if array.dtype.kind not in "biuf":
         return None
     result = array.astype(np.float64).ravel()
-    result[~np.isfinite(result)] = np.nan
+    result[~(np.abs(result) < MOST_SIZE)] = np.nan
     return result

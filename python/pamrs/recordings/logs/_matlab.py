@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from pamrs.errors import RecordingError
-from pamrs.recordings.logs._hdf import leads_elsewhere
+from pamrs.recordings._gate import Gate, admit_matlab
+from pamrs.recordings.logs._hdf import leads_elsewhere, members
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._tables import series_of_matrix
 from pamrs.recordings.logs._words import understood_unit
@@ -49,15 +50,20 @@ def read_matlab(path: Path, form: TextFormat) -> Log:
 
 
 def _check_own_numbers(path: Path) -> None:
-    """Refuse a file of version 7.3, which is HDF5, that leads to other files."""
+    """Refuse a file that unpacks to too much or (version 7.3, which is HDF5) leads to others."""
     import h5py
 
     if not h5py.is_hdf5(path):
+        admit_matlab(path)
         return
 
     with h5py.File(path, "r") as file:
         for name, why in leads_elsewhere(file):
             raise RecordingError(f"{path}: {name}: {why}")
+        gate = Gate(path)
+        for _, item in members(file):
+            if isinstance(item, h5py.Dataset):
+                gate.admit_array(item.shape or (), item.dtype)
 
 
 class _Reader:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 
 __all__ = ["read_mdf", "read_tdms"]
@@ -33,7 +34,10 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
     found: list[Series] = []
     unread: dict[str, str] = {}
     file: Any
+    gate = Gate(path)
     with MDF(path) as file:
+        for group in file.groups:
+            gate.admit(group.channel_group.cycles_nr, len(group.channels))
         for number, group in enumerate(file.groups):
             master = file.masters_db.get(number)
             time: Array | None = None
@@ -86,6 +90,9 @@ def read_tdms(path: Path, form: TextFormat) -> Log:
     unread: dict[str, str] = {}
     with path.open("rb") as stream, TdmsFile.open(stream) as file:
         channels = [channel for group in file.groups() for channel in group.channels()]
+        gate = Gate(path)
+        for channel in channels:
+            gate.admit(len(channel))
         starts = [item for channel in channels if (item := _start(channel)) is not None]
         clocks: dict[tuple[float, ...], Array] = {}
         for channel in channels:

@@ -13,9 +13,9 @@ from typing import Any, Final
 
 from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
+from pamrs.recordings._gate import check_size
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
 from pamrs.recordings.logs._text import log_of_rows
-from pamrs.recordings.table import check_size
 
 __all__ = ["read_sheets"]
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from pamrs.errors import RecordingError
+from pamrs.recordings._gate import admit_arrow, admit_numpy
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected, numbers_of
 from pamrs.recordings.logs._words import split_heading
 
@@ -32,6 +33,7 @@ def read_arrow(path: Path, form: TextFormat) -> Log:
     import pyarrow.feather
     import pyarrow.parquet
 
+    admit_arrow(path)
     if path.suffix.lower() == ".parquet":
         table = pyarrow.parquet.read_table(path)
     else:
@@ -71,6 +73,7 @@ def read_numpy(path: Path, form: TextFormat) -> Log:
     Log
         A series for each vector, each column of a matrix, each field of records.
     """
+    admit_numpy(path)
     content = np.load(path, allow_pickle=False)
     found: list[Series] = []
     unread: dict[str, str] = {}
