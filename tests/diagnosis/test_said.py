@@ -18,7 +18,9 @@ from pamrs import report
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_aside
 from pamrs.diagnosis.explain import _assemble, _free_run
+from pamrs.diagnosis.explain._next import _telling, next_experiment
 from pamrs.diagnosis.fit import Problem, fit, known_parameters, residuals
+from pamrs.diagnosis.next_experiment import experiments_of
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
 from pamrs.findings import (
@@ -150,6 +152,41 @@ def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
     assert loud.headline.startswith(begin)
     assert "whole rig" not in quiet.headline
     assert "not settled" in report.render_html(loud)
+
+
+def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
+    prepared = prepare(recorded(RIG, "a", "fit"), RIG, SETTINGS)
+    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    chamber = next(b for b in blocks if b.name == "chamber")
+    problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
+    base = Candidate(
+        (), fit(problem, RIG, (), {}, dict.fromkeys(("supply", "chamber", "arm"), 1.0)), {}, {}, 0.0
+    )
+    quiet = judge([Group(blocks, {}, {}, [base], {"": 1.0}, None, {}, [])], SETTINGS)
+
+    def told(problem: Problem, *off: str) -> str:
+        return next_experiment("none", [], [], RIG, quiet, problem, problem, off).text
+
+    assert told(problem).startswith("The answer is settled")
+    # a block that has the channel is asked, without one what surrounds it
+    assert "no judged block shows why. For the chamber: step" in told(problem, "muscle_pressure")
+    few = replace(problem, blocks=[b for b in blocks if b is not chamber])
+    assert "record the channels that stand between it" in told(few, "muscle_pressure")
+
+
+def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> None:
+    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    (chamber,) = (b for b in blocks if b.name == "chamber")
+    assert _telling(chamber, RIG).kind == "step_and_shut"
+    assert _telling(chamber, RIG, ["pressure_lag"]).kind == "step_and_shut"
+    leak = _telling(chamber, RIG, ["leak_muscle"])
+    assert leak.kind == "sealed_hold"
+    assert "inside those that are already recorded" in leak.text
+    record = recorded(RIG, "a", "fit")
+    own = SETTINGS.next_experiment
+    (hold,) = experiments_of(RIG, [record], own, ["sealed_hold"])
+    run = hold.simulate(RIG)
+    assert run["muscle_pressure"].max() < 1.02 * record.channels["muscle_pressure"].max()
 
 
 def block_of(name: str, channel: str, noises: float, *, more: bool, **named: Any) -> BlockVerdict:

@@ -5,8 +5,8 @@ below reports and diagnosis, so that neither has to know the other to name what 
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
 `WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`to_plain` and `told`, by which they become JSON, `object_of`, `reference` and `DEFINITIONS`, by
-which a schema comes of them.
+`channels_off` (of free runs); `to_plain` and `told`, by which they become JSON, `object_of`,
+`reference` and `DEFINITIONS`, by which a schema comes of them.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from pamrs.findings._entries import (
     WrongParameter,
 )
 from pamrs.findings._entry import Entry, to_plain, told
-from pamrs.findings._findings import Findings
+from pamrs.findings._findings import Findings, channels_off
 from pamrs.findings._schema import DEFINITIONS, object_of, reference
 from pamrs.findings._trace import ModelFile, Trace
 
@@ -88,6 +88,7 @@ __all__ = [
     "Unexplained",
     "Where",
     "WrongParameter",
+    "channels_off",
     "object_of",
     "reference",
     "to_plain",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from pamrs.findings._details import (
@@ -30,7 +31,20 @@ from pamrs.findings._entries import (
 from pamrs.findings._entry import told
 from pamrs.findings._trace import ModelFile, Trace
 
-__all__ = ["Findings"]
+__all__ = ["Findings", "channels_off"]
+
+
+def channels_off(runs: Sequence[FreeRun]) -> dict[str, FreeRunError]:
+    """Channels that free runs miss by more than noise and what is known of the values explain, the
+    worst recording of each, by channel; the worst first.
+    """
+    found: dict[str, FreeRunError] = {}
+    for run in runs:
+        for channel, error in run.channels.items():
+            worst = found.get(channel)
+            if error.off and (worst is None or error.noises > worst.noises):
+                found[channel] = error
+    return dict(sorted(found.items(), key=lambda item: -item[1].noises))
 
 
 @dataclass(frozen=True)
@@ -185,13 +199,7 @@ class Findings:
         """Channels that the whole rig misses from its commands alone by more than noise and the
         uncertainty of its values explain, the worst recording of each, by channel.
         """
-        found: dict[str, FreeRunError] = {}
-        for run in self.free_run or []:
-            for channel, error in run.channels.items():
-                worst = found.get(channel)
-                if error.off and (worst is None or error.noises > worst.noises):
-                    found[channel] = error
-        return dict(sorted(found.items(), key=lambda item: -item[1].noises))
+        return channels_off(self.free_run or [])
 
     @property
     def judged(self) -> list[BlockVerdict]:

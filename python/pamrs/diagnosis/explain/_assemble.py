@@ -78,6 +78,7 @@ from pamrs.findings import (
     Trace,
     Tried,
     WrongParameter,
+    channels_off,
 )
 from pamrs.recordings import Case
 from pamrs.rig import Rig
@@ -133,6 +134,7 @@ def assemble(
     running = partial(free_run, held, out_found, nominal, models.final, models.events, uncertain)
     nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
     runs, runs_note = part("the free run", running, nothing)
+    off = channels_off(runs or [])
     effects = _effects(judged, verdict, fitted)
     likely = partial(_hypotheses, judged, probabilities, nominal, fitted)
     constants = said_of_constants(runs or [], [effect.id for effect in effects], settings.warnings)
@@ -147,7 +149,9 @@ def assemble(
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=part(
             "the next experiment",
-            lambda: next_experiment(verdict, ambiguity, likely(), nominal, judged, fitted, held),
+            lambda: next_experiment(
+                verdict, ambiguity, likely(), nominal, judged, fitted, held, list(off)
+            ),
             NextExperiment(""),
         ),
         warnings=constants + _warnings(case, models, table, settings, same=held is fitted),

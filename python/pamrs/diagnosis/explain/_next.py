@@ -88,10 +88,17 @@ _SHUT = _Telling(
 )
 _HOLDS = _Telling(
     "sealed_hold",
-    "fill to three pressures, shut the air in at each and hold it for 16 s",
+    "fill to three pressures, inside those that are already recorded, shut the air in at each and "
+    "hold it for 16 s",
     "what the supply pressure does while the air is shut in is the supply's own, what it does only "
     "while air is drawn goes with the flow",
     alone=False,
+)
+_LEAKS = replace(
+    _HOLDS,
+    shows="what the pressure goes on losing while the air is shut in, in proportion to itself, is "
+    "a leak; what stops within seconds is heat; what turns its sign with the pressure is the "
+    "valve's null",
 )
 _SET = _Telling(
     "set_steps",
@@ -128,8 +135,10 @@ _OVER = _Telling(
 )
 
 
-def _telling(block: Block, rig: Rig) -> _Telling:
-    """What tells most about a block of a rig whatever is missing there."""
+def _telling(block: Block, rig: Rig, names: Iterable[str] = ()) -> _Telling:
+    """What tells most about a block of a rig: about some names that are open there, as far as the
+    catalogue says what tells them, else whatever is missing.
+    """
     if block.mechanical:
         return _STROKES if has_frame(rig) else _LOOPS
     if is_sealed(rig):
@@ -141,6 +150,9 @@ def _telling(block: Block, rig: Rig) -> _Telling:
         return _SET
     if not all(can_shut(rig, chain) for chain in _driving(block, rig)):
         return _KEPT
+    asked = {dict(info_of(n).excitation).get("kind") for n in names if is_effect(n)}
+    if block.kind != "supply" and _LEAKS.kind in asked:
+        return _LEAKS
     return _HOLDS if block.kind == "supply" else _SHUT
 
 
@@ -218,11 +230,13 @@ class _Question:
             return found
         return acting[0] if acting else group.blocks[-1]
 
-    def experiment(self, block: Block) -> tuple[str, str, Experiment | None]:
-        """What to do about a block, what it shows, and the experiment where the library makes it
-        for this rig.
+    def experiment(
+        self, block: Block, open_: Iterable[str] = ()
+    ) -> tuple[str, str, Experiment | None]:
+        """What to do about a block, of which some names are open, what it shows, and the experiment
+        where the library makes it for this rig.
         """
-        telling, rig = _telling(block, self.nominal), self.nominal
+        telling, rig = _telling(block, self.nominal, open_), self.nominal
         names = [telling.kind]
         if telling is _OVER:
             names = [f"{telling.kind}.{name}" for name in _joining(block, rig)]
@@ -254,6 +268,7 @@ def next_experiment(
     judged: list[Judged],
     fitted: Problem,
     held: Problem,
+    off: Sequence[str] = (),
 ) -> NextExperiment:
     """What to record next.
 
@@ -271,6 +286,8 @@ def next_experiment(
         The groups with their verdicts.
     fitted, held : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
+    off : sequence of str
+        Channels that the whole rig misses from its commands alone, the worst first.
 
     Returns
     -------
@@ -301,16 +318,20 @@ def next_experiment(
         return replace(simulated, pairs=pairs)
     if same:
         return NextExperiment(same, pairs=pairs)
-    return replace(_told(asked, verdict, ambiguity), pairs=pairs)
+    return replace(_told(asked, verdict, ambiguity, off), pairs=pairs)
 
 
-def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExperiment:
+def _told(
+    asked: _Question, verdict: str, ambiguity: list[list[str]], off: Sequence[str]
+) -> NextExperiment:
     """What to record where no two hypotheses could be simulated."""
     missing = [
         j.group.mismatch
         for j in asked.judged
         if j.verdict == "unlisted" and j.group.mismatch is not None
     ]
+    if not ambiguity and verdict != "unlisted" and not missing and off:
+        return _of_whole(asked, off[0])
     if not ambiguity and verdict != "unlisted" and not missing:
         several = sum(len(j.named) + len(j.wrong) for j in asked.judged) > 1
         text = (
@@ -326,7 +347,7 @@ def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExp
         return NextExperiment(_measured(measurable) + ".")
     settled = not ambiguity and verdict != "unlisted"
     block = missing[0] if missing and not ambiguity else asked.place(names or [verdict])
-    what, shows, experiment = asked.experiment(block)
+    what, shows, experiment = asked.experiment(block, names)
     begin = "The name is settled. For the rest of the residual in the" if settled else "For the"
     rest = (
         " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
@@ -334,11 +355,31 @@ def _told(asked: _Question, verdict: str, ambiguity: list[list[str]]) -> NextExp
         else spoken_name(block.name)
     )
     text = f"{begin} {rest}: {what}; {shows}."
-    excitation: dict[str, Any] = {"kind": _telling(block, asked.nominal).kind, "block": block.name}
+    excitation: dict[str, Any] = {
+        "kind": _telling(block, asked.nominal, names).kind,
+        "block": block.name,
+    }
     if experiment is None:
         return NextExperiment(text, excitation)
     excitation |= experiment.excitation
     return NextExperiment(text, excitation, protocol=protocol_of(experiment))
+
+
+def _of_whole(asked: _Question, channel: str) -> NextExperiment:
+    """What to record where the blocks fit one by one and the whole rig misses a channel."""
+    begin = f"The whole rig misses the {spoken_name(channel)}, and no judged block shows why"
+    block = next((b for b in asked.blocks if b.channel == channel), None)
+    if block is None:
+        return NextExperiment(
+            f"{begin}: record the channels that stand between it and the commands as well, so that "
+            "the blocks that were not judged can be."
+        )
+    what, shows, experiment = asked.experiment(block)
+    text = f"{begin}. For the {spoken_name(block.name)}: {what}; {shows}."
+    kind = {"kind": _telling(block, asked.nominal).kind, "block": block.name}
+    if experiment is None:
+        return NextExperiment(text, kind)
+    return NextExperiment(text, kind | experiment.excitation, protocol=protocol_of(experiment))
 
 
 def _pairs(
@@ -387,7 +428,7 @@ def _pair(
         return PairExperiment(labels, same)
     differing = sorted(set(one) ^ set(other))
     block = asked.place([*one, *other])
-    what, shows, experiment = asked.experiment(block)
+    what, shows, experiment = asked.experiment(block, [*one, *other])
     kind = "" if experiment is None else experiment.name
     if "unlisted" not in differing:
         values = [n for n in differing if is_parameter(n)]
