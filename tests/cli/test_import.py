@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -46,6 +47,54 @@ def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert 'rig = "../../mine.toml"' in text
     found = load_case(tmp_path / "a" / "b", allow_outside=True)
     assert found.recordings[0].name == "run_bag"
+
+
+LAYOUTS = [
+    ("my logs/run 1.csv", "my rig.toml", "new case"),
+    ("my logs/run 1.csv", "shoulder", "."),
+    ("my logs/run 1.csv", "my rig.toml", "./my logs/../c1/"),
+    ("my logs/../my logs/run 1.csv", "./my rig.toml", "my logs"),
+    ("link.csv", "my rig.toml", "c2"),
+    ("my logs/run 1.csv", "shoulder", "alias/deep"),
+]
+
+
+@pytest.mark.parametrize(("log", "rig", "out"), LAYOUTS)
+def test_what_it_tells_to_run_next_takes_the_case(
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    log: str,
+    rig: str,
+    out: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my logs").mkdir()
+    rows = "".join(f"{0.01 * i:.2f};{i % 9 / 8:.3f};{20 + i}\n" for i in range(60))
+    Path("my logs/run 1.csv").write_text(f"t [s];p_muscle [bar];angle [deg]\n{rows}")
+    Path("link.csv").symlink_to("my logs/run 1.csv")
+    Path("alias").symlink_to("my logs")
+    pamrs.rigs.shoulder().to_toml("my rig.toml")
+    code, said, _ = run(capsys, log, "--rig", rig, "--out", out)
+    assert code == 0
+    command = said.rpartition("then: ")[2].strip()
+    _, _, folder, *options = shlex.split(command)
+    found = load_case(folder, allow_outside="--allow-outside" in options)
+    assert len(found.recordings[0]) == 60
+
+
+def test_no_rig_and_another_rig_are_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savez("run.npz", **{"p1 [bar]": np.linspace(0.0, 4.0, 100), "t [s]": np.arange(100) * 0.01})
+    code, out, _ = run(capsys, "run.npz", "--out", "case")
+    assert (code, "put the rig file there as case/rig.toml, then: pamrs" in out) == (0, True)
+    pamrs.rigs.bench().to_toml("rig.toml")
+    before = Path("rig.toml").read_bytes()
+    code, _, err = run(capsys, "run.npz", "--rig", "shoulder", "--out", ".")
+    assert (code, "is there already, and is not shoulder" in err) == (2, True)
+    assert (Path("rig.toml").read_bytes(), Path("case.toml").exists()) == (before, False)
 
 
 def test_without_a_folder_it_is_printed(

@@ -11,6 +11,7 @@ import pytest
 
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit import ForceMap, load_force_map, load_measured_muscle
+from tests.recordings.written import write_workbook
 
 CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
 TABLE = (
@@ -798,3 +799,56 @@ def test_a_description_takes_no_arguments_beside_it(described):
         ParameterError, match=r"rest_length cannot be given: .* describes its table itself"
     ):
         load_force_map(described, rest_length=0.3)
+
+
+# ------------------------------------------------- without headings, with scales, workbooks
+
+PULL = [(300.0 - 2.0 * k, 10.0 + 3.0 * (k % 7), 1.0 + k % 3) for k in range(24)]  # mm, N, bar
+
+
+def same_map(found: ForceMap) -> None:
+    length, force, gauge = np.array(PULL).T
+    np.testing.assert_allclose(found.length, 1e-3 * length)
+    np.testing.assert_allclose(found.force, force, atol=1e-9)
+    np.testing.assert_allclose(found.pressure, 1e5 * gauge)
+
+
+def test_a_table_without_headings_takes_a_list_of_them(tmp_path):
+    file = tmp_path / "map.csv"
+    file.write_text("\n".join(f"{a:.1f};{b:.2f};x;{c:.0f}".replace(".", ",") for a, b, c in PULL))
+    names = ["length [mm]", "force [N]", "", "pressure [bar]"]
+    same_map(load_force_map(file, rest_length=0.3, columns=names))
+    with pytest.raises(RecordingError, match=r"the first row has numbers.*columns = \["):
+        load_force_map(file, rest_length=0.3)
+    with pytest.raises(RecordingError, match="columns lists 3 names, but there are 4 columns"):
+        load_force_map(file, rest_length=0.3, columns=names[:3])
+
+
+def test_a_load_cell_in_volts_has_a_scale(tmp_path):
+    file = tmp_path / "map.csv"
+    rows = [f"{a:.1f},{0.5 + b / 50.0:.5f},{4.0 + 16.0 * c / 6.0:.9f}" for a, b, c in PULL]
+    file.write_text("\n".join(["L [mm],U1,I1", *rows]))
+    cell = {"name": "force [N]", "scale": 50.0, "offset": -25.0}
+    gauge = {"name": "pressure [bar]", "from": [4, 20], "to": [0, 6]}
+    columns = {"L [mm]": "length [mm]", "U1": cell, "I1": gauge}
+    found = load_force_map(file, rest_length=0.3, columns=columns)
+    same_map(found)
+    (tmp_path / "map.toml").write_text(
+        'schema = "pamrs.force_map/1"\nfile = "map.csv"\n[columns]\n"L [mm]" = "length [mm]"\n'
+        'U1 = { name = "force [N]", scale = 50.0, offset = -25.0 }\n'
+        'I1 = { name = "pressure [bar]", from = [4, 20], to = [0, 6] }\n[muscle]'
+        + DESCRIPTION.partition("[muscle]")[2]
+    )
+    np.testing.assert_allclose(load_force_map(tmp_path / "map.toml").force, found.force)
+    for wrong, words in (({"scale": 2}, "name"), ({"name": "force [N]", "scale": 0}, "scale = 0")):
+        with pytest.raises(RecordingError, match=words):
+            load_force_map(file, rest_length=0.3, columns=columns | {"U1": wrong})
+
+
+def test_a_workbook_is_a_force_map(tmp_path):
+    rows = [[*row, "contracting" if k % 2 else "lengthening"] for k, row in enumerate(PULL)]
+    head = ["length [mm]", "force [N]", "pressure [bar]", "direction"]
+    write_workbook(tmp_path / "map.xlsx", [head, *rows])
+    found = load_force_map(tmp_path / "map.xlsx", rest_length=0.3)
+    same_map(found)
+    assert set(found.direction.tolist()) == {-1, 1}

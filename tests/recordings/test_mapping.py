@@ -47,6 +47,43 @@ def test_counts_scales_signs_and_absolute_pressures(tmp_path: Path) -> None:
     np.testing.assert_allclose(got.channels["joint_angle"], np.radians(data["angle"] + 5))
 
 
+def test_a_table_is_straight_between_its_points_and_goes_on_beyond(tmp_path: Path) -> None:
+    raw = np.linspace(-0.5, 5.0, 61)
+    file = npz(tmp_path, t=np.arange(61) * DT, adc=raw)
+    want = (
+        np.interp(raw, [0, 1, 4], [0, 2, 3]) + np.minimum(raw, 0) * 2 + np.maximum(raw - 4, 0) / 3
+    )
+    for given, stand_for in (([0, 1, 4], [0, 2, 3]), ([4, 1, 0], [3, 2, 0])):
+        entry = {"column": "adc", "unit": "bar", "from": given, "to": stand_for}
+        (got,) = load_recordings(file, channels={"muscle_pressure": entry}, time="t")
+        np.testing.assert_allclose(got.channels["muscle_pressure"], 1e5 * want, atol=1e-6)
+
+
+@pytest.mark.parametrize("clocks", [1, 2])
+def test_a_channel_that_had_one_value_all_the_time(tmp_path: Path, clocks: int) -> None:
+    data = signals()
+    file = npz(tmp_path, t=data["t"], p1=data["p1"], t2=data["t"] + 0.002, f=data["angle"])
+    channels = BASE | {
+        "length": {"value": 0.25, "unit": "m"},
+        "ambient_pressure": {"value": 950, "unit": "hPa"},
+        "force": {"column": "f", "unit": "N", "time": "t" if clocks == 1 else "t2"},
+    }
+    channels["muscle_pressure"] = {"column": "p1", "unit": "bar(a)"}
+    (got,) = load_recordings(file, channels=channels, time="t", start=1.0, stop=2.0)
+    assert set(got.channels["length"].tolist()) == {0.25}
+    assert got.valid("length").all()
+    assert len(got.channels["length"]) == len(got)
+    assert not [issue for issue in got.issues if issue.channel == "length"]
+    assert got.units["length"] == "m"
+    (gauge,) = load_recordings(file, channels=BASE, time="t", start=1.0, stop=2.0)
+    count = min(len(got), len(gauge))
+    apart = gauge.channels["muscle_pressure"][:count] - got.channels["muscle_pressure"][:count]
+    np.testing.assert_allclose(apart, 95e3, atol=2e3 if clocks == 2 else 1e-6)
+    assert "the recorded ambient pressure" in got.notes["muscle_pressure"]
+    with pytest.raises(RecordingError, match="every channel has a value"):
+        load_recordings(file, channels={"length": {"value": 0.25, "unit": "m"}})
+
+
 def test_channels_with_clocks_of_their_own(tmp_path: Path) -> None:
     """Fast pressures are averaged over the encoder's interval, its clock is 40 ms behind, and the
     command holds from one change to the next.
@@ -197,6 +234,14 @@ WRONG = [
     ({"muscle_pressure": {"column": "p1", "unit": "bar", "from": [0, 1]}}, {}, "belong together"),
     ({"muscle_pressure": BASE["muscle_pressure"] | {"from": [1, 1], "to": [0, 1]}}, {}, "equal"),
     ({"muscle_pressure": {"column": "p1", "unit": "bar", "hold": 1}}, {}, "hold = 1"),
+    ({"length": {"value": "x", "unit": "m"}}, {}, "channels.length.value = 'x'"),
+    ({"length": {"value": 0.2}}, {}, "channels.length.unit = None"),
+    ({"length": {"value": 0.2, "unit": "m", "hold": True}}, {}, "unknown key"),
+    ({"length": {"value": 0.2, "unit": "m(a)"}}, {}, "unknown unit 'm(a)'"),
+    ({"length": {"column": "p1", "unit": "m", "from": [0, 1, 1], "to": [0, 1, 2]}}, {}, "rises"),
+    ({"length": {"column": "p1", "unit": "m", "from": [0, 1, 2], "to": [0, 1]}}, {}, "as many"),
+    ({"muscle_pressure": BASE["muscle_pressure"] | {"assumed": 1}}, {}, "assumed = 1"),
+    ({"muscle_pressure": BASE["muscle_pressure"] | {"scale": 10**400}}, {}, "scale = 1000"),
     ({"muscle_pressure": {"column": "p1", "unit": "bar", "time": 3}}, {}, "time = 3"),
     (BASE, {"time": {"column": "t", "unit": "bar"}}, "wrong dimension"),
     (BASE, {"time": {"column": "t", "offset": "1"}}, "time.offset = '1'"),

@@ -161,6 +161,8 @@ def test_without_clock_or_channel(tmp_path: Path) -> None:
         ("p1 (bar/x)", "p1", "bar/x"),
         ("p1_bar_abs", "p1_bar_abs", "bar abs"),
         ("p1 psia", "p1 psia", "psia"),
+        ("tank bar(a)", "tank bar(a)", "bar(a)"),
+        ("p1 kPa (g)", "p1 kPa (g)", "kPa (g)"),
         ("torque_V", "torque_V", "V"),
         ("p1 [4..20 mA = 0..6 bar]", "p1", "4..20 mA = 0..6 bar"),
     ],

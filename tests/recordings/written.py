@@ -298,9 +298,14 @@ def _sheet(data: dict[str, Array]) -> list[list[Any]]:
 
 
 def write_xlsx(path: Path, data: dict[str, Array]) -> None:
-    """A workbook of one sheet with a title above its table, with as little as Excel needs."""
+    """A workbook of one sheet with a title above its table."""
+    write_workbook(path, _sheet(data))
+
+
+def write_workbook(path: Path, table: list[list[Any]]) -> None:
+    """A workbook of one sheet, with as little as Excel needs."""
     rows = []
-    for number, row in enumerate(_sheet(data), start=1):
+    for number, row in enumerate(table, start=1):
         cells = [
             f'<c r="{chr(65 + place)}{number}" t="inlineStr"><is><t>{cell}</t></is></c>'
             if isinstance(cell, str)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -85,18 +86,25 @@ def import_command(
         typer.echo(text)
         return
     file.parent.mkdir(parents=True, exist_ok=True)
-    if rig is not None and model is not None and not rig.exists():
-        beside = file.parent / "rig.toml"
-        if not beside.exists():
-            from pamrs import rigs
+    used = [*log, *([rig] if rig is not None and rig.exists() else [])]
+    beside = file.parent / "rig.toml"
+    if rig is not None and not rig.exists():
+        from pamrs import rigs
 
-            contents[beside] = rigs.template(str(rig), str(rig), "coefficients")
+        template = rigs.template(str(rig), str(rig), "coefficients")
+        if beside.exists() and beside.read_text(encoding="utf-8", errors="replace") != template:
+            raise FileExistsError(
+                f"{beside}: is there already, and is not {rig}; it is not overwritten: give it as "
+                "--rig, or another --out"
+            )
+        contents[beside] = template
     contents[file] = text
     write(contents)
-    used = [*log, *([rig] if rig is not None and rig.exists() else [])]
     outside = any(not is_inside(file.parent, path) for path in used)
     allowed = " --allow-outside" if outside else ""
-    typer.echo(f"look at {file}, then: pamrs diagnose {file.parent}{allowed}")
+    missing = "" if rig is not None or beside.exists() else f", put the rig file there as {beside}"
+    folder_name = shlex.quote(str(file.parent))
+    typer.echo(f"look at {file}{missing}, then: pamrs diagnose {folder_name}{allowed}")
 
 
 def _show(item: LogProposal) -> None:

@@ -101,7 +101,8 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     }
     if "file" not in document:
         reader.problem("file is missing: the table with the measurements")
-    maps = {key: _text_table(reader, document, key) for key in ("columns", "where")}
+    columns = _columns(reader, document)
+    where = _text_table(reader, document, "where")
     clipped = _quantity(reader, document, "clipped_force", "N")
     tolerance = _quantity(reader, document, "level_tolerance", "Pa")
     noise = _quantity(reader, document, "noise", "N")
@@ -131,8 +132,8 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         )
     options = {
         "rest_length": model["rest_length"],
-        "columns": maps["columns"],
-        "where": maps["where"] or None,
+        "columns": columns,
+        "where": where or None,
         "clipped": clipped,
         "level_tolerance": tolerance,
         "delimiter": texts["delimiter"] or None,
@@ -174,6 +175,21 @@ def _text(reader: Reader, document: Mapping[str, Any], key: str) -> str:
         return value
     reader.problem(f"{key} = {value!r} is not allowed: a text is needed")
     return ""
+
+
+def _columns(reader: Reader, document: Mapping[str, Any]) -> Any:
+    """A table from headings, or a list, of headings or of tables with a calibration."""
+    given = document.get("columns", {})
+    entries = given.values() if isinstance(given, Mapping) else given
+    if isinstance(given, (Mapping, list)) and all(
+        isinstance(entry, (str, Mapping)) for entry in entries
+    ):
+        return given
+    reader.problem(
+        f"columns = {given!r} is not allowed: a table of texts is needed, or a list of one for "
+        "each column"
+    )
+    return None
 
 
 def _text_table(reader: Reader, document: Mapping[str, Any], key: str) -> dict[str, str]:

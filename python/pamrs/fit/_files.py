@@ -6,7 +6,7 @@ import difflib
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,12 @@ from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
 from pamrs.fit._dialect import decimal_of, delimiter_of
 from pamrs.recordings import load_recording
+from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
+from pamrs.recordings.logs import ENDINGS, read_log
 from pamrs.recordings.table import Table, is_text, read_table, read_text
 from pamrs.units import parse_unit, same_dimension, to_si
 
-__all__ = ["read_map"]
+__all__ = ["Columns", "read_map"]
 
 Array = NDArray[np.float64]
 
@@ -52,6 +54,7 @@ _DIRECTIONS: Final = {
     "unknown": 0.0,
 }
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]\s*$")
+_NUMERIC = re.compile(r"[-+]?(\d[\d.,]*|[.,]\d+)([eE][-+]?\d+)?")
 _NARROW: Final = 0.006  # a map of contractions from 0 to less than 0.6 % is one of fractions
 _SET_POINTS: Final = (
     50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
@@ -62,13 +65,18 @@ class _Column(NamedTuple):
     position: int
     heading: str
     unit: str
+    line: Calibration = Calibration()
+
+
+#: What a column is: a heading with its unit, or a table with that as ``name`` and a calibration.
+Columns = Mapping[str, "str | Mapping[str, Any]"] | Sequence["str | Mapping[str, Any]"]
 
 
 def read_map(
     file: Path,
     *,
     rest_length: float | None,
-    columns: Mapping[str, str] | None,
+    columns: Columns | None,
     where: Mapping[str, str | float] | None,
     clipped: float | None,
     level_tolerance: float | None,
@@ -88,9 +96,13 @@ def read_map(
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     _one_character(delimiter, decimal, source)
     delimiter = delimiter or _delimiter(file)
-    table = read_table(file, delimiter=delimiter, header=True)
-    headings = _renamed(table, columns, source)
+    table = _table(file, delimiter, columns)
+    headings, lines = _renamed(table, columns, source)
     found, strange = _understood(headings, source)
+    found = {
+        name: column._replace(line=lines.get(column.position, column.line))
+        for name, column in found.items()
+    }
     decimal = decimal or decimal_of(_texts(table, found), source)
     wanted = {heading: str(value) for heading, value in (where or {}).items()}
     title = name or "_".join([file.name.removesuffix(".gz").rsplit(".", 1)[0], *wanted.values()])
@@ -100,8 +112,18 @@ def read_map(
                 f"{source}: where does not apply to a table with a time column, which is one "
                 "recording"
             )
+        if lines:
+            raise RecordingError(
+                f"{source}: scale, offset, from and to do not apply to a table with a time column, "
+                "which is one recording (in Python: load_recordings and from_recording)"
+            )
         recording = load_recording(
-            file, columns=_channels(table, found), delimiter=delimiter, decimal=decimal, name=title
+            file,
+            columns=_channels(table, found),
+            delimiter=delimiter,
+            decimal=decimal,
+            header=table.header is not None,
+            name=title,
         )
         return from_recording(
             recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance
@@ -157,7 +179,15 @@ def _one_character(delimiter: str | None, decimal: str | None, source: str) -> N
 
 
 def _delimiter(file: Path) -> str:
-    return delimiter_of(read_text(file), str(file)) if is_text(file) else ","
+    if not is_text(file) or _is_log(file):
+        return ","
+    return delimiter_of(read_text(file), str(file))
+
+
+def _is_log(file: Path) -> bool:
+    """Whether a file is a log of a kind that only :mod:`pamrs.recordings.logs` reads."""
+    kind = Path(file.name.lower().removesuffix(".gz")).suffix
+    return kind in ENDINGS and kind not in (".csv", ".tsv", ".txt", ".dat", ".parquet")
 
 
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
@@ -168,14 +198,84 @@ def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
     return [cells for cells in columns if not isinstance(cells, np.ndarray)]
 
 
-def _renamed(table: Table, columns: Mapping[str, str] | None, source: str) -> list[str]:
+def _table(file: Path, delimiter: str, columns: Columns | None) -> Table:
+    """The table of a file, with headings or, where they are listed, without."""
+    if _is_log(file):
+        return _table_of_log(file)
+    if is_text(file):
+        listed = columns is not None and not isinstance(columns, Mapping)
+        table = read_table(file, delimiter=delimiter, header=True)
+        if not any(_NUMERIC.fullmatch(cell.strip()) for cell in table.header or []):
+            return table
+        if not listed:
+            raise RecordingError(
+                f"{file}: the first row has numbers, {', '.join(table.header or [])[:60]!r}, and "
+                'no headings: say what each column is, columns = ["length [mm]", "force [N]", "", '
+                '"pressure [bar]"] in a .toml description (in Python: the argument columns)'
+            )
+        return read_table(file, delimiter=delimiter, header=False)
+    return read_table(file, delimiter=delimiter, header=True)
+
+
+def _table_of_log(file: Path) -> Table:
+    """The columns of a log that are as long as most."""
+    log = read_log(file)
+    counts = [len(series.values) for series in log.series.values()]
+    usual = max(set(counts), key=counts.count)
+    header: list[str] = []
+    cells: list[Sequence[str] | Array] = []
+    for series in log.series.values():
+        if len(series.values) == usual:
+            header.append(f"{series.name} [{series.unit}]" if series.unit else series.name)
+            texts = [series.labels[int(at)] for at in series.values] if series.labels else None
+            cells.append(series.values if texts is None else texts)
+    return Table(header, cells, list(range(2, usual + 2)), list(log.remarks))
+
+
+def _renamed(
+    table: Table, columns: Columns | None, source: str
+) -> tuple[list[str], dict[int, Calibration]]:
+    """Headings of all columns, and the calibrations of those that have one."""
     given = table.header or []
-    strange = [key for key in columns or {} if key not in given]
-    if strange:
+    if columns is None:
+        return list(given), {}
+    if isinstance(columns, str) or not isinstance(columns, (Mapping, Sequence)):
         raise RecordingError(
-            f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}"
+            f"{source}: columns = {columns!r} is not allowed: a table from headings to headings, "
+            "or a list of one for each column"
         )
-    return [(columns or {}).get(heading, heading) for heading in given]
+    count = len(table.cells)
+    if not isinstance(columns, Mapping):
+        if len(columns) != count:
+            raise RecordingError(
+                f"{source}: columns lists {len(columns)} names, but there are {count} columns"
+            )
+        entries: list[Any] = list(columns)
+    else:
+        strange = [key for key in columns if key not in given]
+        if strange:
+            raise RecordingError(
+                f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}"
+            )
+        entries = [columns.get(heading, heading) for heading in given]
+    problems: list[str] = []
+    lines: dict[int, Calibration] = {}
+    headings = []
+    for index, entry in enumerate(entries):
+        if isinstance(entry, Mapping):
+            unknown = [key for key in entry if key not in ("name", *KEYS)]
+            if unknown or not isinstance(entry.get("name"), str):
+                problems.append(
+                    f"columns: {dict(entry)!r} is not allowed: name (a heading with its unit) with "
+                    "scale and offset, or from and to"
+                )
+            else:
+                lines[index] = read_calibration(problems, f"columns: {entry['name']}", entry)
+            entry = str(entry.get("name", ""))
+        headings.append(str(entry))
+    if problems:
+        raise RecordingError(joined(source, problems))
+    return headings, lines
 
 
 def _split(heading: str) -> tuple[str, str | None]:
@@ -289,7 +389,7 @@ def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: 
         )
     values = table.numbers(column.position, column.heading, source, None, decimal)
     unit = parse_unit(column.unit)
-    return np.asarray(values * unit.scale + unit.offset)
+    return np.asarray(column.line.of(values) * unit.scale + unit.offset)
 
 
 def _direction_cells(
@@ -397,7 +497,7 @@ def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
             "a recording with a time column needs the column length, not contraction"
         )
     headings = [""] * len(table.cells)
-    for channel, (index, _, unit) in found.items():
+    for channel, (index, _, unit, _) in found.items():
         if channel == "pressure":
             held = len(set(np.asarray(table.cells[index]).tolist())) < _SET_POINTS
             headings[index] = f"{'reference' if held else 'muscle_pressure'} [{unit}]"

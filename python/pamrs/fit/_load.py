@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from pamrs.errors import ParameterError
 from pamrs.fit._data import ForceMap
 from pamrs.fit._description import read_description
-from pamrs.fit._files import read_map
+from pamrs.fit._files import Columns, read_map
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -49,7 +49,7 @@ def load_force_map(
     path: str | os.PathLike[str],
     *,
     rest_length: float | None = None,
-    columns: Mapping[str, str] | None = None,
+    columns: Columns | None = None,
     where: Mapping[str, str | float] | None = None,
     clipped: float | None = None,
     level_tolerance: float | None = None,
@@ -63,15 +63,18 @@ def load_force_map(
     Parameters
     ----------
     path : path-like
-        A table, of any kind that :func:`pamrs.load_recording` reads, with the columns length or
+        A table, text, Parquet, a workbook of Excel or another log, with the columns length or
         contraction, pressure, force and, if known, direction (-1 or "contracting", 1 or
         "lengthening"). Units are in the headings: ``length [mm]``, ``pressure_kPa``,
         ``force (N)``. With a column ``time`` it is read as a recording of a bench. Or a ``.toml``
         description (schema ``pamrs.force_map/1``), to which only `allow_outside` applies.
     rest_length : float, optional
         Length at zero contraction [m]; needed for a table.
-    columns : mapping of str to str, optional
-        From the file's headings to headings as above; an empty one leaves the column out.
+    columns : mapping or sequence, optional
+        From the file's headings to headings as above; an empty one leaves the column out. A list of
+        one for each column where the file has no headings. Instead of a heading a table with that
+        as ``name`` and ``scale`` and ``offset``, or ``from`` and ``to``, as in ``case.toml``:
+        ``{"name": "force [N]", "scale": 50.0}`` for a load cell in volts.
     where : mapping of str to str or float, optional
         Column of the file -> value: only rows with these values belong to the map. Numbers count as
         numbers: 1 is 1.000.

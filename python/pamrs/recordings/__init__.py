@@ -5,7 +5,7 @@ reads a case folder; :func:`load_recordings` takes the log of a laboratory as it
 :func:`propose` says what of it is likely which channel, :func:`suspicions` which units physics
 contradicts.
 :mod:`pamrs.recordings.table` reads tables of numbers from files, :mod:`pamrs.recordings.logs` logs
-of every format.
+of every format, :mod:`pamrs.recordings.calibration` what their numbers stand for.
 """
 
 from __future__ import annotations

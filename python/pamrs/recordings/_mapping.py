@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import itertools
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -15,11 +14,12 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS
+from pamrs.recordings.calibration import KEYS, Calibration, is_finite, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["Clock", "Source", "read_clock", "read_sources"]
 
-_ENTRY: Final = ("column", "unit", "scale", "offset", "from", "to", "time", "hold", "assumed")
+_ENTRY: Final = ("column", "unit", *KEYS, "time", "hold", "assumed")
 _CONSTANT: Final = ("value", "unit", "assumed")
 _CLOCK: Final = ("column", "unit", "offset")
 
@@ -47,7 +47,7 @@ class Clock:
 
 @dataclass(frozen=True)
 class Source:
-    """Where a channel comes from: its values are ``scale * raw + offset`` in `unit`.
+    """Where a channel comes from, and what its numbers stand for in `unit`.
 
     Attributes
     ----------
@@ -56,14 +56,11 @@ class Source:
     column : str
         The series of the log; empty for a channel that had one value all the time.
     unit : str
-        Unit after scale and offset.
+        Unit of the values.
     absolute : bool
         Whether that is an absolute pressure.
-    scale, offset : float
+    line : Calibration
         From the numbers of the log.
-    table : tuple of tuple of float, optional
-        Instead of them: three or more numbers of the log, rising, and the values that they stand
-        for. Straight between neighbours, and beyond the ends as in the last interval.
     value : float
         For a channel with one value, that, in `unit`.
     clock : Clock, optional
@@ -78,9 +75,7 @@ class Source:
     column: str
     unit: str
     absolute: bool = False
-    scale: float = 1.0
-    offset: float = 0.0
-    table: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    line: Calibration = Calibration()
     value: float = math.nan
     clock: Clock | None = None
     hold: bool = False
@@ -88,18 +83,8 @@ class Source:
 
     def si(self, raw: Array | float) -> Array:
         """Values in SI of numbers of the log; absolute pressures stay absolute."""
-        values = self.scale * np.asarray(raw, dtype=np.float64) + self.offset
-        if self.table is not None:
-            values = _along(np.asarray(raw, dtype=np.float64), *map(np.asarray, self.table))
         unit = parse_unit(self.unit)
-        return np.asarray(values * unit.scale + unit.offset)
-
-
-def _along(raw: Array, given: Array, stand_for: Array) -> Array:
-    """Values on the lines between neighbours of a table, and on its last ones beyond its ends."""
-    place = np.clip(np.searchsorted(given, raw) - 1, 0, len(given) - 2)
-    slope = np.diff(stand_for) / np.diff(given)
-    return np.asarray(stand_for[place] + slope[place] * (raw - given[place]))
+        return np.asarray(self.line.of(raw) * unit.scale + unit.offset)
 
 
 def read_sources(channels: Any, source: str) -> list[Source]:
@@ -177,21 +162,21 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     absolute = kind == "absolute"
     if constant:
         value = entry["value"]
-        if not _finite(value):
+        if not is_finite(value):
             problems.append(f"{label}.value = {value!r} is not allowed: a number is needed")
             return None
         return Source(name, "", unit, absolute, value=float(value), assumed=assumed)
     hold = entry.get("hold", False)
     if not isinstance(hold, bool):
         problems.append(f"{label}.hold = {hold!r} is not allowed: true or false is needed")
-    line = _line(problems, label, entry)
+    line = read_calibration(problems, label, entry)
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
     return Source(
         name,
         entry["column"],
         unit,
         absolute,
-        *line,
+        line,
         clock=clock,
         hold=hold is True,
         assumed=assumed,
@@ -208,63 +193,6 @@ def _check_unit(problems: list[str], label: str, channel: str, unit: str) -> Non
             troubles.append(str(error))
     if len(troubles) == len(expected):
         problems.append(f"{label}.unit: {troubles[0]}")
-
-
-_Table = tuple[tuple[float, ...], tuple[float, ...]]
-
-
-def _line(
-    problems: list[str], label: str, entry: Mapping[str, Any]
-) -> tuple[float, float, _Table | None]:
-    """Scale and offset, given so or by two readings and what they stand for; the table of more."""
-    if ("from" in entry) != ("to" in entry) or (
-        "from" in entry and {"scale", "offset"} & set(entry)
-    ):
-        problems.append(
-            f"{label}: from and to belong together, like from = [0, 4095], to = [0, 10], and stand "
-            "instead of scale and offset"
-        )
-        return 1.0, 0.0, None
-    if "from" in entry:
-        return _calibration(problems, label, entry["from"], entry["to"])
-    for key in ("scale", "offset"):
-        value = entry.get(key, 1.0)
-        if not _finite(value) or (key == "scale" and value == 0):
-            needed = "a number other than zero" if key == "scale" else "a number"
-            problems.append(f"{label}.{key} = {value!r} is not allowed: {needed} is needed")
-            return 1.0, 0.0, None
-    return float(entry.get("scale", 1.0)), float(entry.get("offset", 0.0)), None
-
-
-def _calibration(
-    problems: list[str], label: str, given: Any, stand_for: Any
-) -> tuple[float, float, _Table | None]:
-    pairs = [given, stand_for]
-    if not all(
-        isinstance(p, (list, tuple)) and len(p) > 1 and all(map(_finite, p)) for p in pairs
-    ) or len(given) != len(stand_for):
-        problems.append(
-            f"{label}: from = {given!r}, to = {stand_for!r} is not allowed: as many numbers in "
-            "both, two at least"
-        )
-        return 1.0, 0.0, None
-    rises = [b > a for a, b in itertools.pairwise(given)]
-    falls = [b < a for a, b in itertools.pairwise(given)]
-    if not (all(rises) or all(falls)) or min(stand_for) == max(stand_for):
-        problems.append(
-            f"{label}: from = {given!r}, to = {stand_for!r}: two equal numbers, or from neither "
-            "rises nor falls all the way"
-        )
-        return 1.0, 0.0, None
-    if len(given) == 2:
-        scale = (stand_for[1] - stand_for[0]) / (given[1] - given[0])
-        return scale, stand_for[0] - scale * given[0], None
-    way = 1 if rises[0] else -1
-    return 1.0, 0.0, (tuple(map(float, given[::way])), tuple(map(float, stand_for[::way])))
-
-
-def _finite(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
 
 
 def read_clock(time: Any, source: str) -> Clock:
@@ -308,7 +236,7 @@ def _clock(problems: list[str], label: str, entry: Any) -> Clock:
         if value is not None and not (isinstance(value, str) and value):
             problems.append(f"{label}.{key} = {value!r} is not allowed: a text is needed")
             return Clock()
-    if not _finite(offset):
+    if not is_finite(offset):
         problems.append(f"{label}.offset = {offset!r} is not allowed: a number of seconds")
         return Clock()
     if unit is not None:

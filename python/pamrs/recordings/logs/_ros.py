@@ -22,6 +22,9 @@ _SECONDS: Final = (("sec", "nanosec"), ("secs", "nsecs"), ("seconds", "nanos"))
 _OTHER_CLOCK: Final = 1e9  # ns between stamp and arrival that no network takes
 _OF_ADDRESSES: Final = frozenset("%?#")  # rosbags opens a bag by an address, which SQLite decodes
 
+#: Units of fields by the definition of their messages: ``sensor_msgs/FluidPressure`` is absolute.
+_UNITS: Final = {"stamp": "s", "fluid_pressure": "Pa(a)"}
+
 _Messages = Iterable[tuple[str, int, Any]]
 Times = NDArray[np.int64]
 
@@ -201,7 +204,7 @@ def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
             own = clocks.setdefault(rows, clock[list(rows)])
             array = np.array(numbers, dtype=np.float64)
             array[~np.isfinite(array)] = np.nan
-            found.append(Series(inner, array, "s" if inner.endswith("/stamp") else "", own))
+            found.append(Series(inner, array, _UNITS.get(inner.rpartition("/")[2], ""), own))
         if told:
             arrival = _seconds(np.array(topic.arrived, dtype=np.int64) - first)
             found.append(Series(f"{name}/arrival", arrival, "s", clock))

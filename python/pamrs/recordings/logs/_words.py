@@ -17,7 +17,8 @@ _BRACKETS = re.compile(
 )
 _SLASH = re.compile(r"^\s*(?P<name>.+?)\s+(?:/|in)\s*(?P<unit>[^\s/]+)\s*$")
 _TAIL = re.compile(
-    r"^\s*.+?[_.\s-](?P<unit>[A-Za-z°]+(?:[2-3]?[A-Za-z]*)?(?:[_\s-](?:a|g|abs|gauge))?)\s*$"
+    r"^\s*.+?[_.\s-](?P<unit>(?P<alone>[A-Za-z°]+(?:[2-3]?[A-Za-z]*)?)"
+    r"(?:[_\s-]*\(?(?:a|g|abs|gauge)\)?)?)\s*$"
 )
 _NUMBER: Final = r"\s*(?P<{}>[-+]?\d+(?:[.,]\d+)?)\s*"
 _RANGE: Final = _NUMBER + r"(?:\.{{2,3}}|…|-|–|to|bis|~)" + _NUMBER
@@ -191,7 +192,7 @@ def split_heading(heading: str) -> tuple[str, str]:
     if match and understood_unit(match["unit"]):
         return match["name"], match["unit"]
     match = _TAIL.match(heading)
-    if match and re.split(r"[_\s-]", match["unit"])[0] in _TAILS and understood_unit(match["unit"]):
+    if match and match["alone"] in _TAILS and understood_unit(match["unit"]):
         return heading.strip(), match["unit"].replace("_", " ")
     return heading.strip(), ""
 
