@@ -20,6 +20,7 @@ _JUMP_HOLE: Final = 10  # samples left empty where the clock jumped: the true pa
 _ON_SAMPLE: Final = 0.05  # samples: nearer than this, a recorded value stands as it is
 _MOST_EVENTS: Final = 20
 _LATE: Final = 2  # samples: a hole of so many is the timer's jitter where there are several
+_FARTHEST: Final = 1e12  # samples that a hole is said to have, at most
 _FEW_LATE: Final = 2  # such holes that are told one by one
 
 
@@ -252,7 +253,8 @@ def gaps(placed: Array, elapsed: Array, jumps: Mask, usual: float) -> list[Event
     list of Event
     """
     holes = np.flatnonzero(~jumps & (elapsed > GAP * usual))
-    missing = np.maximum(np.rint(elapsed[holes] / usual).astype(int) - 1, 1)
+    away = np.minimum(elapsed[holes] / usual, _FARTHEST)
+    missing = np.maximum(np.rint(away).astype(int) - 1, 1)
     if len(holes) > _MOST_EVENTS:
         total = int(missing.sum())
         share = 100.0 * total / (total + len(placed))

@@ -52,9 +52,10 @@ def read_arrow(path: Path, form: TextFormat) -> Log:
             codes = np.array([place[text] for text in texts])
             found.append(Series(name, codes, "", None, labels))
             continue
-        if str(column.type).startswith(("timestamp", "duration", "time")):
+        stamps = str(column.type).startswith(("timestamp", "duration", "time"))
+        if stamps:
             unit = "s"
-        found.append(Series(name, values, said.decode() if said else unit))
+        found.append(Series(name, values, said.decode() if said else unit, stamps=stamps))
     return collected(path, found, unread)
 
 
