@@ -24,7 +24,7 @@ from typing import Any
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
-from pamrs.diagnosis.explain import assemble, data_used
+from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, holdable, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
@@ -51,7 +51,7 @@ from pamrs.diagnosis.prepare import (
     without_rails,
 )
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.search import examine
+from pamrs.diagnosis.search import examine, misread
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError, meant
@@ -230,36 +230,50 @@ def diagnose(
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
-    motion = [b for b in inner.blocks if b.mechanical]
-    parts = [[b for b in inner.blocks if not b.mechanical], motion]
     with _in_range(case.name):
-        groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
-        every = inner.blocks
-        inner, outer = _judged_only(inner, outer, groups)
-        groups = [calibrated(group, chosen.verdict) for group in groups]
-        unsettled = _unsettled(case.rig) if motion else []
-        factor = chosen.verdict.unknown_geometry_probability
-        if unsettled:
-            groups = [_capped(group, factor) for group in groups]
-        say("putting the answer together")
-        unjudged += _lost(every, inner)
-        diagnosis = assemble(case, inner, outer, groups, unjudged)
+        read = misread(inner, case.rig)
+        if read is not None:
+            diagnosis = misread_diagnosis(case, inner, outer, read, unjudged)
+        else:
+            diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
     warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *begun]
     warnings += diagnosis.warnings
-    if unsettled:
-        what = "length" if case.rig.model["load"] else "angle"
-        warnings.insert(
-            0,
-            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
-            f"{what} as an effect would, so the probability of an effect of muscles and what they "
-            f"move is capped at {100 * factor:.0f} %",
-        )
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     data = data_used(case.recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(
         diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
     )
+
+
+def _physics(
+    case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Say
+) -> tuple[Diagnosis, Problem, list[Unjudged]]:
+    """The diagnosis of recordings that are what their log says, the recordings to fit with the
+    blocks that were judged, and the blocks that were not.
+    """
+    every = inner.blocks
+    motion = [b for b in inner.blocks if b.mechanical]
+    parts = [[b for b in inner.blocks if not b.mechanical], motion]
+    groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
+    inner, outer = _judged_only(inner, outer, groups)
+    groups = [calibrated(group, inner.settings.verdict) for group in groups]
+    unsettled = _unsettled(case.rig) if motion else []
+    factor = inner.settings.verdict.unknown_geometry_probability
+    if unsettled:
+        groups = [_capped(group, factor) for group in groups]
+    say("putting the answer together")
+    unjudged = [*unjudged, *_lost(every, inner)]
+    diagnosis = assemble(case, inner, outer, groups, unjudged)
+    if unsettled:
+        what = "length" if case.rig.model["load"] else "angle"
+        told = (
+            f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
+            f"{what} as an effect would, so the probability of an effect of muscles and what they "
+            f"move is capped at {100 * factor:.0f} %"
+        )
+        diagnosis = replace(diagnosis, warnings=[told, *diagnosis.warnings])
+    return diagnosis, inner, unjudged
 
 
 def _judged_only(inner: Problem, outer: Problem, groups: list[Group]) -> tuple[Problem, Problem]:

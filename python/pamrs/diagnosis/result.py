@@ -54,7 +54,12 @@ class Diagnosis(Findings):
     case : str
         Name of the case.
     verdict : str
-        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+        ``none``, ``parameters``, ``effects``, ``unlisted``, or ``units`` (channels are read wrong,
+        and nothing else is judged).
+    misread : list of Misread
+        Channels that are likely in another unit, or pressures with another zero, than the log says:
+        ``channels``, ``said``, ``likely``, ``factors``, ``offset``, what the refitted baseline
+        leaves ``before`` and ``after``, and ``text``.
     where : Where
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to
@@ -152,7 +157,7 @@ class Diagnosis(Findings):
     Raises
     ------
     ValueError
-        If `verdict` is none of the allowed four.
+        If `verdict` is none of the allowed ones.
     """
 
     settings: DiagnosisSettings = field(

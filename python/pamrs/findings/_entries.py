@@ -24,6 +24,7 @@ __all__ = [
     "FreeRunError",
     "MismatchSize",
     "MismatchStages",
+    "Misread",
     "ParameterFound",
     "StageError",
     "Unexplained",
@@ -31,7 +32,7 @@ __all__ = [
     "WrongParameter",
 ]
 
-VERDICTS: Final = ("none", "parameters", "effects", "unlisted")
+VERDICTS: Final = ("none", "parameters", "effects", "unlisted", "units")
 """Allowed verdicts."""
 HEALTHY: Final = VERDICTS[:2]
 """Verdicts, and hypotheses, by which no physics is missing."""
@@ -431,6 +432,38 @@ class ChannelError(Entry):
     before: float = field(metadata=told("root mean square error of the nominal model"))
     refit: float = field(metadata=told("root mean square error after refitting parameters only"))
     after: float = field(metadata=told("root mean square error with the effect"))
+
+
+@dataclass(frozen=True, eq=False)
+class Misread(Entry):
+    """Channels that are likely in another unit, or pressures with another zero, than the log says.
+
+    Attributes
+    ----------
+    channels : list of str
+        Which ones.
+    said, likely : str
+        The unit that the log says, and the one that fits; ``gauge`` and ``absolute`` where the zero
+        is another one.
+    factors : list of float
+        By which the values of each channel are to be multiplied.
+    offset : float
+        What is to be added to them then, SI.
+    before, after : float
+        Mean square of what the refitted baseline leaves of all blocks, in variances of the noise,
+        as the log says and read so.
+    text : str
+        The same in words.
+    """
+
+    channels: list[str]
+    said: str
+    likely: str
+    factors: list[float] = field(metadata=told("by which the values of each are to be multiplied"))
+    offset: float = field(metadata=told("what is to be added to them then, SI"))
+    before: float = field(metadata=told("what the baseline leaves, in variances of the noise"))
+    after: float = field(metadata=told("the same with the channels read so"))
+    text: str
 
 
 @dataclass(frozen=True, eq=False)

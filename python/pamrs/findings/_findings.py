@@ -23,6 +23,7 @@ from pamrs.findings._entries import (
     FitErrors,
     FreeRun,
     FreeRunError,
+    Misread,
     ParameterFound,
     Unexplained,
     Where,
@@ -56,7 +57,10 @@ class Findings:
     case : str
         Name of the case.
     verdict : str
-        ``none``, ``parameters``, ``effects`` or ``unlisted``.
+        ``none``, ``parameters``, ``effects``, ``unlisted``, or ``units`` (channels are read wrong,
+        and nothing else is judged).
+    misread : list of Misread
+        Channels that are likely in another unit than the log says.
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
@@ -117,11 +121,18 @@ class Findings:
     Raises
     ------
     ValueError
-        If `verdict` is none of the allowed four.
+        If `verdict` is none of the allowed ones.
     """
 
     case: str = field(metadata=told(json=False))
     verdict: str = field(metadata=told(enum=VERDICTS))
+    misread: list[Misread] = field(
+        default_factory=list,
+        metadata=told(
+            "channels that are likely in another unit than the log says, judged before any physics",
+            required=False,
+        ),
+    )
     where: Where = field(default_factory=Where)
     effects: list[EffectFound] = field(
         default_factory=list, metadata=told("the named physics, most probable first")

@@ -30,6 +30,7 @@ BADGES = {
     "parameters": "parameters inside their tolerances",
     "effects": "missing physics named",
     "unlisted": "missing physics, not in the catalogue",
+    "units": "a channel is in another unit",
 }
 
 
@@ -38,6 +39,7 @@ OPEN_BADGES = {
     "parameters": "parameters or physics, not settled",
     "effects": "missing physics, the name is not settled",
     "unlisted": "missing physics, no name",
+    "units": "a channel is in another unit",
 }
 """The same where several answers are left."""
 

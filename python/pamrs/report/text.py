@@ -426,6 +426,8 @@ def claim(diagnosis: Findings) -> str:
     the whole rig misses from its commands alone, then the blocks, that with the largest mismatch
     first.
     """
+    if diagnosis.misread:
+        return "; ".join(reading.text for reading in diagnosis.misread)
     off = off_sentence(diagnosis)
     found = _claims(diagnosis)
     # where something has no name anyway, that is the answer, and the whole rig stands beside it

@@ -1,6 +1,6 @@
 """From judged hypotheses to an answer: where and when, in words, the model, its traces.
 
-Public: `assemble`, `data_used`, `describe_closure`.
+Public: `assemble`, `data_used`, `describe_closure`, `misread_diagnosis` (units first).
 """
 
 from __future__ import annotations
@@ -8,9 +8,11 @@ from __future__ import annotations
 from pamrs.diagnosis.explain._assemble import assemble
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._data_used import data_used
+from pamrs.diagnosis.explain._misread import misread_diagnosis
 
 __all__ = [
     "assemble",
     "data_used",
     "describe_closure",
+    "misread_diagnosis",
 ]

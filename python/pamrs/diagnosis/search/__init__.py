@@ -2,7 +2,8 @@
 noise, forms without a name.
 
 Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
-alone), `find_closure`, `below_noise`, `freed`, `beside_quiet`, `suspected`.
+alone), `misread`, `Reading` (other units of channels), `find_closure`, `below_noise`, `freed`,
+`beside_quiet`, `suspected`.
 """
 
 from __future__ import annotations
@@ -11,14 +12,17 @@ from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import examine
+from pamrs.diagnosis.search._readings import Reading, misread
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed, suspected
 
 __all__ = [
+    "Reading",
     "below_noise",
     "beside_quiet",
     "examine",
     "find_closure",
     "freed",
+    "misread",
     "refitted",
     "suspected",
     "with_autocorrelation",

@@ -28,6 +28,7 @@ from pamrs.diagnosis.settings._models import (
 )
 from pamrs.diagnosis.settings._search import (
     BelowNoiseSettings,
+    ReadingSettings,
     SearchSettings,
     WrongParameterSettings,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "PlausibilitySettings",
     "PrepareSettings",
     "ScreenSettings",
+    "ReadingSettings",
     "SearchSettings",
     "Setting",
     "SettingsGroup",
@@ -78,6 +80,8 @@ class DiagnosisSettings:
         Effects with times of their own.
     screen : ScreenSettings
         Scores of effects before any fit.
+    readings : ReadingSettings
+        Other units of columns.
     search : SearchSettings
         Hypotheses that are fitted.
     below_noise : BelowNoiseSettings
@@ -119,6 +123,7 @@ class DiagnosisSettings:
     fit: FitSettings = field(default_factory=FitSettings)
     transients: TransientSettings = field(default_factory=TransientSettings)
     screen: ScreenSettings = field(default_factory=ScreenSettings)
+    readings: ReadingSettings = field(default_factory=ReadingSettings)
     search: SearchSettings = field(default_factory=SearchSettings)
     below_noise: BelowNoiseSettings = field(default_factory=BelowNoiseSettings)
     wrong_parameters: WrongParameterSettings = field(default_factory=WrongParameterSettings)
@@ -211,6 +216,7 @@ _GROUPS: dict[str, type[SettingsGroup]] = {
     "fit": FitSettings,
     "transients": TransientSettings,
     "screen": ScreenSettings,
+    "readings": ReadingSettings,
     "search": SearchSettings,
     "below_noise": BelowNoiseSettings,
     "wrong_parameters": WrongParameterSettings,

@@ -6,7 +6,93 @@ from dataclasses import dataclass
 
 from pamrs.diagnosis.settings._setting import SettingsGroup, setting
 
-__all__ = ["BelowNoiseSettings", "SearchSettings", "WrongParameterSettings"]
+__all__ = ["BelowNoiseSettings", "ReadingSettings", "SearchSettings", "WrongParameterSettings"]
+
+
+@dataclass(frozen=True)
+class ReadingSettings(SettingsGroup):
+    """When another unit of a column, or another zero of a pressure, is what the model misses."""
+
+    suspect: float = setting(
+        3.0,
+        unit="1",
+        least=0.0,
+        reason="mean square of the bin means, in variances of the noise, from which other units "
+        "are tried: a wrong one leaves hundreds, and noise of the drives leaves two",
+        origin="judgement",
+    )
+    promising: float = setting(
+        0.3,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of that excess which a unit may leave after one step of the parameters to be "
+        "worth a fit",
+        origin="judgement",
+    )
+    fitted: int = setting(
+        4,
+        unit="1",
+        least=1,
+        reason="units that are fitted, the most promising first; others leave more",
+        origin="judgement",
+    )
+    left: float = setting(
+        0.05,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of the excess of the refitted baseline that a unit may leave: missing "
+        "physics may stand beside it, and is then told from recordings that are read right",
+        origin="judgement",
+    )
+    small_step: float = setting(
+        0.1,
+        unit="1",
+        least=0.0,
+        reason="logarithm of a factor up to which (bar, atmosphere, kgf/cm2) a wrong parameter or "
+        "an effect may come near to it",
+        origin="atmosphere over kgf/cm2 is 1.033",
+    )
+    small_left: float = setting(
+        0.02,
+        unit="1",
+        above=0.0,
+        most=1.0,
+        reason="share of the excess that such a factor may leave",
+        origin="judgement",
+    )
+    gauge_error: float = setting(
+        0.005,
+        unit="1",
+        least=0.0,
+        reason="share by which a gauge's slope, or its zero in parts of the offset, may be off: a "
+        "free factor need not be nearer to the one of the list",
+        origin="usual class of industrial gauges: 0.5 % of the range",
+    )
+    stds: float = setting(
+        3.0,
+        unit="1",
+        above=0.0,
+        reason="standard deviations by which a free factor may be off",
+        origin="one in 370",
+    )
+    closer: float = setting(
+        0.25,
+        unit="1",
+        above=0.0,
+        most=0.5,
+        reason="how far, in parts of the step from the unit that was said (of its logarithm), a "
+        "free factor may be at the most, what is not known of it included",
+        origin="half the step would be no nearer than the unit that was said",
+    )
+    free_step: float = setting(
+        0.005,
+        unit="1",
+        above=0.0,
+        reason="part of an offset, and share of a factor, by which it is moved for its derivative",
+        origin="judgement",
+    )
 
 
 @dataclass(frozen=True)

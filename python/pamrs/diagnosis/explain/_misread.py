@@ -1,0 +1,141 @@
+"""A diagnosis of recordings whose channels are in other units than their log says: that, and
+nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from pamrs.diagnosis.explain._block_entries import not_judged
+from pamrs.diagnosis.fit import Problem, residuals
+from pamrs.diagnosis.prepare import Residual, Unjudged
+from pamrs.diagnosis.result import Diagnosis
+from pamrs.diagnosis.search import Reading
+from pamrs.errors import SimulationError
+from pamrs.findings import ChannelError, FitErrors, Misread, NextExperiment, Where
+from pamrs.recordings import Case
+from pamrs.rig import Rig
+from pamrs.units import bar_and_psi
+
+__all__ = ["misread_diagnosis"]
+
+
+def misread_diagnosis(
+    case: Case,
+    fitted: Problem,
+    held: Problem,
+    reading: Reading,
+    unjudged: Sequence[Unjudged],
+) -> Diagnosis:
+    """The diagnosis of a case whose channels are to be read in another way.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+    fitted, held : Problem
+        Recordings to fit and held-out ones (the same object when there are no others), as their
+        log is said to be.
+    reading : Reading
+        The way to read them, with its fits.
+    unjudged : sequence of Unjudged
+        Blocks that could not be judged in any case.
+    """
+    why = "the unit of what surrounds it is settled first"
+    blocks = [Unjudged(block.name, block.covers, why) for block in fitted.blocks]
+    text, advice = _told(reading), _advice(reading)
+    most = fitted.settings.evidence.most_probability
+    table = _table(case.rig, fitted, reading)
+    channels = list(reading.channels)
+    entry = Misread(
+        channels=channels,
+        said=reading.said,
+        likely=reading.likely,
+        factors=list(reading.factors),
+        offset=reading.offset,
+        before=reading.before,
+        after=reading.after,
+        text=text,
+    )
+    return Diagnosis(
+        case=case.name,
+        verdict="units",
+        misread=[entry],
+        where=Where(channel=channels[0], text=advice),
+        probabilities={"units": most, "unlisted": 1.0 - most},
+        blocks=[not_judged(block) for block in (*blocks, *unjudged)],
+        fit=FitErrors(table, _table(case.rig, held, reading) if held is not fitted else {}),
+        next_experiment=NextExperiment(text=f"None yet. {advice}"),
+        text=f"{text[:1].upper()}{text[1:]}.\n\n{advice}",
+        rig=case.rig,
+        measured=list(case.channels),
+        settings=fitted.settings,
+    )
+
+
+def _names(reading: Reading) -> str:
+    *first, last = reading.channels
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def _told(reading: Reading) -> str:
+    """What is likely, and the evidence."""
+    names, many = _names(reading), len(reading.channels) > 1
+    verb = "are" if many else "is"
+    if reading.offset:
+        what = (
+            f"{names} {verb} likely {reading.likely} and not {reading.said}: with "
+            f"{bar_and_psi(abs(reading.offset))} "
+            f"{'taken off' if reading.offset < 0.0 else 'added'}"
+        )
+    else:
+        what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}: read so,"
+    return (
+        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise in "
+        f"the place of {reading.before:.2g} times, and a free "
+        f"{'offset' if reading.offset else 'factor'} would be the same"
+    )
+
+
+def _advice(reading: Reading) -> str:
+    """What to do about it."""
+    how = (
+        "subtract the ambient pressure"
+        if reading.likely == "absolute"
+        else "give the values as they are, as gauge pressures"
+        if reading.offset
+        else f"write {reading.likely}"
+    )
+    return (
+        f"No physics was judged, since what the log says cannot be told from it: {how} for "
+        f"{_names(reading)} (in the heading, or in case.toml), or see to the sensor where the log "
+        "is right, and diagnose again."
+    )
+
+
+def _table(nominal: Rig, problem: Problem, reading: Reading) -> dict[str, ChannelError]:
+    """Errors of each channel as the log says, before and after the refit, and read so."""
+    if reading.was is None or reading.fit is None:
+        return {}
+    turned = reading.read(problem)
+    try:
+        before = residuals(problem, nominal)
+        refit = residuals(problem, reading.was.rig)
+        after = residuals(turned, reading.fit.rig)
+    except SimulationError:
+        return {}
+    found: dict[str, ChannelError] = {}
+    for block in problem.blocks:
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        noise = math.sqrt(float(np.mean([p.noise[block.channel] ** 2 for p in turned.recordings])))
+        errors = [_rms([stage[key] for key in keys]) for stage in (before, refit, after)]
+        found[block.channel] = ChannelError(noise, *errors)
+    return found
+
+
+def _rms(found: list[Residual]) -> float:
+    values = np.concatenate([r.value[r.rows] for r in found])
+    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan

@@ -1,0 +1,306 @@
+"""Other units of channels, tried before any physics: whether what the model misses is how a column
+is read.
+
+A wrong unit is a factor of a short list, a wrong zero of a pressure is one atmosphere: an effect or
+a wrong parameter has no reason to look like either. Each way to read each channel, and all channels
+of a kind at once, is judged by what the refitted baseline then leaves in all blocks together. It
+is believed where it takes nearly all that is above the noise, and where a factor (or an offset)
+that is free would be the one of the list.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.channels import channel_of, unit_of
+from pamrs.diagnosis.fit import (
+    Fit,
+    Problem,
+    free_baseline,
+    known_parameters,
+    residuals,
+    stacked,
+)
+from pamrs.diagnosis.prepare import Prepared, implausible
+from pamrs.diagnosis.search._baseline import refitted
+from pamrs.errors import ParameterError, SimulationError
+from pamrs.rig import Rig
+from pamrs.units import parse_unit
+
+__all__ = ["Reading", "misread"]
+
+Array = NDArray[np.float64]
+
+OTHERS: Final[dict[str, dict[str, float]]] = {
+    "Pa": {
+        "Pa": 1.0,
+        "hPa": 1e2,
+        "mmHg": 133.322387415,
+        "inH2O": 249.08891,
+        "kPa": 1e3,
+        "psi": 6894.757293168361,
+        "mH2O": 9806.65,
+        "kgf/cm2": 98066.5,
+        "bar": 1e5,
+        "atm": 101325.0,
+        "MPa": 1e6,
+    },
+    "rad": {"mrad": 1e-3, "deg": math.pi / 180.0, "rad": 1.0, "rev": 2.0 * math.pi},
+    "m": {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0},
+    "N": {"N": 1.0, "lbf": 4.4482216152605, "kgf": 9.80665, "kN": 1e3},
+    "N m": {"N mm": 1e-3, "lbf in": 0.1129848290276, "lbf ft": 1.3558179483314, "kgf m": 9.80665},
+    "V": {"mV": 1e-3, "V": 1.0},
+}
+"""Units that a column may be in, by the SI unit of its channel, with the size of each in SI."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """Another way to read channels of a log.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        Which ones.
+    said, likely : str
+        The unit of the log, and the one that fits; ``"gauge"`` and ``"absolute"`` of pressures with
+        another zero.
+    factors : tuple of float
+        By which the SI values of each channel are multiplied.
+    offset : float
+        What is added to them then, SI.
+    before, after : float
+        What the refitted baseline leaves, in variances of the noise, as the log is said to be and
+        read so: the mean square of bin means over all blocks.
+    fit, was : Fit or None
+        The refitted baselines, read so and as the log is said to be.
+    """
+
+    channels: tuple[str, ...]
+    said: str
+    likely: str
+    factors: tuple[float, ...]
+    offset: float = 0.0
+    before: float = math.nan
+    after: float = math.nan
+    fit: Fit | None = None
+    was: Fit | None = None
+
+    @property
+    def size(self) -> float:
+        """How far it is from what is said: an offset [SI], or the logarithm of the largest
+        factor.
+        """
+        return abs(self.offset) or max(abs(math.log(factor)) for factor in self.factors)
+
+    def of(self, prepared: Prepared) -> Prepared:
+        """A recording read so."""
+        maps = dict(zip(self.channels, self.factors, strict=True))
+
+        def turned(values: Mapping[str, Array]) -> dict[str, Array]:
+            return {
+                name: maps[name] * v + self.offset if name in maps else v
+                for name, v in values.items()
+            }
+
+        recording = replace(
+            prepared.recording,
+            channels=turned(prepared.recording.channels),
+            commands=turned(prepared.recording.commands),
+        )
+        signals = {
+            name: (maps[name] * value + self.offset, maps[name] * slope)
+            if name in maps
+            else (value, slope)
+            for name, (value, slope) in prepared.signals.items()
+        }
+        noise = {name: maps.get(name, 1.0) * level for name, level in prepared.noise.items()}
+        return replace(
+            prepared,
+            recording=recording,
+            commands=turned(prepared.commands),
+            held=turned(prepared.held),
+            signals=signals,
+            raw=turned(prepared.raw),
+            noise=noise,
+            _begun={},
+        )
+
+    def read(self, problem: Problem) -> Problem:
+        """Recordings read so."""
+        return replace(problem, recordings=[self.of(p) for p in problem.recordings])
+
+
+def misread(problem: Problem, nominal: Rig) -> Reading | None:
+    """The way to read channels that explains what the model misses, where there is one.
+
+    Parameters
+    ----------
+    problem : Problem
+        Recordings to fit, as their log is said to be.
+    nominal : Rig
+        The nominal model.
+
+    Returns
+    -------
+    Reading or None
+        None where the baseline leaves little more than noise, and where no unit of the list takes
+        nearly all of what it leaves.
+    """
+    settings = problem.settings.readings
+    names = free_baseline(problem, nominal)
+    left = _linear(problem, nominal, names)
+    if left <= settings.suspect:
+        return None
+    tried: list[tuple[float, Reading]] = []
+    for reading in _readings(problem, nominal):
+        own = reading.read(problem)
+        if _possible(own, nominal):
+            with suppress(SimulationError):
+                tried.append((_linear(own, nominal, names), reading))
+    tried.sort(key=lambda item: item[0])
+    worth = [r for power, r in tried if power - 1.0 <= settings.promising * (left - 1.0)]
+    if not worth:
+        return None
+    try:
+        was = refitted(problem, nominal, _white(problem))
+    except SimulationError:
+        return None
+    found = [_fitted(problem, nominal, was, r) for r in worth[: settings.fitted]]
+    believed = [reading for reading in found if reading is not None]
+    return min(believed, key=lambda r: r.after, default=None)
+
+
+def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
+    """A reading with its fit, where the recordings ask for it."""
+    settings = problem.settings.readings
+    own = reading.read(problem)
+    try:
+        now = refitted(own, nominal, _white(problem))
+    except SimulationError:
+        return None
+    before, after = _power(problem, was), _power(own, now)
+    small = not reading.offset and reading.size < settings.small_step
+    most = settings.small_left if small else settings.left
+    if after - 1.0 > most * (before - 1.0) or not _free_is_listed(own, now, reading):
+        return None
+    return replace(reading, before=before, after=after, fit=now, was=was)
+
+
+def _white(problem: Problem) -> dict[str, float]:
+    return {block.name: 1.0 for block in problem.blocks}
+
+
+def _power(problem: Problem, found: Fit) -> float:
+    rows, _ = stacked(problem, found.residuals, found.inflation)
+    return float(rows @ rows) / max(1, rows.size)
+
+
+def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
+    """What the baseline leaves after one step of its parameters inside their tolerances: the mean
+    square of bin means, in variances of the noise.
+    """
+    known = known_parameters(rig, problem.settings.fit)
+    rows, slope = stacked(problem, residuals(problem, rig, names), _white(problem))
+    square = float(rows @ rows)
+    if not math.isfinite(square):
+        raise SimulationError("a residual is not finite")
+    if slope is not None and np.all(np.isfinite(slope)):
+        scaled = slope * np.array([known[name].tol for name in names])
+        normal = scaled.T @ scaled + np.eye(len(names))
+        most = problem.settings.fit.most_tolerances
+        step = np.clip(np.linalg.solve(normal, -scaled.T @ rows), -most, most)
+        square = min(square, float(np.sum((rows + scaled @ step) ** 2)))
+    return square / max(1, rows.size)
+
+
+def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
+    """Whether a factor (an offset) that is free would be that of the list, beside parameters that
+    move as well; the problem is that of the reading.
+    """
+    settings = problem.settings.readings
+    step = settings.free_step * (abs(reading.offset) or 1.0)
+    factor, offset = (1.0, step) if reading.offset else (1.0 + step, 0.0)
+    moved = replace(reading, factors=(factor,) * len(reading.channels), offset=offset)
+    pairs = [(p, moved.of(p)) for p in problem.recordings]
+    # in units of the noise that it has, or a free factor would make the noise larger
+    other = replace(problem, recordings=[replace(m, noise=p.noise) for p, m in pairs])
+    names = list(found.values)
+    rows, slope = stacked(problem, residuals(problem, found.rig, names), found.inflation)
+    try:
+        there, _ = stacked(other, residuals(other, found.rig), found.inflation)
+    except SimulationError:
+        return False
+    if there.size != rows.size:
+        return False
+    columns = [((there - rows) / step)[:, None]]
+    if slope is not None:
+        columns.append(slope * np.array([found.scales[name] for name in names]))
+    design = np.concatenate(columns, axis=1)
+    prior = np.diag([0.0] + [1.0] * (design.shape[1] - 1))
+    strain = np.array([0.0, *(found.moved[name] for name in names)][: design.shape[1]])
+    inverse = np.linalg.pinv(design.T @ design + prior, hermitian=True)
+    away = abs(float((inverse @ (design.T @ rows + prior @ strain))[0]))
+    coloured = max(1.0, float(rows @ rows) / max(1, rows.size))
+    spread = settings.stds * math.sqrt(max(0.0, inverse[0, 0]) * coloured)
+    exact = settings.gauge_error * (abs(reading.offset) or 1.0)
+    return away <= max(exact, spread) and away + spread <= settings.closer * reading.size
+
+
+def _possible(problem: Problem, nominal: Rig) -> bool:
+    """Whether recordings read so can be of the rig at all."""
+    plausible = problem.settings.plausibility
+    return not any(implausible(p.recording, nominal, plausible) for p in problem.recordings)
+
+
+def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
+    """Ways to read the channels that the blocks use: each alone, all of one name, and all of one
+    dimension.
+    """
+    used = list(
+        dict.fromkeys(name for block in problem.blocks for name in (block.channel, *block.drives))
+    )
+    said = {name: _said(problem, name) for name in used}
+    sets = dict.fromkeys(
+        [
+            *((name,) for name in used),
+            *(tuple(n for n in used if channel_of(n) == channel_of(name)) for name in used),
+            *(tuple(n for n in used if unit_of(n) == unit_of(name)) for name in used),
+        ]
+    )
+    ambient = float(nominal.model["gas"]["ambient_pressure"])
+    for channels in sets:
+        kinds = {unit_of(name) for name in channels}
+        if len(kinds) > 1:
+            continue
+        unit = kinds.pop()
+        told = " and ".join(dict.fromkeys(said[name] for name in channels))
+        for other, scale in OTHERS.get(unit, {}).items():
+            factors = tuple(scale / _size(said[name]) for name in channels)
+            if max(abs(math.log(factor)) for factor in factors) > 1e-6:
+                yield Reading(channels, told, other, factors)
+        if unit == "Pa":
+            same = (1.0,) * len(channels)
+            yield Reading(channels, "gauge", "absolute", same, -ambient)
+            yield Reading(channels, "absolute", "gauge", same, ambient)
+
+
+def _said(problem: Problem, channel: str) -> str:
+    """The unit in which the log is said to have a channel; SI where it was read from none."""
+    told = (p.recording.said.get(channel, "") for p in problem.recordings)
+    unit = next((u for u in told if u), "")
+    return unit or unit_of(channel)
+
+
+def _size(unit: str) -> float:
+    try:
+        return parse_unit(unit).scale
+    except ParameterError:
+        return 1.0
