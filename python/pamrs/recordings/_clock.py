@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -64,6 +65,8 @@ class Grid:
         Seconds from 0.
     sample_time : float
         Seconds.
+    usual : float
+        Usual interval of the stamps [s].
     events : list of Event
         Gaps, jumps, repeats.
     rows : array of int
@@ -80,7 +83,7 @@ class Grid:
         time: Array | None = None,
     ) -> None:
         self.rows = rows
-        self.sample_time = step
+        self.sample_time, self.usual = step, usual
         self.events = events
         self._stamps = stamps
         if time is None:
@@ -98,6 +101,11 @@ class Grid:
         self._reachable = single | (
             (span <= GAP * usual) & (self._share > 0.0) & (self._share < 1.0)
         )
+
+    @property
+    def interpolates(self) -> bool:
+        """Whether it has clearly more samples than were recorded."""
+        return math.isfinite(self.usual) and self.usual > GAP * self.sample_time
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """Values of the used rows on the grid; NaN where the mask is False.

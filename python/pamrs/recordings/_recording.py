@@ -169,6 +169,9 @@ class Recording:
     notes : dict of str to str
         By channel, a sentence on how its numbers became values where the file alone does not say: a
         unit that was assumed, an ambient pressure that was subtracted.
+    logged : dict of str to (float, (m,) array)
+        Of a channel that was sampled more slowly than its grid, and is interpolated between its
+        samples: how far these are apart as a rule [s], and their values, NaN where there is none.
     """
 
     name: str
@@ -184,6 +187,7 @@ class Recording:
     said: dict[str, str] = field(default_factory=dict)
     commands: dict[str, Array] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    logged: dict[str, tuple[float, Array]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])
@@ -369,12 +373,25 @@ def assemble(
         issues.append(Issue("short", "time", 0.0, float(grid.time[-1]), text))
     channels: dict[str, Array] = {}
     masks: dict[str, Mask] = {}
+    logged: dict[str, tuple[float, Array]] = {}
     for channel, values in raw.items():
         own = (said or {}).get(channel, "")
         laid = judged(channel, values[grid.rows], grid, source, issues, said=own)
         channels[channel], masks[channel] = laid
+        if grid.interpolates:
+            logged[channel] = grid.usual, values[grid.rows]
     issues.sort(key=lambda issue: (issue.start, issue.channel))
-    return Recording(name, role, grid.time, grid.sample_time, channels, masks, issues, dict(units))
+    return Recording(
+        name,
+        role,
+        grid.time,
+        grid.sample_time,
+        channels,
+        masks,
+        issues,
+        dict(units),
+        logged=logged,
+    )
 
 
 def judged(

@@ -197,7 +197,7 @@ class _Held(Grid):
         time: Array | None = None,
     ) -> None:
         self.rows = rows
-        self.sample_time = step
+        self.sample_time, self.usual = step, np.inf
         self.events = events
         self.time = stamps if time is None else time
         self._stamps = stamps
@@ -289,6 +289,7 @@ def on_one_clock(
     issues: list[Issue] = []
     laid: dict[str, Array] = {}
     masks: dict[str, Mask] = {}
+    logged: dict[str, tuple[float, Array]] = {}
     for channel in channels:
         own = rows[channel.name]
         stamps = channel.time[own] - start
@@ -306,9 +307,11 @@ def on_one_clock(
         laid[channel.name], masks[channel.name] = judged(
             channel.name, channel.values[own], grid, source, issues, held=channel.hold
         )
+        if grid.interpolates:
+            logged[channel.name] = grid.usual, channel.values[own]
     issues.sort(key=lambda issue: (issue.start, issue.channel))
     units = {channel.name: channel.unit for channel in channels}
-    return Recording(name, role, time, step, laid, masks, issues, units)
+    return Recording(name, role, time, step, laid, masks, issues, units, logged=logged)
 
 
 def _rising(channel: Sampled, source: str) -> NDArray[np.intp]:

@@ -454,7 +454,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
                 f"{name} are usable"
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
-        noise[name] = noise_level(recording.channels[name], mask, own, seed=settings.seed)
+        noise[name] = _noise_of(recording, name, settings)
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
         lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
@@ -466,6 +466,22 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         for name, values in commands.items()
     }
     return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings)
+
+
+def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> float:
+    """Standard deviation of a channel's sample noise.
+
+    What is interpolated between samples that are farther apart than the grid's is far smoother
+    than they are: their own noise counts, as that of so many independent samples as were recorded.
+    """
+    own, seed = settings.prepare, settings.seed
+    values, mask = recording.channels[name], recording.mask[name]
+    if name not in recording.logged:
+        return noise_level(values, mask, own, seed=seed)
+    apart, logged = recording.logged[name]
+    there = np.isfinite(logged)
+    single = noise_level(np.where(there, logged, 0.0), there, own, seed=seed)
+    return single * math.sqrt(max(1.0, apart / recording.sample_time))
 
 
 def few_usable(mask: Mask, settings: PrepareSettings) -> bool:

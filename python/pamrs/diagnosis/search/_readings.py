@@ -30,35 +30,23 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.prepare import Prepared, implausible
 from pamrs.diagnosis.search._baseline import refitted
-from pamrs.errors import ParameterError, SimulationError
+from pamrs.errors import SimulationError
 from pamrs.rig import Rig
-from pamrs.units import parse_unit
+from pamrs.units import measured_from, parse_unit
 
 __all__ = ["Reading", "misread"]
 
 Array = NDArray[np.float64]
 
-OTHERS: Final[dict[str, dict[str, float]]] = {
-    "Pa": {
-        "Pa": 1.0,
-        "hPa": 1e2,
-        "mmHg": 133.322387415,
-        "inH2O": 249.08891,
-        "kPa": 1e3,
-        "psi": 6894.757293168361,
-        "mH2O": 9806.65,
-        "kgf/cm2": 98066.5,
-        "bar": 1e5,
-        "atm": 101325.0,
-        "MPa": 1e6,
-    },
-    "rad": {"mrad": 1e-3, "deg": math.pi / 180.0, "rad": 1.0, "rev": 2.0 * math.pi},
-    "m": {"um": 1e-6, "mm": 1e-3, "cm": 1e-2, "in": 0.0254, "m": 1.0},
-    "N": {"N": 1.0, "lbf": 4.4482216152605, "kgf": 9.80665, "kN": 1e3},
-    "N m": {"N mm": 1e-3, "lbf in": 0.1129848290276, "lbf ft": 1.3558179483314, "kgf m": 9.80665},
-    "V": {"mV": 1e-3, "V": 1.0},
+OTHERS: Final[dict[str, tuple[str, ...]]] = {
+    "Pa": ("Pa", "hPa", "mmHg", "inH2O", "kPa", "psi", "mH2O", "kgf/cm2", "bar", "atm", "MPa"),
+    "rad": ("mrad", "deg", "rad", "rev"),
+    "m": ("um", "mm", "cm", "in", "m"),
+    "N": ("N", "lbf", "kgf", "kN"),
+    "N m": ("N mm", "lbf in", "N m", "lbf ft", "kgf m"),
+    "V": ("mV", "V"),
 }
-"""Units that a column may be in, by the SI unit of its channel, with the size of each in SI."""
+"""Units that a column may be in, by the SI unit of its channel."""
 
 
 @dataclass(frozen=True)
@@ -282,8 +270,9 @@ def _readings(problem: Problem, nominal: Rig) -> Iterator[Reading]:
             continue
         unit = kinds.pop()
         told = " and ".join(dict.fromkeys(said[name] for name in channels))
-        for other, scale in OTHERS.get(unit, {}).items():
-            factors = tuple(scale / _size(said[name]) for name in channels)
+        sizes = [_size(said[name]) for name in channels]
+        for other in OTHERS.get(unit, ()):
+            factors = tuple(_size(other) / size for size in sizes)
             if max(abs(math.log(factor)) for factor in factors) > 1e-6:
                 yield Reading(channels, told, other, factors)
         if unit == "Pa":
@@ -300,7 +289,5 @@ def _said(problem: Problem, channel: str) -> str:
 
 
 def _size(unit: str) -> float:
-    try:
-        return parse_unit(unit).scale
-    except ParameterError:
-        return 1.0
+    """Size of a unit, that of an absolute pressure without what says so."""
+    return parse_unit(measured_from(unit)[0]).scale
