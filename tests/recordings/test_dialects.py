@@ -471,6 +471,30 @@ def test_a_clock_that_was_set_back_is_not_sorted_and_no_overflow(tmp_path: Path)
     assert read.valid().sum() == N
 
 
+def test_recordings_of_one_encoder_lie_on_one_turn(tmp_path: Path) -> None:
+    """An encoder of several turns that was switched on a turn later: the joint of the rig goes from
+    15 to 120 deg.
+    """
+    rig = pamrs.rigs.shoulder()
+    rig.to_toml(tmp_path / "rig.toml")
+    entries = []
+    for name, angle in (("a", DATA[:, 3]), ("b", np.full(N, 22.0) + 0.01 * (np.arange(N) % 3))):
+        lines = table("time [s]", plain).splitlines()
+        raw = angle + 360.0 * (name == "b")
+        for row in range(N):
+            parts = lines[row + 1].split(",")
+            lines[row + 1] = ",".join([*parts[:3], f"{raw[row]:.3f}"])
+        (tmp_path / f"{name}.csv").write_text("\n".join([KNOWN, *lines[1:]]), encoding="utf-8")
+        entries.append(f'[[recording]]\nfile = "{name}.csv"\n')
+    (tmp_path / "case.toml").write_text(
+        'schema = "pamrs.case/1"\n' + "".join(entries), encoding="utf-8"
+    )
+    first, second = load_case(tmp_path).recordings
+    assert [issue.kind for issue in first.issues] == []
+    assert second.issues[0].text == "-1 turns, which puts it between the ends in the rig file"
+    np.testing.assert_allclose(np.degrees(second.channels["joint_angle"]), 22.0, atol=0.03)
+
+
 def test_a_dropout_of_an_encoder_is_no_turn(tmp_path: Path) -> None:
     def edit(lines: list[str]) -> None:
         for row in range(1, N + 1):

@@ -11,12 +11,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+import numpy as np
+
 from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
+from pamrs.channels import channel_of
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
-from pamrs.recordings._recording import OwnValue, Recording
-from pamrs.recordings._suspicion import ambient_of
+from pamrs.recordings._recording import Issue, OwnValue, Recording
+from pamrs.recordings._suspicion import ambient_of, limits_of
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Rig, load_rig
 from pamrs.units import to_si
@@ -33,6 +36,7 @@ _OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
 _ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
 _ERRORS: Final = ("same", "proportional", "none")
 _RIG: Final = "rig.toml"
+_TURN: Final = 2.0 * np.pi
 _GIVE_BOTH: Final = (
     "give the folder of the case, and this file as its rig (CASE --rig FILE; in Python: "
     "load_case(CASE).with_rig(load_rig(FILE)))"
@@ -287,7 +291,7 @@ def _recordings(
                 options |= {"role": role, "name": entry.get("name"), "ambient_pressure": ambient}
                 whole = load_recording(file, **options)
                 parts = [whole.between(entry.get("start"), entry.get("stop"))]
-            recordings += [replace(part, parameters=own) for part in parts]
+            recordings += [_on_its_turn(replace(part, parameters=own), rig) for part in parts]
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
@@ -303,6 +307,30 @@ def _recordings(
     ):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
+
+
+def _on_its_turn(recording: Recording, rig: Rig | None) -> Recording:
+    """The same with angles that are whole turns outside what the rig allows moved there: encoders
+    without a leap in one recording, and with one in another, count from different turns.
+    """
+    for name, values in recording.channels.items():
+        limits, used = limits_of(rig, name), recording.mask[name]
+        if limits is None or channel_of(name) != "joint_angle" or not used.any():
+            continue
+        low, high = np.quantile(values[used], (0.01, 0.99))
+        slack = 0.1 * (limits[1] - limits[0])
+        turns = round((0.5 * (limits[0] + limits[1]) - 0.5 * (low + high)) / _TURN)
+        away = turns * _TURN
+        apart = high < limits[0] or low > limits[1]
+        if turns and apart and limits[0] - slack <= low + away and high + away <= limits[1] + slack:
+            text = f"{turns:+d} turns, which puts it between the ends in the rig file"
+            issue = Issue("log", name, 0.0, recording.duration, text)
+            recording = replace(
+                recording,
+                channels=recording.channels | {name: values + away},
+                issues=[issue, *recording.issues],
+            )
+    return recording
 
 
 def _own_values(

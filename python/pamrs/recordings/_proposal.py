@@ -297,13 +297,17 @@ def _proposal(
         remarks.append(f"not found in this log: {told}")
     stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
     split, pieces, short = _split(log, stepped[0] if stepped else None)
-    if short:
-        remarks.append(
-            f"{short} of {short + len(pieces)} parts have fewer than {_SHORTEST} samples: left out"
-        )
     listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
     read = [*log.remarks, *clocks.remarks]
     read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]
+    read += [
+        f"{name}: {lost} of {len(item.values)} samples are missing"
+        for name, item in laid.items()
+        if (lost := int(np.sum(np.isnan(item.values))))
+    ]
+    if short:
+        count = short + len(pieces)
+        read.append(f"{short} of {count} parts have fewer than {_SHORTEST} samples: left out")
     log = replace(log, remarks=read)
     return LogProposal(log, listed, matches, shared, left, split, pieces, short, remarks)
 
