@@ -12,16 +12,13 @@ import numpy as np
 
 from .plant import Parameters
 
-ROOT = Path(__file__).resolve().parents[1]
+HOME = Path(__file__).resolve().parent / "rigs"
 _UNIT = {"bar": 1.0e5, "deg": math.pi / 180.0}
 
 
 def default_rig() -> Path:
-    """The nominal rig file that comes with the package."""
-    path = ROOT / "python" / "pamrs" / "rigs" / "shoulder.toml"
-    if not path.is_file():
-        raise FileNotFoundError("no shoulder.toml found; give the nominal rig with --rig")
-    return path
+    """The nominal rig file: the package's shoulder, with muscles that push, as the plant's do."""
+    return HOME / "shoulder.toml"
 
 
 def _si(entry: Any) -> Any:
@@ -88,7 +85,7 @@ def to_parameters(model: dict[str, Any], **kind: Any) -> Parameters:
     muscle = {
         k: v
         for k, v in model["muscle"].items()
-        if k not in ("model", "count", "modulus_scale", "end_ratio")
+        if k not in ("model", "count", "modulus_scale", "buckling_load", "end_ratio")
     }
     muscle.update(model["muscle"]["end_ratio"])
     return Parameters(

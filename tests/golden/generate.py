@@ -107,12 +107,12 @@ NETWORKS = ("antagonistic_joint", "two_joint_arm", "tube", "hanging_mass")
 
 def networks() -> None:
     """Write ``network_NAME.csv`` of each rig: the smooth run of ``tests/runs.py`` by the
-    reference.
+    reference, whose muscles push as their force model says.
     """
     from tests.runs import RUNS
 
     for name in NETWORKS:
-        run = RUNS[name]
+        run = RUNS[name].with_struts
         columns = {"time": run.time, **run.commands, **run.reference()}
         np.savetxt(
             DATA / f"network_{name}.csv",

@@ -303,11 +303,13 @@ class Pull:
 
     def held(self, force: float) -> float:
         """Force of one muscle that bows out where it is pushed: a push grows with a slope that
-        falls from 1 at none to 0 at twice the load.
+        falls from 1 at none to 0 at twice the load. Without a load it is slack.
         """
         load = self.buckling_load
         if force >= 0.0 or load >= 1e9:
             return force
+        if load == 0.0:
+            return 0.0
         push = min(-force, 2.0 * load)
         return -(push - push**2 / (4.0 * load))
 
@@ -585,7 +587,7 @@ class Network:
         shortening = list(_possible(means, np.linspace(at.low - depth, at.high + depth, 201)))
         low = max(min(shortening) / rest - 1e-3, (1.0 - 1e-4) * muscle.geometry.min_contraction)
         high = min(max(shortening) / rest + 1e-3, muscle.geometry.max_contraction)
-        load = part["muscle"].get("buckling_load", 1e9)
+        load = part["muscle"].get("buckling_load", 0.0)
         table = tabulate(muscle, low, high)
         return Pull(muscle, table, self.index[part["chamber"]], number, means, load)
 

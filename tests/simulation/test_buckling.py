@@ -1,11 +1,14 @@
-"""Muscles without pressure bow out: they push no more than their buckling load."""
+"""Muscles do not push: without pressure they are slack, or push up to their buckling load."""
 
 from __future__ import annotations
+
+from importlib import resources
 
 import numpy as np
 import pytest
 
 import pamrs
+from pamrs.rig import parse_rig
 
 PAIRS = ("pair_1", "pair_2", "pair_3")
 STRUT = 1e9
@@ -42,14 +45,73 @@ def test_muscles_without_air_do_not_hold_the_arm_down() -> None:
     )
 
 
-def test_the_packaged_rig_has_muscles_that_bow_out() -> None:
-    tables = pamrs.rigs.recruitment().tables("muscle")
-    assert [tables[pair]["buckling_load"] for pair in PAIRS] == [3.5] * 3
-    # where a file says nothing a muscle is a strut, as in the dissertation's force models
-    assert pamrs.rigs.shoulder().tables("muscle")[""]["buckling_load"] == STRUT
+@pytest.mark.parametrize("name", pamrs.rigs.names())
+def test_muscles_of_the_packaged_rigs_are_slack_or_bow_out(name: str) -> None:
+    loads = [table["buckling_load"] for table in pamrs.rigs.named(name).tables("muscle").values()]
+    assert set(loads) <= ({3.5} if name == "recruitment" else {0.0})
+    # a new file says so
+    told = pamrs.rigs.template(name)
+    assert told.count("\nbuckling_load") == len(loads)
 
 
-@pytest.mark.parametrize("load", [0.0, -3.5, 2e9, float("nan")])
+def without_key(name: str) -> pamrs.Rig:
+    """A packaged rig whose file says nothing of a push."""
+    lines = (resources.files("pamrs.rigs") / f"{name}.toml").read_text(encoding="utf-8")
+    kept = [line for line in lines.splitlines() if not line.startswith("buckling_load")]
+    return parse_rig("\n".join(kept))
+
+
+def test_where_nothing_is_said_a_muscle_is_slack() -> None:
+    assert without_key("antagonistic_joint").tables("muscle")["flexor"]["buckling_load"] == 0.0
+    assert pamrs.library.entry("pam_a_1in").muscle.parameters["buckling_load"] == 0.0
+
+
+def against_a_vented_extensor(rig: pamrs.Rig) -> pamrs.Simulation:
+    """The flexor keeps its 2 bar."""
+    command = {"flexor": np.full(1000, 5.0), "extensor": np.zeros(1000)}
+    return pamrs.simulate(rig, sample_time=0.01, valve_command=command)
+
+
+def test_a_vented_antagonist_does_not_push() -> None:
+    slack = against_a_vented_extensor(without_key("antagonistic_joint"))
+    assert np.degrees(slack["joint_angle.elbow"][-1]) == pytest.approx(51.7, abs=0.3)
+    for side in ("flexor", "extensor"):
+        assert float(slack[f"muscle_force.{side}"].min()) >= 0.0
+    assert not [event for event in slack.events if event.kind == "muscle_pushes"]
+    assert "pushes" not in slack.summary()
+
+
+def test_what_pushes_is_said() -> None:
+    held = {f"muscle.{side}.buckling_load": STRUT for side in ("flexor", "extensor")}
+    rig = pamrs.rigs.antagonistic_joint().with_parameters(held)
+    struts = against_a_vented_extensor(rig)
+    assert np.degrees(struts["joint_angle.elbow"][-1]) == pytest.approx(79.7, abs=0.3)
+    pushes = [event for event in struts.events if event.kind == "muscle_pushes"]
+    assert {event.block for event in pushes} == {"muscle.flexor", "muscle.extensor"}
+    assert "muscle.extensor: pushes, each muscle with up to 591.5 N" in struts.summary()
+    assert len(rig.cautions) == 2
+    assert all("buckling_load = 1e+09 N" in caution for caution in rig.cautions)
+    assert "push: muscle.flexor, each by up to 1e+09 N" in rig.wiring
+    bows = pamrs.rigs.recruitment()
+    assert not bows.cautions  # possible, and meant
+    assert "push: muscle.pair_1, each by up to 3.5 N" in bows.wiring
+    assert not [line for line in pamrs.rigs.shoulder().wiring if line.startswith("push")]
+
+
+@pytest.mark.parametrize("lane", ["elbow", "hanging_mass", "shoulder"])
+def test_lanes_know_slack_muscles(lane: str) -> None:
+    """The same run by the exact equations: what effects act on does not run in lanes."""
+    rig = pamrs.rigs.named(lane)
+    alone = rig.with_effect("pressure_lag", {"time_constant": 0.0})
+    command = np.r_[np.full(60, 8.0), np.full(200, 0.0), np.full(60, 9.0)]
+    ways = [pamrs.simulate(one, sample_time=0.01, valve_command=command) for one in (rig, alone)]
+    for channel in ("joint_angle", "length", "muscle_work", "muscle_pressure"):
+        if channel in ways[0]:
+            fast, exact = (run[channel] for run in ways)
+            np.testing.assert_allclose(fast, exact, atol=1e-7 * float(np.abs(exact).max()))
+
+
+@pytest.mark.parametrize("load", [-1e-3, -3.5, 2e9, float("nan")])
 def test_a_load_that_cannot_be_is_named(load: float) -> None:
     with pytest.raises(pamrs.PamrsError, match="buckling_load"):
         pamrs.rigs.recruitment().with_parameters({"muscle.pair_1.buckling_load": load})

@@ -45,8 +45,8 @@ def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
     recording = pamrs.load_recording(write(tmp_path / "run.csv", run, *names))
     again = replay(rig, recording)
     np.testing.assert_allclose(
-        again["joint_angle.wrist"], run["joint_angle.wrist"], atol=1e-4
-    )  # rests on its stop at the start
+        again["joint_angle.wrist"], run["joint_angle.wrist"], atol=2e-3
+    )  # slack at the start: when it becomes taut lies between samples of the pressure
     found = differences(again, recording)
     assert set(found) == {n for n in names if not n.startswith("valve_command")}
     assert found["joint_angle.elbow"] < 1e-4

@@ -10,9 +10,8 @@ from typing import Any
 from ..pair.places import SIDES
 from ..pair.plant import PairPlant, pair_parameters
 from ..plant import Parameters, Plant
-from ..rigfile import default_rig, read_rig, to_parameters
+from ..rigfile import HOME, read_rig, to_parameters
 
-HOME = Path(__file__).resolve().parents[1] / "rigs"
 PAIR = "antagonistic_pair"
 ARM = ("arm.inertia", "arm.first_moment", "arm.payload", "arm.viscous")
 GAS = ("supply.volume", "valve.discharge_area_max", "chamber.dead_volume")
@@ -38,7 +37,7 @@ class RigKind:
     @property
     def path(self) -> Path:
         """Its nominal rig file."""
-        return default_rig() if self.name == "shoulder" else HOME / f"{self.name}.toml"
+        return HOME / f"{self.name}.toml"
 
 
 _AIR = ("supply", "valve", "line", "chamber")

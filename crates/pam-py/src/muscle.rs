@@ -185,6 +185,15 @@ impl Muscle {
         })
     }
 
+    /// Forces [N] that one muscle has in a rig, of those that it has where it is held straight.
+    fn buckled<'py>(
+        &self,
+        py: Python<'py>,
+        force: PyReadonlyArray1<'py, f64>,
+    ) -> Bound<'py, PyArray1<f64>> {
+        array(py, values(&force).iter().map(|f| self.inner.buckled(*f)).collect())
+    }
+
     /// Force [N] of one muscle from the compiled table; otherwise as `force`.
     #[pyo3(signature = (pressure, contraction, direction=None))]
     fn force_table<'py>(

@@ -110,7 +110,8 @@ class CoContraction(Share):
         ``K`` [N m/rad], or a function of the time [s] that gives it. None: the least pressures that
         give the torque.
     least_pressure : float
-        Gauge pressure below which no muscle is let [Pa], so that none goes slack.
+        Gauge pressure below which no muscle is let [Pa]. Muscles that slacken are let no lower
+        than the pressure at which they begin to pull.
 
     Raises
     ------
@@ -143,26 +144,28 @@ class CoContraction(Share):
         wanted = self._stiffness
         if callable(wanted):
             wanted = stiffness_of(wanted(demand.time))
-        low, high, angle = self.least_pressure, self.pressure_limit, demand.angle
+        high, angle = self.pressure_limit, demand.angle
+        up, down = self._least(self._up, angle), self._least(self._down, angle)
         (a, a0, ka, ka0), (b, b0, kb, kb0) = (
             self._side(self._up, angle),
             self._side(self._down, angle),
         )
         # tau = a p + b q + a0 + b0 with b < 0: a line of pairs, of which the limits cut a piece
         left = demand.torque - a0 - b0
-        first = _larger(low, (a * low - left) / -b)
+        first = _larger(down, (a * up - left) / -b)
         last = -_larger(-high, (left - a * high) / -b)
         q = first
         if wanted is not None:
             gain = kb - ka * b / a
             rest = ka * left / a + ka0 + kb0
             q = _towards(wanted - rest, gain, first, last)
-        q = clip(q, low, high)
-        p = clip((left - b * q) / a, low, high)
+        q = clip(q, down, high)
+        p = clip((left - b * q) / a, up, high)
         return [p if group.sign > 0 else q for group in self.groups]
 
     def stiffness(self, pressures: Sequence[Value], angle: Value) -> Value:
-        """Stiffness of the joint by its muscles [N m/rad] at pressures [Pa] that are held.
+        """Stiffness of the joint by its muscles [N m/rad] at pressures [Pa] that are held and make
+        them taut.
 
         Parameters
         ----------
@@ -180,6 +183,13 @@ class CoContraction(Share):
             k1, k2 = group.stiffness(angle)
             total = total + k1 * pressure + k2
         return total
+
+    def _least(self, which: list[int], angle: Value) -> Value:
+        """Least pressure of the groups of a side [Pa]: that at which all of them are taut."""
+        low: Value = self.least_pressure
+        for k in which:
+            low = _larger(low, self.groups[k].taut(angle, self.least_pressure, self.pressure_limit))
+        return low
 
     def _side(self, which: list[int], angle: Value) -> tuple[Value, Value, Value, Value]:
         """``c1, c2, k1, k2`` of the groups of a side."""

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure, named
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
-from pamrs.control._values import positive_gain
+from pamrs.control._values import clip, positive_gain, where
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -44,6 +44,7 @@ Array = NDArray[np.float64]
 _NODES: Final = (
     1025  # of a table over the joint's range; makes its error some 1e-9 of the largest value
 )
+_STRUT: Final = 1e9  # buckling load of a muscle that pushes, whatever it is pushed with [N]
 _LEAST_SLOPE: Final = 0.01  # of the largest C1: below it a pressure says nothing about the torque
 _INCH: Final = 0.0254
 
@@ -183,6 +184,9 @@ class GroupTorque:
         1 where pressure raises the angle, -1 where it lowers it.
     angle_range : tuple of (float, float)
         Of the joint [rad].
+    slackens : bool
+        Whether its muscles go slack or bow out where the line is beyond zero: none of them is a
+        strut.
     beyond_sine : tuple of str
         Keys of the rig, with their values, for which the torque that holds the joint is not the
         sine of its angle times a number: springs, a tilted base.
@@ -200,6 +204,7 @@ class GroupTorque:
         table = _parts(rig, muscles[0])[2]
         low, high = self.angle_range = float(table["min_angle"]), float(table["max_angle"])
         joint = rig.ports("muscle")[muscles[0]]["joint"].partition(".")[2]
+        self.slackens = all(rig.tables("muscle")[m]["buckling_load"] < _STRUT for m in muscles)
         self.beyond_sine = beyond_sine(rig, joint)
         place = np.linspace(low, high, _NODES)
         between = 0.5 * (place[1:] + place[:-1])
@@ -233,6 +238,16 @@ class GroupTorque:
         if slope.__class__ is float:
             return (slope if slope < -floor else -floor), self.rest(angle)
         return np.minimum(slope, -floor), self.rest(angle)
+
+    def taut(self, angle: Value, least: float, most: float) -> Value:
+        """Least gauge pressure at an angle at which the line holds, within two bounds [Pa]: muscles
+        that slacken do so below it. The lower bound where the upper one does not make them taut.
+        """
+        if not self.slackens:
+            return least
+        slope, rest = self.at(angle)
+        begins = -rest / slope
+        return where(begins < most, clip(begins, least, most), least)
 
     def stiffness(self, angle: Value) -> tuple[Value, Value]:
         """``k1`` [N m/(rad Pa)] and ``k2`` [N m/rad]: ``-dtau/dtheta = k1 P + k2`` while the
@@ -312,17 +327,18 @@ class OpposedTorque:
         return total, 0.0
 
     def limits(self, angle: Value, pressure_limit: float) -> tuple[Value, Value]:
-        """Least and largest difference at an angle [Pa], every pressure from 0 to the limit."""
+        """Least and largest difference at an angle [Pa], every pressure from 0 to the limit, and
+        muscles that slacken at least taut.
+        """
         total: Value = 0.0
         low: Value = 0.0
         high: Value = 0.0
         for group in self.groups:
             c1, c2 = group.at(angle)
             total = total + 0.5 * group.sign * c1
-            most = c1 * pressure_limit
-            low, high = (
-                (low + c2, high + c2 + most) if group.sign > 0 else (low + c2 + most, high + c2)
-            )
+            most = c2 + c1 * pressure_limit
+            least = c2 + c1 * group.taut(angle, 0.0, pressure_limit)
+            low, high = (low + least, high + most) if group.sign > 0 else (low + most, high + least)
         return low / total, high / total
 
 

@@ -373,11 +373,8 @@ class _Balance:
                 else np.full(angle.shape, self.pressure)
             )
             friction = constant + by_pressure * np.maximum(pressure, 0.0)
-            total += (
-                count
-                * (muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction)
-                * arm
-            )
+            force = muscle.force(pressure, joint.shortening(angle) / rest, way) + way * friction
+            total += count * muscle.buckled(force) * arm
         return total
 
     def weight(self, angle: Array) -> Array:

@@ -24,9 +24,9 @@ from pamrs.library.evaluate import free_contraction
 from pamrs.library.published import compare_entry
 from pamrs.reproduce import _recruiting as rec
 from pamrs.reproduce._recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Case, Cycles
+from pamrs.reproduce._rigs import with_struts
 from pamrs.reproduce._score import OTHER, OWN, Apart, scored
 from pamrs.rig import Muscle
-from pamrs.rigs import shoulder
 
 __all__ = [
     "CHOSEN",
@@ -330,7 +330,7 @@ def _silicone() -> list[Comparison]:
 
 
 def _joint() -> list[Comparison]:
-    group, rig = GROUPS["joint"], shoulder()
+    group, rig = GROUPS["joint"], with_struts("shoulder")
     end = math.radians(90.0)
     full = lift(rig.with_parameters({"arm.payload": 95.0}), pressure=13.0 * BAR, to=end)
     weight = rig.parameter("arm.gravity").value

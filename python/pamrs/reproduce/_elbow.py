@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 
 from pamrs.design import lift
 from pamrs.errors import ParameterError
+from pamrs.reproduce._rigs import with_struts
 from pamrs.rig import Joint, Rig
 from pamrs.rigs import named
 from pamrs.simulation import Simulation, simulate
@@ -106,7 +107,7 @@ def arm_rig(
     if area is not None:
         values["valve.discharge_area_max"] = area
     degrees = _BRAID.get()
-    rig = named("elbow")
+    rig = with_struts("elbow")
     if degrees is not None:
         rig = with_muscle(rig, steeper_braid(degrees))
     return _with(rig.with_parameters(values), joint={"kind": LAWS[law]})
@@ -153,7 +154,7 @@ def with_muscle(rig: Rig, muscle: Muscle | None = None, **changes: Any) -> Rig:
     rig : Rig
         With one muscle.
     muscle : Muscle, optional
-        As many of it; the rig's own by default.
+        As many of it, which buckle as the rig's own; these by default.
     **changes
         Entries of ``[muscle]``, SI.
 
@@ -165,7 +166,7 @@ def with_muscle(rig: Rig, muscle: Muscle | None = None, **changes: Any) -> Rig:
     own = (
         model["muscle"]
         if muscle is None
-        else {**muscle.parameters, "count": model["muscle"]["count"]}
+        else muscle.parameters | {key: model["muscle"][key] for key in ("count", "buckling_load")}
     )
     model["muscle"] = {**own, **changes}
     return Rig(rig.name, model)

@@ -32,6 +32,7 @@ from pamrs.control.trajectories import degrees, lift_hold_return
 from pamrs.control.tuning import perturbed
 from pamrs.errors import ParameterError
 from pamrs.reproduce._elbow import HYSTERESIS, POUND, with_muscle
+from pamrs.reproduce._rigs import with_struts
 from pamrs.reproduce._two_branches import two_branches
 from pamrs.rig import Rig
 from pamrs.rigs import named
@@ -186,7 +187,7 @@ def trajectory() -> Trajectory:
 
 def assumed(variant: Variant = VARIANTS["as printed"]) -> Rig:
     """The rig as the controllers know it."""
-    rig = named("elbow")
+    rig = with_struts("elbow")
     if variant.printed:
         rig = with_muscle(rig, two_branches())
     return rig.with_parameters(variant.known)

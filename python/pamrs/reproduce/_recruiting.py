@@ -20,8 +20,9 @@ from pamrs.control import PressureLoop, cascaded_pid, sweep
 from pamrs.control.trajectories import Trajectory, cosine_cycles
 from pamrs.errors import ParameterError
 from pamrs.reproduce._elbow import HYSTERESIS, with_muscle
+from pamrs.reproduce._rigs import with_struts
 from pamrs.rig import Rig
-from pamrs.rigs import named, shoulder
+from pamrs.rigs import named
 
 __all__ = [
     "CYCLE",
@@ -85,7 +86,7 @@ def plant(payload: float, muscles: int) -> Rig:
     -------
     Rig
     """
-    rig = shoulder()
+    rig = with_struts("shoulder")
     share = rig.parameter("chamber.dead_volume").value / rig.parameter("muscle.count").value
     return rig.with_parameters(
         {
@@ -330,12 +331,8 @@ def beside_idle(payload: float, high: float, cycles: int, *, struts: bool = Fals
     Cycles
         With one row, the case of two muscles.
     """
-    rig = named("recruitment").with_parameters({"arm.payload": payload})
-    if struts:
-        model = rig.model
-        for table in model["muscle"].values():
-            table.pop("buckling_load", None)
-        rig = Rig(rig.name, model)
+    rig = with_struts("recruitment") if struts else named("recruitment")
+    rig = rig.with_parameters({"arm.payload": payload})
     vented = np.zeros(1)
     done = sweep(
         [rig],

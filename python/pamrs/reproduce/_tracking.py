@@ -35,8 +35,8 @@ from pamrs.control import (
 from pamrs.control.metrics import combined, steady_error, total_curvature
 from pamrs.control.trajectories import Trajectory, compound, lift_hold_return
 from pamrs.errors import ParameterError
+from pamrs.reproduce._rigs import with_struts
 from pamrs.rig import Rig
-from pamrs.rigs import shoulder
 
 __all__ = [
     "GAINS",
@@ -109,7 +109,7 @@ def plant(payload: float, effect: str = "", parameters: tuple[tuple[str, float],
     """The shoulder with a payload [lb], a source that stays as it is, and perhaps an effect of the
     catalogue.
     """
-    rig = shoulder().with_parameters(
+    rig = with_struts("shoulder").with_parameters(
         {"arm.payload": payload * POUND, "supply.volume": SOURCE_VOLUME}
     )
     return rig.with_effect(effect, dict(parameters)) if effect else rig
@@ -117,7 +117,7 @@ def plant(payload: float, effect: str = "", parameters: tuple[tuple[str, float],
 
 @cache
 def _simplified() -> ArmModel:
-    return ArmModel.from_rig(shoulder(), torque="simplified")
+    return ArmModel.from_rig(with_struts("shoulder"), torque="simplified")
 
 
 def arm_model(
@@ -126,7 +126,11 @@ def arm_model(
     """What the controllers know, (5.1)-(5.4): the right I, b and m g r for the payload [lb] of each
     plant, times a factor.
     """
-    base = _simplified() if torque == "simplified" else ArmModel.from_rig(shoulder(), torque=torque)
+    base = (
+        _simplified()
+        if torque == "simplified"
+        else ArmModel.from_rig(with_struts("shoulder"), torque=torque)
+    )
     exact = [ArmModel.from_rig(plant(payload), torque=base.torque) for payload in payloads]
     known = base.replace(
         inertia=np.array([arm.inertia for arm in exact]),

@@ -1,9 +1,10 @@
-"""What a rig file may say, and hardly means: valves that never act."""
+"""What a rig file may say, and hardly means: valves that never act, muscles that push."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Final
 
 from pamrs.rig.schema import qualified, tables_of
 
@@ -11,6 +12,8 @@ __all__ = ["cautions_of"]
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
+
+_STIFFEST: Final = 5e6  # modulus of the stiffest rubber that bladders are made of [Pa]
 
 
 def cautions_of(model: Mapping[str, Any]) -> list[str]:
@@ -31,6 +34,8 @@ def cautions_of(model: Mapping[str, Any]) -> list[str]:
         label = qualified("valve", name)
         found += _shut(label, valve)
         found += _late(label, valve)
+    for name, muscle in tables_of(model, "muscle").items():
+        found += _strut(qualified("muscle", name), muscle)
     return found
 
 
@@ -49,6 +54,20 @@ def _shut(label: str, valve: Mapping[str, Any]) -> list[str]:
     said = [f"{label}.{key} = {position!r}" for key, position in positions.items()]
     said += [f"{label}.{way}_conductance = 0 m3/(s Pa)" for way in ways]
     return [f"{label} never passes air: {', '.join(said)}"]
+
+
+def _strut(label: str, muscle: Mapping[str, Any]) -> list[str]:
+    """A muscle that pushes more than a rod of rubber as thick as it can bear, held at both ends."""
+    load, length = muscle["buckling_load"], muscle["rest_length"]
+    bent = math.pi / 64.0 * muscle["rest_diameter"] ** 4
+    most = 4.0 * math.pi**2 * _STIFFEST * bent / length**2
+    if load <= most:
+        return []
+    return [
+        f"{label} pushes without air, by up to {label}.buckling_load = {load:.4g} N: a solid rod "
+        f"of rubber as thick and long bows out at {most:.2g} N, a muscle before; 0 N for one that "
+        "goes slack"
+    ]
 
 
 def _late(label: str, valve: Mapping[str, Any]) -> list[str]:

@@ -62,8 +62,9 @@ class Muscle:
         Motion over which the force goes from one branch of the hysteresis to the other in a
         simulation [m].
     buckling_load : float
-        The most that one muscle pushes in a rig, where it bows out [N]; 1e9: it pushes like a
-        strut, without end. The methods here are those of a muscle that is held straight.
+        The most that one muscle pushes in a rig, where it bows out [N]; 0: it goes slack, 1e9: it
+        pushes like a strut, without end. The methods here are those of a muscle that is held
+        straight.
     count : int
         Muscles in parallel in a rig; the methods here are those of one muscle.
     modulus_scale : float
@@ -115,7 +116,7 @@ class Muscle:
         friction_pressure_slope: float = 0.0,
         friction_floor: float = 0.0,
         friction_presliding: float = 1e-3,
-        buckling_load: float = 1e9,
+        buckling_load: float = 0.0,
         count: int = 1,
         modulus_scale: float = 1.0,
         softening: float = 0.0,
@@ -474,6 +475,23 @@ class Muscle:
             limits or a direction outside -1 to 1.
         """
         return self._forces(self._core.force, pressure, contraction, direction)
+
+    def buckled(self, force: ArrayLike) -> Array:
+        """Force of one muscle in a rig [N], where it bows out or goes slack when it is pushed.
+
+        Parameters
+        ----------
+        force : array_like
+            What it would be, were the muscle held straight, as :meth:`force` [N].
+
+        Returns
+        -------
+        ndarray
+            A pull as it is, a push as far as ``buckling_load``, in the shape of ``force``.
+        """
+        straight = np.asarray(force, dtype=np.float64)
+        held = self._core.buckled(np.ascontiguousarray(straight.ravel()))
+        return np.asarray(held.reshape(straight.shape))
 
     def force_table(
         self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None

@@ -101,8 +101,8 @@ def hanging_problem(entries: Iterable[Mapping[str, Any]]) -> str:
 
 
 def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
-    """One line for each way that the air takes and each way that the force takes, to be read by a
-    person.
+    """One line for each way that the air takes, each way that the force takes and each muscle that
+    can push, to be read by a person.
     """
     lines, used = [], set()
     fronts = {qualified("supply", n): e["inlet"] for n, e in ports["supply"].items() if e}
@@ -136,6 +136,11 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
         *(f"air: {' -> '.join(way)}" for way in lines),
         *(f"air: {name}, shut off" for name in stores if name not in used),
         *(f"pull: {' -> '.join(way)}" for way in pulls),
+        *(
+            f"push: {qualified('muscle', name)}, each by up to {table['buckling_load']:.4g} N"
+            for name, table in tables_of(model, "muscle").items()
+            if table["buckling_load"] > 0.0
+        ),
         *([f"arm: {' -> '.join(['base', *chain])}"] if chain else []),
     ]
 

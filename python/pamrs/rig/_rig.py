@@ -159,7 +159,8 @@ class Rig:
     @property
     def cautions(self) -> list[str]:
         """What of the rig is possible, and most likely a mistake, one sentence each: valves that
-        never pass air, delays as long as the period of the pulses. Empty where nothing is.
+        never pass air, delays as long as the period of the pulses, muscles that push more than
+        rubber bears. Empty where nothing is.
         """
         return cautions_of(self._model)
 

@@ -437,10 +437,10 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
         Key(
             "buckling_load",
             "N",
-            1e-2,
+            0.0,
             1e9,
-            1e9,
-            note="the most that one muscle pushes; 1e9 N: like a strut, without end",
+            0.0,
+            note="the most that one muscle pushes; 0: it goes slack, 1e9 N: it pushes without end",
         ),
     ),
     "transmission": (

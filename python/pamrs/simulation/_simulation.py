@@ -42,9 +42,11 @@ class Event(NamedTuple):
         below the ambient pressure, and no longer is there); ``max_pressure_passed`` and
         ``max_pressure_kept`` (it rises above ``limits.max_pressure`` of the rig file, and is below
         it again); ``command_clipped`` and ``command_in_range`` (a valve is asked for more than
-        ``null_voltage`` +- ``half_range`` and stays at that end, and no longer is).
+        ``null_voltage`` +- ``half_range`` and stays at that end, and no longer is);
+        ``muscle_pushes`` and ``push_ends`` (a muscle whose ``buckling_load`` is above zero pushes
+        with a newton or more, or half of that load, and no longer does; at samples).
     block : str
-        Where: ``joint.elbow``, ``load``, ``chamber``, ``valve.flexor``, ``line``.
+        Where: ``joint.elbow``, ``load``, ``chamber``, ``valve.flexor``, ``line``, ``muscle``.
     """
 
     time: float
@@ -192,6 +194,46 @@ class _Clipped(NamedTuple):
         )
 
 
+class _Pushed(NamedTuple):
+    """A muscle that pushes.
+
+    Attributes
+    ----------
+    block : str
+        The muscle, or group of muscles.
+    times : list of float
+        When it begins and ends [s], in turn.
+    most : float
+        The largest push of one muscle [N].
+    load : float
+        What one muscle is said to push at the most [N].
+    """
+
+    block: str
+    times: list[float]
+    most: float
+    load: float
+
+    def events(self) -> list[Event]:
+        """When it begins and ends."""
+        kinds = ("muscle_pushes", "push_ends")
+        return [Event(time, kinds[k % 2], self.block) for k, time in enumerate(self.times)]
+
+    def words(self) -> str:
+        """The same as one line."""
+        end = f"to {self.times[1]:.4g} s" if len(self.times) > 1 else "to the end"
+        return (
+            f"{self.block}: pushes, each muscle with up to {self.most:.4g} N, from "
+            f"{self.times[0]:.4g} s {end}{_again(-(-len(self.times) // 2))}; its buckling_load is "
+            f"{self.load:.4g} N"
+        )
+
+
+def _edges(of: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Rows from which something holds and from which it no longer does, in turn."""
+    return np.flatnonzero(np.diff(of, prepend=False))
+
+
 def _again(count: int) -> str:
     """How often something happened that was told once."""
     return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
@@ -214,10 +256,10 @@ class Simulation(Mapping[str, Array]):
     @cached_property
     def events(self) -> list[Event]:
         """Stops that were reached or left, flows that became choked or no longer are, commands
-        beyond the range of their valve, in the order of time.
+        beyond the range of their valve, muscles that push, in the order of time.
         """
-        clipped = [event for own in self._clipped() for event in own.events()]
-        return sorted([*self._happened, *clipped], key=lambda event: event.time)
+        seen = [event for own in (*self._clipped(), *self._pushed()) for event in own.events()]
+        return sorted([*self._happened, *seen], key=lambda event: event.time)
 
     def _clipped(self) -> list[_Clipped]:
         """Commands that are beyond the range of their valve at some time."""
@@ -228,11 +270,24 @@ class Simulation(Mapping[str, Array]):
             held = command[:-1] if command.size > 1 else command  # the last one is not run
             beyond = np.abs(held - null) > half * (1.0 + _BEYOND_RANGE)
             if beyond.any():
-                edges = np.flatnonzero(np.diff(beyond, prepend=False))
-                times = [float(t) for t in self.time[edges]]
+                times = [float(t) for t in self.time[_edges(beyond)]]
                 worst = float(held[np.argmax(np.abs(held - null))])
                 block = dotted("valve", name)
                 found.append(_Clipped(block, times, worst, (null - half, null + half)))
+        return found
+
+    def _pushed(self) -> list[_Pushed]:
+        """Muscles that push at some time, of those that can."""
+        found = []
+        for name, muscle in self.rig.tables("muscle").items():
+            load, force = muscle["buckling_load"], self.under("muscle_force").get(name)
+            if load == 0.0 or force is None:
+                continue
+            each = force / muscle["count"]
+            pushing = each < -min(_TELLING_PUSH, 0.5 * load)
+            if pushing.any():
+                times = [float(t) for t in self.time[_edges(pushing)]]
+                found.append(_Pushed(dotted("muscle", name), times, -float(each.min()), load))
         return found
 
     @property
@@ -393,7 +448,7 @@ class Simulation(Mapping[str, Array]):
             said.append(
                 f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{_again(len(times))}"
             )
-        said += [own.words() for own in self._clipped()]
+        said += [own.words() for own in (*self._clipped(), *self._pushed())]
         return "\n".join([*said, *self._beyond(), *self._fallen(), str(self.balance)])
 
     def _beyond(self) -> list[str]:
@@ -742,6 +797,7 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 #: Numbers that one run may keep: 2 GB.
 MOST_NUMBERS = 250_000_000
 _TELLING_TORQUE = 1.0  # N m
+_TELLING_PUSH = 1.0  # N, of one muscle
 _TELLING_DEGREES = 1.0
 #: Of a valve's half range: recorded commands that scatter about its end are not beyond it.
 _BEYOND_RANGE = 0.01

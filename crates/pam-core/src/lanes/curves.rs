@@ -7,6 +7,7 @@
 
 use super::num::{side_by_side, Aligned, Num, Registers, MOST_LANES, PAIR, WHOLE};
 use crate::chebyshev::{interpolate, lobatto};
+use crate::muscle::Pushed;
 use crate::plant::Group;
 use pulp::Simd;
 
@@ -55,11 +56,21 @@ impl Piece {
     }
 }
 
+/// What the torque of muscles that pull does to the coordinate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sign {
+    Raises,
+    Lowers,
+}
+
 /// All columns of one group over a range of its coordinate.
 #[derive(Debug, Clone)]
 pub(super) struct Curves {
     pub low: f64,
     pub high: f64,
+    /// Of muscles that go slack the sign of the torque with which they pull: of the other one they
+    /// have none.
+    pub pulls: Option<Sign>,
     first: Piece,
     others: Vec<Piece>,
     cells: Vec<Cell>,
@@ -71,6 +82,10 @@ impl Curves {
     /// Curves over a range [rad, or m of shortening] in which the muscle's table and the joint
     /// hold; none where they are not smooth enough.
     pub fn new(group: &Group, low: f64, high: f64) -> Option<Self> {
+        let pulls = match group.muscle.pushed() {
+            Pushed::Slack => Some(turning(group, low, high)?),
+            _ => None,
+        };
         let mut ends = vec![low];
         ends.extend(kinks(group, low, high));
         ends.push(high);
@@ -87,7 +102,7 @@ impl Curves {
         }
         let mut pieces = pieces.into_iter();
         let (first, others) = (pieces.next()?, pieces.collect());
-        Some(Self { low, high, first, others, cells, none: Aligned([0.0; NODES * COLUMNS]) })
+        Some(Self { low, high, pulls, first, others, cells, none: Aligned([0.0; NODES * COLUMNS]) })
     }
 
     /// The columns at an angle of each lane, worked out in registers of some width; beyond the range
@@ -167,6 +182,21 @@ impl Curves {
         // on a kink, rounding alone would find the cell on its other side
         let cell = (position + WHOLE).or_above(first).or_below(last);
         (cell, position - (cell - WHOLE))
+    }
+}
+
+/// The sign of the torque of muscles that pull, where that is one over a whole range.
+fn turning(group: &Group, low: f64, high: f64) -> Option<Sign> {
+    let arms = (0..=SCAN).map(|k| low + (high - low) * k as f64 / SCAN as f64);
+    let (mut raises, mut lowers) = (false, false);
+    for arm in arms.map(|angle| group.joint.eval(angle).torque_arm) {
+        raises |= arm > 0.0;
+        lowers |= arm < 0.0;
+    }
+    match (raises, lowers) {
+        (true, true) => None,
+        (_, true) => Some(Sign::Lowers),
+        _ => Some(Sign::Raises),
     }
 }
 

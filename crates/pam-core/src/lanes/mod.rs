@@ -30,6 +30,7 @@ pub(crate) use solo::Solo;
 
 use self::blocks::{Orifice, Turns};
 use self::curves::Curves;
+use crate::muscle::Pushed;
 use crate::plant::{BodyUnit, Group, Passes, Rig};
 
 /// How far beyond its stops a coordinate may go in lanes, in ranges of it.
@@ -50,12 +51,13 @@ impl Plan {
     pub(crate) fn new(rig: &Rig) -> Option<Self> {
         let wiring = &rig.wiring;
         let body = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Mass { .. });
-        // the curves hold torques linear in pressure, which know nothing of a muscle that goes slack
+        // the curves hold torques linear in pressure, whose sign tells a slack muscle and whose size
+        // does not tell how far one bows out
         let plain = wiring.ports.effects.is_empty()
             && wiring
                 .groups
                 .iter()
-                .all(|g| !g.direction && !g.muscle.buckles() && !g.muscle.mapped());
+                .all(|g| !g.direction && g.muscle.pushed() != Pushed::Bows && !g.muscle.mapped());
         let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
         let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
         let fed = wiring.inlets_of_regulators().next().is_some();

@@ -2,6 +2,7 @@
 //! without effects.
 
 use super::blocks::{Body, Supply, Tube, Turns};
+use super::curves::Sign;
 use super::num::{side_by_side, Mask, Num, Registers, MOST_LANES};
 use super::rk4::Slopes;
 use super::Plan;
@@ -336,10 +337,25 @@ impl<S: Simd, R: Registers> Plants<'_, S, R> {
             let [pull, elastic, offset, volume, slope, pull_work, elastic_work, offset_work] =
                 curves.eval(wide, self.simd, angle);
             let wall = gauge.times_plus(elastic, offset);
+            let slack = curves.pulls.map(|pulls| {
+                let own = scale.times_plus(wall, gauge * pull);
+                match pulls {
+                    Sign::Raises => own.less(zero),
+                    Sign::Lowers => zero.less(own),
+                }
+            });
+            let before = torque;
             torque = scale.times_plus(wall, gauge.times_plus(pull, torque));
+            if let Some(slack) = &slack {
+                torque = slack.select(before, torque);
+            }
             if shape.sums {
                 let wall = gauge.times_plus(elastic_work, offset_work);
+                let before = work;
                 work = scale.times_plus(wall, gauge * pull_work).times_plus(rate, work);
+                if let Some(slack) = &slack {
+                    work = slack.select(before, work);
+                }
             }
             let (before, moved) = match first {
                 true => (self.fixed_volume[gas], zero),

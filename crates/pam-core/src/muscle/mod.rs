@@ -117,6 +117,30 @@ impl Muscle {
         Ok(self.coefficients(e)?.force(pressure, scale))
     }
 
+    /// What the muscle does when it is pushed.
+    #[must_use]
+    pub fn pushed(&self) -> Pushed {
+        match self.spec.buckling_load {
+            0.0 => Pushed::Slack,
+            load if load < STRUT => Pushed::Bows,
+            _ => Pushed::Holds,
+        }
+    }
+
+    /// The force [N] of a muscle that bows out when it is pushed: a pull as it is, a push up to the
+    /// buckling load, reached with a continuous slope at twice that push; without one it is slack.
+    #[inline]
+    pub fn buckled<S: Scalar>(&self, force: S) -> S {
+        let load = self.spec.buckling_load;
+        if force.re() >= 0.0 || self.pushed() == Pushed::Holds {
+            return force;
+        }
+        if force.re() <= -2.0 * load {
+            return constant(0.0 - load);
+        }
+        force + force * force / (4.0 * load)
+    }
+
     /// Exact force of one muscle [N] in a direction of motion, from -1 (contracting) to +1
     /// (lengthening), with friction.
     ///
@@ -138,6 +162,17 @@ impl Muscle {
             direction,
         ))
     }
+}
+
+/// What a muscle does when it is pushed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Pushed {
+    /// It carries nothing.
+    Slack,
+    /// It bows out, and carries some newtons.
+    Bows,
+    /// It pushes back like a strut, as its force model says.
+    Holds,
 }
 
 /// One muscle compiled for the integrator.
@@ -204,24 +239,16 @@ impl CompiledMuscle {
         }
     }
 
-    /// Whether the muscle buckles when it is pushed.
+    /// What the muscle does when it is pushed.
     #[must_use]
-    pub fn buckles(&self) -> bool {
-        self.exact.spec.buckling_load < STRUT
+    pub fn pushed(&self) -> Pushed {
+        self.exact.pushed()
     }
 
-    /// The force [N] of a muscle that bows out when it is pushed: a pull as it is, a push up to the
-    /// buckling load, reached with a continuous slope at twice that push.
+    /// As [`Muscle::buckled`].
     #[inline]
     pub fn buckled<S: Scalar>(&self, force: S) -> S {
-        let load = self.exact.spec.buckling_load;
-        if force.re() >= 0.0 || !self.buckles() {
-            return force;
-        }
-        if force.re() <= -2.0 * load {
-            return constant(-load);
-        }
-        force + force * force / (4.0 * load)
+        self.exact.buckled(force)
     }
 
     /// The presliding distance [m] over which the direction changes.
@@ -346,7 +373,7 @@ pub(crate) mod tests {
             ("muscle.c10", |s| s.c10 = 1e5),
             ("muscle.friction_coefficient", |s| s.friction_coefficient = f64::NAN),
             ("muscle.neck_floor", |s| s.neck_floor = 1.5),
-            ("muscle.buckling_load", |s| s.buckling_load = 0.0),
+            ("muscle.buckling_load", |s| s.buckling_load = -1e-3),
         ];
         for (name, change) in changes {
             let mut spec = shoulder();
@@ -381,13 +408,17 @@ pub(crate) mod tests {
         let load = 3.5;
         let spec = MuscleSpec { buckling_load: load, ..shoulder() };
         let muscle = CompiledMuscle::new(Muscle::new(&spec).unwrap()).unwrap();
-        let strut = CompiledMuscle::new(Muscle::new(&shoulder()).unwrap()).unwrap();
-        assert!(muscle.buckles() && !strut.buckles());
+        let strut = MuscleSpec { buckling_load: STRUT, ..shoulder() };
+        let strut = CompiledMuscle::new(Muscle::new(&strut).unwrap()).unwrap();
+        let slack = CompiledMuscle::new(Muscle::new(&shoulder()).unwrap()).unwrap();
+        let kinds = [slack.pushed(), muscle.pushed(), strut.pushed()];
+        assert_eq!(kinds, [Pushed::Slack, Pushed::Bows, Pushed::Holds]);
         let mut before = f64::NEG_INFINITY;
         for k in 0..=4000 {
             let force = -10.0 + f64::from(k) * 0.005;
             let (held, straight) = (muscle.buckled(force), strut.buckled(force));
             assert_eq!(straight, force);
+            assert_eq!(slack.buckled(force), force.max(0.0));
             assert!(held >= before && held >= -load && held >= force, "{force} N");
             before = held;
             if force >= 0.0 {

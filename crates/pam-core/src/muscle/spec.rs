@@ -17,7 +17,8 @@ pub const SOFTENING: (f64, f64, &str) = (-0.1, 0.1, "1/K");
 pub const TEMPERATURE: (f64, f64, &str) = (150.0, 500.0, "K");
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
-/// Buckling load of a muscle that pushes like a strut, whatever it is pushed with [N].
+/// Buckling load of a muscle that pushes like a strut, whatever it is pushed with [N]; by default a
+/// muscle pushes nothing.
 pub const STRUT: f64 = 1e9;
 
 /// Share of its moduli at the reference temperature that a muscle has at a temperature [1].
@@ -121,8 +122,9 @@ pub struct MuscleSpec {
     /// Motion over which the force goes from one branch of the hysteresis to the other [m].
     #[serde(default = "default_presliding")]
     pub friction_presliding: f64,
-    /// Compression at which one muscle in a rig buckles [N]; from [`STRUT`] on it never does.
-    #[serde(default = "default_buckling_load")]
+    /// Compression at which one muscle in a rig buckles [N]: with 0 it goes slack, from [`STRUT`] on
+    /// it never does.
+    #[serde(default)]
     pub buckling_load: f64,
     /// Axis ratio of the elliptic ends at rest [1].
     #[serde(default = "default_k0")]
@@ -150,9 +152,6 @@ fn default_scale() -> f64 {
 }
 fn default_presliding() -> f64 {
     1e-3
-}
-fn default_buckling_load() -> f64 {
-    STRUT
 }
 fn default_k0() -> f64 {
     1.64
@@ -196,7 +195,7 @@ impl MuscleSpec {
             friction_pressure_slope: 0.0,
             friction_floor: 0.0,
             friction_presliding: default_presliding(),
-            buckling_load: default_buckling_load(),
+            buckling_load: 0.0,
             k0: default_k0(),
             contraction_slope: default_contraction_slope(),
             extension_slope: default_extension_slope(),
@@ -276,7 +275,7 @@ impl MuscleSpec {
             friction_pressure_slope: 0.0,
             friction_floor: 0.0,
             friction_presliding: default_presliding(),
-            buckling_load: default_buckling_load(),
+            buckling_load: 0.0,
             ..self.clone()
         }
     }
@@ -331,7 +330,7 @@ impl MuscleSpec {
         )?;
         check_range("muscle.friction_floor", self.friction_floor, 0.0, 1.0, "(1)")?;
         check_range("muscle.friction_presliding", self.friction_presliding, 1e-7, 1.0, "m")?;
-        check_range("muscle.buckling_load", self.buckling_load, 1e-2, STRUT, "N")?;
+        check_range("muscle.buckling_load", self.buckling_load, 0.0, STRUT, "N")?;
         check_range("muscle.k0", self.k0, 0.3, 10.0, "(1)")?;
         check_range("muscle.contraction_slope", self.contraction_slope, -20.0, 20.0, "(1)")?;
         check_range("muscle.extension_slope", self.extension_slope, -20.0, 20.0, "(1)")?;
