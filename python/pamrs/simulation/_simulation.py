@@ -258,7 +258,7 @@ class Simulation(Mapping[str, Array]):
         """Stops that were reached or left, flows that became choked or no longer are, commands
         beyond the range of their valve, muscles that push, in the order of time.
         """
-        seen = [event for own in (*self._clipped(), *self._pushed()) for event in own.events()]
+        seen = [event for own in self._told() for event in own.events()]
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
     def _clipped(self) -> list[_Clipped]:
@@ -275,6 +275,10 @@ class Simulation(Mapping[str, Array]):
                 block = dotted("valve", name)
                 found.append(_Clipped(block, times, worst, (null - half, null + half)))
         return found
+
+    def _told(self) -> list[_Clipped | _Pushed]:
+        """What the recorded channels show to have happened."""
+        return [*self._clipped(), *self._pushed()]
 
     def _pushed(self) -> list[_Pushed]:
         """Muscles that push at some time, of those that can."""
@@ -448,7 +452,7 @@ class Simulation(Mapping[str, Array]):
             said.append(
                 f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{_again(len(times))}"
             )
-        said += [own.words() for own in (*self._clipped(), *self._pushed())]
+        said += [own.words() for own in self._told()]
         return "\n".join([*said, *self._beyond(), *self._fallen(), str(self.balance)])
 
     def _beyond(self) -> list[str]:

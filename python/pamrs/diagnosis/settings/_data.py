@@ -332,30 +332,136 @@ class PrepareSettings(SettingsGroup):
 class OverlapSettings(SettingsGroup):
     """When two recordings hold the same samples, so that one proves nothing of the other."""
 
-    noise_share: float = setting(
+    least_peak: float = setting(
+        6.5,
+        unit="1",
+        above=0.0,
+        reason="correlation of two recordings' noise at one lag, in standard deviations of chance, "
+        "from which it is the same: repetitions reach 5.3 over all lags, a copy under five times "
+        "its noise 9.2",
+        origin="docs/decisions/0111",
+    )
+    least_correlation: float = setting(
+        0.2,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="that correlation itself where windows are not told apart: corners of a command a "
+        "quarter of a second apart leave 0.15 in signals of a noise of 20 Pa, a copy under three "
+        "times its noise 0.3",
+        origin="docs/decisions/0111",
+    )
+    peak_ratio: float = setting(
+        1.5,
+        unit="1",
+        least=1.0,
+        reason="that correlation over the largest at other lags: what repeats with a command has "
+        "its like a period away, noise has none",
+        origin="docs/decisions/0111",
+    )
+    follow_share: float = setting(
         0.5,
         unit="1",
         above=0.0,
         most=1.0,
-        reason="error of one recording's samples told by the other's, over that told by their own "
-        "neighbours, below which their noise is the same: 0 for a copy, about 1 for a repetition",
-        origin="docs/decisions/0039",
+        reason="correlation of a window's noise with what the other recording tells of it from "
+        "which the window is shared: 1 for a copy, 0.1 by chance",
+        origin="judgement",
     )
-    usual_share: float = setting(
-        0.9,
+    clear_share: float = setting(
+        0.75,
         unit="1",
         above=0.0,
         most=1.0,
-        reason="share of a window's samples that are compared; steps of the signal are left out",
+        reason="the same of most windows that are shared, below which noise of its own covers the "
+        "copy and windows are not told apart: it is shared wherever the two meet",
         origin="judgement",
+    )
+    chance_share: float = setting(
+        4.5,
+        unit="1",
+        above=0.0,
+        reason="the same in standard deviations of chance, of windows with few samples",
+        origin="judgement: some 1e-5 for a window",
+    )
+    coarse_step: float = setting(
+        2.2,
+        unit="1",
+        above=0.0,
+        reason="step of a converter over the noise, rounding included, from which its steps lie in "
+        "the same samples of a repetition: two and a half times the noise before it",
+        origin="docs/decisions/0111",
+    )
+    step_noises: float = setting(
+        3.5,
+        unit="1",
+        above=1.0,
+        reason="noise levels beyond which a sample is a step of the signal, which repeats",
+        origin="judgement: one sample in two thousand by chance",
+    )
+    least_flips: float = setting(
+        12.0,
+        unit="count",
+        above=0.0,
+        reason="flips of a converter, each between two others that go back within four samples, "
+        "from which two recordings are compared by them",
+        origin="judgement: none of twelve in other samples has a chance of 1e-5",
+    )
+    flip_share: float = setting(
+        0.35,
+        unit="1",
+        above=0.0,
+        reason="samples in which two recordings are on different steps, over their flips, below "
+        "which they are the same: 0 for a copy, 1 or more for a repetition",
+        origin="docs/decisions/0111",
+    )
+    clock: float = setting(
+        0.05,
+        unit="1",
+        above=0.0,
+        most=0.4,
+        reason="share by which the clock of a copy may go faster or slower",
+        origin="judgement",
+    )
+    rate_blocks: int = setting(
+        3, unit="count", least=2, reason="blocks that say how it goes", origin="judgement"
+    )
+    most_searched: int = setting(
+        16384,
+        unit="count",
+        least=1024,
+        reason="samples of a recording in which those blocks lie, from its beginning",
+        origin="judgement: seconds for a recording of a million samples",
+    )
+    phases: int = setting(
+        12,
+        unit="count",
+        least=1,
+        reason="offsets between the samples of two rates that are tried",
+        origin="judgement",
+    )
+    between_error: float = setting(
+        0.02,
+        unit="1",
+        above=0.0,
+        reason="how well the time between the samples of two recordings is known, in sample "
+        "times, for odd and even samples of one to be told",
+        origin="judgement",
+    )
+    between_left: float = setting(
+        1.6,
+        unit="1",
+        above=0.0,
+        reason="what is left between two such recordings in a window, over what their noise leaves",
+        origin="judgement: chance of some 1e-3 with ten windows",
     )
     least_alive: float = setting(
         0.2,
         unit="1",
         least=0.0,
         most=1.0,
-        reason="share of a window's samples that differ from the one before: at rest on one step "
-        "of a converter two recordings are equal by chance",
+        reason="share of a window's samples that have to say something: at rest on one step of a "
+        "converter two recordings are equal by chance",
         origin="judgement",
     )
     window_samples: int = setting(
@@ -413,33 +519,11 @@ class OverlapSettings(SettingsGroup):
         reason="neighbours on either side by which a sample is told without the other recording",
         origin="judgement",
     )
-    most_blocks: int = setting(
-        200,
-        unit="count",
-        least=4,
-        reason="blocks of a long recording that are compared, spread over it",
-        origin="judgement: seconds for a recording of a million samples",
-    )
     block_samples: int = setting(
         256,
         unit="count",
         least=64,
-        reason="samples for which one linear combination tells a resampled recording",
-        origin="judgement",
-    )
-    reach: float = setting(
-        10.0,
-        unit="1",
-        above=0.0,
-        reason="samples on either side from which a resampled one is told, for each sample of the "
-        "slower recording",
-        origin="the usual length of filters for resampling",
-    )
-    most_reach: int = setting(
-        40,
-        unit="count",
-        least=2,
-        reason="the same at the most: the combination has far fewer terms than a block has samples",
+        reason="samples of a block that is looked for in a recording whose clock goes otherwise",
         origin="judgement",
     )
 

@@ -1,0 +1,474 @@
+"""What of two recordings is the same although no command makes it so: their noise.
+
+A channel's deviations are what its own neighbours do not tell of a sample: of a smooth signal its
+noise, whatever the signal is. Those of a repetition are independent of one another. Those of a copy
+go together at one alignment, however it was filtered, thinned, shifted, reversed or covered by more
+noise. Where the steps of a converter are far wider than the noise, its flips stand in their place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import uniform_filter1d
+
+from pamrs.channels import channel_of
+from pamrs.diagnosis.settings import OverlapSettings
+from pamrs.recordings import Recording
+
+__all__ = ["Alignment", "Told", "is_set", "told"]
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_SET: Final = ("valve_command", "supply_command", "reference")
+_TAPS: Final = 8  # deviations on either side by which one of the other recording is told
+_SOON: Final = 4  # samples within which a flip of a converter goes back
+_ROWS: Final = 20_000  # rows from which a linear combination of a few columns is found
+_TINY: Final = 1e-300
+
+
+def is_set(name: str) -> bool:
+    """Whether a channel is set and not measured: it repeats exactly."""
+    return channel_of(name) in _SET
+
+
+@dataclass(frozen=True)
+class Alignment:
+    """Where the samples of a recording lie in another one.
+
+    Attributes
+    ----------
+    rate, lag : float
+        The sample at a time t [s] is at ``rate t + lag`` [s] of the other one [1, s].
+    mean : bool
+        Whether it is a mean of samples there.
+    """
+
+    rate: float
+    lag: float
+    mean: bool = False
+
+    def of(self, time: Array) -> Array:
+        """Times in the other recording [s]."""
+        return self.rate * time + self.lag
+
+
+class Told(NamedTuple):
+    """At an alignment: rows of the slower recording that lie in the other one; rows in which some
+    channel's deviations are those of the other one, and in which those of all channels that say
+    anything are others.
+    """
+
+    way: Alignment
+    inside: Mask
+    same: Mask
+    other: Mask
+
+
+class _Channel(NamedTuple):
+    """A channel: its values, where they are known, their deviations by their standard deviation
+    (zero where nothing is known), and the step of the converter where the noise is far smaller.
+    """
+
+    values: Array
+    known: Mask
+    deviations: Array
+    step: float
+
+    def at(self, rows: NDArray[np.intp]) -> _Channel:
+        """The same at some rows."""
+        return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
+
+
+def told(
+    slow: Recording, fast: Recording, names: list[str], settings: OverlapSettings
+) -> Iterator[Told]:
+    """Every alignment at which deviations of some channel are the same.
+
+    Parameters
+    ----------
+    slow, fast : Recording
+        By sample time.
+    names : list of str
+        Channels that both have measured.
+    settings : OverlapSettings
+
+    Yields
+    ------
+    Told
+    """
+    own, there = (
+        {name: _channel(one.channels[name], one.mask[name], settings) for name in names}
+        for one in (slow, fast)
+    )
+    ratio = slow.sample_time / fast.sample_time
+    some = False
+    for rate, start in _clocks(slow, fast, own, there, settings):
+        if some and rate not in (1.0, -1.0):
+            return
+        phases = min(settings.phases, max(1, round(abs(rate) * ratio)))
+        for mean in (False, True) if abs(rate) * ratio > 1.5 else (False,):
+            for phase in range(phases):
+                way = Alignment(rate, start + phase * fast.sample_time, mean)
+                for one in _at(slow, fast, (own, there), way, settings):
+                    some = True
+                    yield one
+    if not some:
+        yield from _between(slow, fast, own, there, settings)
+
+
+# ------------------------------------------------------------------ channels
+
+
+def _channel(values: Array, known: Mask, settings: OverlapSettings) -> _Channel:
+    """A channel and what its neighbours do not tell of each sample."""
+    index, beside = np.arange(values.size), settings.beside_samples
+    nothing = np.zeros(values.size)
+    if known.sum() < 4 * beside or not np.ptp(values[known]) > 0.0:
+        return _Channel(nothing, known, nothing, 0.0)
+    filled = np.interp(index, index[known], values[known])
+    centred, own = filled - filled.mean(), np.r_[-beside:0, 1 : beside + 1]
+    inner = known & (index >= beside) & (index < values.size - beside)
+    flat = np.diff(centred) == 0.0
+    moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
+    counted = moves if moves.sum() > 4 * beside else inner  # a rest says nothing of the noise
+    use, left, weights = counted, centred, np.zeros(own.size)
+    for _ in range(4):  # steps of the signal do not say how noise is told
+        if use.sum() < 2 * own.size:
+            break
+        weights, follows = _followed(centred, own, centred, use)
+        left = centred - follows
+        size = 1.25 * float(np.mean(np.abs(left[use])))
+        use = counted & (np.abs(left) <= settings.step_noises * size)
+    size = float(np.sqrt(np.mean(left[use] ** 2))) if use.any() else 0.0
+    step = _step(filled[known])
+    noise = size / float(np.sqrt(1.0 + weights @ weights))
+    coarse = step if step > settings.coarse_step * noise else 0.0
+    if not size > 1e-12 * float(np.abs(centred).max()):
+        return _Channel(filled, known, nothing, coarse)
+    # a step of the signal is left in all samples beside it
+    steps = uniform_filter1d((counted & ~use).astype(float), 4 * beside + 1) > 1e-6
+    return _Channel(filled, known, np.where(inner & ~steps, left / size, 0.0), coarse)
+
+
+def _followed(
+    source: Array, offsets: NDArray[np.intp], wanted: Array, use: Mask
+) -> tuple[Array, Array]:
+    """What samples of a source at some offsets tell of each sample, by the linear combination that
+    is nearest in some rows, and that combination.
+    """
+    rows = np.flatnonzero(use)
+    rows = rows[:: max(1, rows.size // _ROWS)]
+    near = source[(rows[:, None] + offsets) % source.size]
+    weights = np.linalg.lstsq(near, wanted[rows], rcond=None)[0]
+    reach = int(np.abs(offsets).max())
+    kernel = np.zeros(2 * reach + 1)
+    kernel[reach - offsets] = weights
+    return weights, np.convolve(source, kernel, "full")[reach : reach + source.size]
+
+
+def _step(values: Array) -> float:
+    """The step of the converter that values lie on; 0 where they lie on none."""
+    levels = np.unique(values)
+    if levels.size < 2:
+        return 0.0
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > 1e-9 * (levels[-1] - levels[0])]
+    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
+    off = (levels - levels[0]) / step
+    return step if np.mean(np.abs(off - np.round(off)) < 0.02) > 0.99 else 0.0
+
+
+def _moved(
+    fast: Recording, name: str, one: _Channel, at: Array, width: float, settings: OverlapSettings
+) -> _Channel:
+    """A channel at times [s], which may be its own, from either end."""
+    for way in (1, -1):
+        if np.array_equal(at, fast.time[::way]):
+            return one.at(np.arange(len(fast))[::way])
+    return _seen(fast, name, at, width, settings)._replace(step=one.step)
+
+
+def _seen(
+    fast: Recording, name: str, at: Array, width: float, settings: OverlapSettings
+) -> _Channel:
+    """A channel at times [s]; means over a width [s] above its sample time. What lies between two
+    samples or is a mean is on no step of a converter, and has its pattern all the same.
+    """
+    index, mask, dt = np.arange(len(fast)), fast.mask[name], fast.sample_time
+    if not mask.any():
+        return _channel(np.zeros(at.size), np.zeros(at.size, dtype=bool), settings)
+    values = np.interp(index, index[mask], fast.channels[name][mask])
+    inside = (at > -0.5 * dt) & (at < fast.duration + 0.5 * dt)
+    known = inside & (np.interp(at, fast.time, mask.astype(float)) > 0.99)
+    if width <= 1.5 * dt:
+        return _channel(np.interp(at, fast.time, values), known, settings)
+    edges = dt * (np.arange(values.size + 1) - 0.5)
+    total = np.concatenate([[0.0], np.cumsum(values) * dt])
+    high, low = (np.interp(at + half, edges, total) for half in (0.5 * width, -0.5 * width))
+    return _channel((high - low) / width, known, settings)
+
+
+# ------------------------------------------------------------------ clocks and lags
+
+
+def _clocks(
+    slow: Recording,
+    fast: Recording,
+    own: dict[str, _Channel],
+    there: dict[str, _Channel],
+    settings: OverlapSettings,
+) -> Iterator[tuple[float, float]]:
+    """How fast the clock of the slower recording may go in the other one, and from when [1, s]: as
+    both say; backwards; sample by sample; as blocks of it say that are found there.
+    """
+    yield 1.0, 0.0
+    yield -1.0, fast.duration
+    ratio = fast.sample_time / slow.sample_time
+    if 1.0 - settings.clock < ratio < 1.0:
+        yield ratio, 0.0
+    found = _rate(slow, fast, own, there, settings)
+    if found is not None:
+        yield found, 0.0
+
+
+def _rate(
+    slow: Recording,
+    fast: Recording,
+    own: dict[str, _Channel],
+    there: dict[str, _Channel],
+    settings: OverlapSettings,
+) -> float | None:
+    """The rate at which the deviations of blocks are found in the other recording; None where they
+    are not.
+    """
+    size, most = settings.block_samples, settings.clock
+    ratio = fast.sample_time / slow.sample_time
+    if len(slow) < 2 * size or ratio < 0.5:
+        return None
+    seen = min(len(slow), settings.most_searched)
+    starts = np.linspace(0, seen - size, settings.rate_blocks).astype(int)
+    step = 0.5 / size
+    rates = 1.0 + step * np.arange(2, int(most / step) + 1)
+    best, found = settings.least_peak, None
+    for name, channel in own.items():
+        other = there[name].deviations[: 2 * settings.most_searched]
+        length = 1 << int(np.ceil(np.log2(other.size + 2 * size)))
+        spectrum = np.fft.rfft(other, length)
+        for rate in (*rates, *(2.0 - rates)):
+            rows = np.arange(0.0, size - 1.0, ratio / rate)
+            peaks, places = [], []
+            for start in starts:
+                part = channel.deviations[start : start + size]
+                block = np.interp(rows, np.arange(size), part)
+                cross = np.fft.irfft(spectrum * np.conj(np.fft.rfft(block, length)), length)
+                place = int(np.argmax(np.abs(cross)))
+                peaks.append(abs(float(cross[place])) / (float(np.linalg.norm(block)) + _TINY))
+                places.append(place if place < other.size else place - length)
+            line = np.polyfit(starts * slow.sample_time, places, 1)
+            off = np.abs(np.polyval(line, starts * slow.sample_time) - places)
+            if min(peaks) > best and off.max() < 4.0:
+                best, found = min(peaks), float(line[0]) * fast.sample_time
+    return found
+
+
+def _at(
+    slow: Recording,
+    fast: Recording,
+    channels: tuple[dict[str, _Channel], dict[str, _Channel]],
+    way: Alignment,
+    settings: OverlapSettings,
+) -> Iterator[Told]:
+    """Alignments of one rate at which some channel's deviations are those of the other one."""
+    own, there = channels
+    step = way.rate * slow.sample_time
+    count = int(fast.duration / abs(step) + 1.5)
+    at: Array = way.lag + step * np.arange(count, dtype=np.float64)
+    width = abs(step) if way.mean else 0.0
+    other = {name: _moved(fast, name, one, at, width, settings) for name, one in there.items()}
+    between = abs(step) / fast.sample_time
+    whole = abs(between - round(between)) < 1e-6  # what lies between samples is on no step
+    lags = {name: _lags(channel, other[name], settings) for name, channel in own.items()}
+    for lag in dict.fromkeys(lag for found in lags.values() for lag in found):
+        rows = np.arange(max(0, -lag), min(len(slow), count - lag))
+        pairs = {n: (one.at(rows), other[n].at(rows + lag)) for n, one in own.items()}
+        copied = {n: lags[n].get(lag, 0.0) for n in pairs}
+        flips = {n for n, pair in pairs.items() if whole and _same_flips(*pair, settings)}
+        if not (flips or any(copied.values())):
+            continue
+        inside, same, others = np.zeros((3, len(slow)), dtype=bool)
+        inside[rows] = True
+        for name, (a, b) in pairs.items():
+            alike, unlike, clear = _by_window(a, b, settings)
+            if copied[name] and clear and alike.sum() >= settings.least_samples:
+                same[rows] |= alike
+            elif copied[name] > settings.least_correlation or name in flips:
+                same[rows] |= a.known & b.known
+            others[rows] |= unlike
+        if same.sum() >= settings.least_samples:
+            here = Alignment(way.rate, way.lag + lag * step, way.mean)
+            yield Told(here, inside, same, others & ~same)
+
+
+def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, float]:
+    """Rows by which one channel may run behind in the other one, and the correlation of their
+    deviations where these go together there and nowhere else, 0 elsewhere: a command that is
+    repeated has its periods too.
+    """
+    found: dict[int, float] = {}
+    pairs = [(a.deviations, b.deviations, 1)]
+    if a.step or b.step:  # flips of a converter tell more than what neighbours leave of them
+        pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), settings.lags))
+    for one, other, most in pairs:
+        length = 1 << int(np.ceil(np.log2(max(one.size + other.size, 2))))
+        cross, power = (
+            np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(x, length)), length)
+            for x, y in ((one, other), (one * one, other * other))
+        )
+        peaks = np.abs(cross) / np.sqrt(np.maximum(power, 1.0))
+        peaks[power < settings.least_alive * settings.least_samples] = 0.0
+        for _ in range(most):
+            place = int(np.argmax(peaks))
+            peak = float(peaks[place])
+            if not peak > 0.0:
+                break
+            beside = np.arange(place - settings.window_samples, place + settings.window_samples + 1)
+            peaks[beside % length] = 0.0
+            alone = peak > max(settings.least_peak, settings.peak_ratio * float(peaks.max()))
+            lag = place if place < other.size else place - length
+            told = most == 1 and alone and not (a.step and b.step)
+            share = peak / float(np.sqrt(max(power[place], 1.0))) if told else 0.0
+            found[lag] = max(found.get(lag, 0.0), share)
+    return found
+
+
+def _by_window(a: _Channel, b: _Channel, settings: OverlapSettings) -> tuple[Mask, Mask, bool]:
+    """Rows about which the deviations of one channel follow those of the other one, rows about
+    which they do not, and whether the two differ so clearly that windows can be told apart.
+    """
+    wanted, size = a.deviations, settings.window_samples
+    offsets = np.arange(-_TAPS, _TAPS + 1)
+    if wanted.size < 4 * offsets.size or not (wanted.any() and b.deviations.any()):
+        nothing = np.zeros(wanted.size, dtype=bool)
+        return nothing, nothing, False
+    use = wanted != 0.0
+    _, follows = _followed(b.deviations, offsets, wanted, use)
+    product, own, other, alive = (
+        uniform_filter1d(part, size, mode="nearest")
+        for part in (
+            wanted * follows,
+            wanted**2,
+            np.where(use, follows, 0.0) ** 2,
+            (use & (b.deviations != 0.0)).astype(float),
+        )
+    )
+    share = product / np.sqrt(np.maximum(own * other, _TINY))
+    says = alive > settings.least_alive
+    chance = settings.chance_share / np.sqrt(np.maximum(alive * size, 1.0))
+    alike = says & (share > np.maximum(settings.follow_share, chance))
+    clear = bool(alike.any()) and float(np.median(share[alike])) > settings.clear_share
+    return alike, says & (share <= settings.follow_share), clear
+
+
+def _same_flips(a: _Channel, b: _Channel, settings: OverlapSettings) -> bool:
+    """Whether two channels on the steps of a converter flip in the same samples, where noise of
+    their own would let them flip in others.
+    """
+    step = max(a.step, b.step)
+    known = a.known & b.known
+    if not step > 0.0 or known.sum() < settings.least_samples:
+        return False
+    zero = float((a if a.step >= b.step else b).values[known].min())
+    for origin in (zero, zero + 0.5 * step):  # rounded, or cut off
+        levels = [np.round((one.values[known] - origin) / step) for one in (a, b)]
+        expected = 0.5 * sum(_flips(level) for level in levels)
+        if expected < settings.least_flips:
+            continue
+        if np.count_nonzero(levels[0] != levels[1]) < settings.flip_share * expected:
+            return True
+    return False
+
+
+def _flips(levels: Array) -> int:
+    """How often a converter flips because of noise: there, back and there again within a few
+    samples. A signal that turns goes there and back once, and does so in every repetition.
+    """
+    change = np.diff(levels)
+    at = np.flatnonzero(change)
+    back = (change[at[1:]] * change[at[:-1]] < 0.0) & (np.diff(at) <= _SOON)
+    return int(np.count_nonzero(back[1:] & back[:-1]))
+
+
+# ------------------------------------------------------------------ samples between samples
+
+
+def _between(
+    slow: Recording,
+    fast: Recording,
+    own: dict[str, _Channel],
+    other: dict[str, _Channel],
+    settings: OverlapSettings,
+) -> Iterator[Told]:
+    """Samples of one run that were dealt out to two recordings: those of one lie at a whole
+    fraction between those of the other one and differ by noise alone, and no command that is
+    repeated made both.
+    """
+    dt = slow.sample_time
+    if abs(dt - fast.sample_time) > 1e-3 * dt or _repeats(slow, fast):
+        return
+    for name, channel in own.items():
+        lag = _fraction(channel, other[name], dt, settings)
+        if lag is None:
+            continue
+        inside = (slow.time + lag >= 0.0) & (slow.time + lag <= fast.duration)
+        if inside.sum() >= settings.least_samples:
+            yield Told(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
+            return
+
+
+def _repeats(slow: Recording, fast: Recording) -> bool:
+    """Whether both have the same commands, sample by sample, that change."""
+    size = min(len(slow), len(fast))
+    for name, values in slow.channels.items():
+        if name in fast.channels and is_set(name):
+            one, other = values[:size], fast.channels[name][:size]
+            both = slow.mask[name][:size] & fast.mask[name][:size]
+            if np.ptp(one[both]) > 0.0 and np.array_equal(one[both], other[both]):
+                return True
+    return False
+
+
+def _fraction(a: _Channel, b: _Channel, dt: float, settings: OverlapSettings) -> float | None:
+    """Time [s] between the samples of two channels where it is a whole fraction of the sample time
+    and nothing but noise is left between the two; None elsewhere.
+    """
+    size = min(a.values.size, b.values.size)
+    if size < settings.least_samples or a.step or b.step:
+        return None
+    index = np.arange(size, dtype=float)
+    smooth, curve = uniform_filter1d(b.values[:size], _SOON), CubicSpline(index, b.values[:size])
+    inner = (index > 2.0) & (index < size - 3.0) & a.known[:size] & b.known[:size]
+    slope, lag, left = np.gradient(smooth), 0.0, np.zeros(size)
+    for _ in range(8):
+        left = a.values[:size] - curve(np.clip(index + lag, 0.0, size - 1.0))
+        power = float(np.sum(slope[inner] ** 2))
+        lag += float(np.sum((slope * left)[inner])) / max(power, _TINY)
+        if not abs(lag) < 2.0:
+            return None
+    noise = float(np.std(left[inner]))
+    unsure = noise / np.sqrt(max(power, _TINY))
+    whole = min((round(lag * n) / n for n in (2, 3)), key=lambda part: abs(part - lag))
+    off = abs(whole - lag) > max(3.0 * unsure, settings.between_error)
+    if off or unsure > settings.between_error or abs(whole - round(whole)) < 1e-9:
+        return None
+    blocks = left[inner][: inner.sum() // settings.window_samples * settings.window_samples]
+    means = blocks.reshape(-1, settings.window_samples).mean(axis=1)
+    rough = np.diff(left[inner]).std() / np.sqrt(2.0)
+    chance = rough / np.sqrt(settings.window_samples)
+    return whole * dt if np.sqrt(np.mean(means**2)) < settings.between_left * chance else None
