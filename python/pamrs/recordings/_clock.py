@@ -52,7 +52,8 @@ def check_samples(length: float, step: float, source: str) -> None:
     if not length / step <= MOST_ROWS:
         raise RecordingError(
             f"{source}: {length:.4g} s have about {length / step:.3g} samples of {step:.4g} s, and "
-            f"at most {MOST_ROWS} are read: give another sample_time, or cut it into parts"
+            f"at most {MOST_ROWS} are read: give another sample_time, or cut it into parts (long "
+            "pauses part recordings with split = { gap = ... })"
         )
 
 
