@@ -26,10 +26,13 @@ __all__ = [
     "compressor",
     "dead_band",
     "dead_zone",
+    "flow_law",
     "heat",
     "input_lag",
     "muscle_leak",
     "play",
+    "regulator_delay",
+    "regulator_slew",
     "restriction",
     "supply_leak",
     "two_areas",
@@ -140,6 +143,53 @@ def dead_band(sheet: Sheet) -> None:
         y="set - outlet [bar]",
         legend="upper right",
     )
+
+
+def _set_steps(sheet: Sheet) -> None:
+    """Steps of the set pressure, small and large, up and down: the outlet, and each enlarged."""
+    time = clock(8.0, 0.005)
+    steps = ((0.0, 2.0), (1.0, 2.3), (3.0, 5.0), (5.0, 2.3), (7.0, 2.0))
+    command = BAR * hold(time, *steps)
+    start = {"supply_pressure": 2e5, "muscle_pressure": 2e5, "joint_angle": 0.91}
+    runs = sheet.run(supply_command=command, sample_time=0.005, initial=start)
+    axes = sheet.axes("pp;sl")
+    for letter, part, title in (
+        ("p", slice(None), "outlet of the regulator"),
+        ("s", slice(190, 340), "a small step"),
+        ("l", slice(590, 780), "a large one"),
+    ):
+        axes[letter].step(
+            time[part], command[part] / BAR, color=QUIET, ls=":", lw=1.3, label="set", where="post"
+        )
+        sheet.both(axes[letter], runs, supply, part=part)
+        label(axes[letter], title, y="pressure [bar]", legend="upper right" * (letter == "p"))
+
+
+def regulator_delay(sheet: Sheet) -> None:
+    """Steps of the set pressure, small and large, up and down."""
+    _set_steps(sheet)
+
+
+def regulator_slew(sheet: Sheet) -> None:
+    """Steps of the set pressure, small and large, up and down."""
+    _set_steps(sheet)
+
+
+def flow_law(sheet: Sheet) -> None:
+    """A tank that empties to the ambient."""
+    runs = sheet.run(duration=40.0, sample_time=0.05)
+    axes = sheet.axes("px;lx", width_ratios=[1.3, 1])
+    sheet.both(axes["p"], runs, pressure)
+    label(axes["p"], "an outlet is opened", y="chamber [bar]", legend="upper right")
+    sheet.both(axes["l"], runs, pressure)
+    axes["l"].set_yscale("log")
+    axes["l"].set_ylim(1e-3, 10.0)
+    label(axes["l"], "its end: an exponential", y="chamber [bar]")
+    for run, colour in zip(runs, (WITHOUT, WITH), strict=True):
+        lost = -np.gradient(1e3 * run["air_mass"], run.time)
+        axes["x"].plot(pressure(run)[1:-1], lost[1:-1], color=colour, lw=1.8)
+    axes["x"].set(xscale="log", yscale="log", xlim=(1e-2, 6.0), ylim=(1e-2, 10.0))
+    label(axes["x"], "flow against pressure", "chamber [bar]", "flow [g/s]")
 
 
 def _triangle(time: Array, period: float, low: float, high: float) -> Array:

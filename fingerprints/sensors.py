@@ -21,7 +21,15 @@ from fingerprints.sheet import (
 )
 from pamrs import Simulation
 
-__all__ = ["erring_encoder", "late_angle", "late_clock", "late_pressure", "slow_thermometer"]
+__all__ = [
+    "drifting_cell",
+    "drifting_gauge",
+    "erring_encoder",
+    "late_angle",
+    "late_clock",
+    "late_pressure",
+    "slow_thermometer",
+]
 
 NAMES = ("without", "with the effect")
 
@@ -61,6 +69,46 @@ def late_pressure(sheet: Sheet) -> None:
         legend="upper right",
     )
     _loop(sheet, axes["x"], runs)
+
+
+def drifting_gauge(sheet: Sheet) -> None:
+    """The same slow triangle of the pressure again and again, and vented between."""
+    time = clock(80.0, 0.02)
+    level = through(
+        time, *((20.0 * k + t, p) for k in range(4) for t, p in ((0, 0), (8, 4), (16, 0), (19, 0)))
+    )
+    runs = sheet.run(supply_command=BAR * level, sample_time=0.02)
+    axes = sheet.axes("px;zx", width_ratios=[1.2, 1])
+    sheet.both(axes["p"], runs, pressure)
+    label(axes["p"], "recorded pressure", y="muscle [bar]", legend="upper right")
+    sheet.both(axes["z"], runs, pressure)
+    axes["z"].set_ylim(-0.1, 0.4)
+    label(axes["z"], "vented: it creeps off its zero", y="muscle [bar]")
+    sheet.both(axes["x"], runs, angle, pressure)
+    label(axes["x"], "angle against recorded pressure", "muscle [bar]", "angle [deg]")
+
+
+def drifting_cell(sheet: Sheet) -> None:
+    """Slow strokes of a load frame at three held pressures."""
+    time = clock(60.0, 0.05)
+    length = 0.25 + 0.02 * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * time / 10.0))
+    gauge = BAR * hold(time, (0.0, 1.0), (20.0, 2.0), (40.0, 0.0))
+    runs = sheet.run(length=length, pressure=gauge, sample_time=0.05)
+    axes = sheet.axes("ff;dx", width_ratios=[1.2, 1])
+    sheet.both(axes["f"], runs, _force)
+    label(axes["f"], "recorded force: 1 bar, 2 bar, vented", y="force [N]", legend="upper right")
+    axes["d"].plot(time, _force(runs[1]) - _force(runs[0]), color=WITH, lw=1.6)
+    label(axes["d"], "the difference: the same at any length and pressure", y="force [N]")
+    sheet.both(axes["x"], runs, _force, _length, part=slice(0, 400))
+    label(axes["x"], "at 1 bar: force against length", "length [mm]", "force [N]")
+
+
+def _force(run: Simulation) -> np.ndarray:
+    return np.asarray(run["muscle_force"])
+
+
+def _length(run: Simulation) -> np.ndarray:
+    return 1e3 * np.asarray(run["length"])
 
 
 def slow_thermometer(sheet: Sheet) -> None:

@@ -35,8 +35,17 @@ def regulated() -> pamrs.Rig:
     return parse_rig(f"{head}[supply]\n{supply}\n{rest}")
 
 
+def with_outlet() -> pamrs.Rig:
+    """The shoulder with an outlet without a valve."""
+    outlet = '[line]\nkind = "orifice"\nfrom = "chamber"\nto = "ambient"\n'
+    area = 'discharge_area = { value = 0.5, unit = "mm2" }\n'
+    return parse_rig(f"{pamrs.rigs.shoulder().to_toml_text(comments=False)}\n{outlet}{area}")
+
+
 def rig_for(effect: str) -> pamrs.Rig:
-    return regulated() if effect == "supply_regulator_deadband" else pamrs.rigs.shoulder()
+    if effect == "line_flow_law":
+        return with_outlet()
+    return regulated() if effect.startswith("supply_regulator") else pamrs.rigs.shoulder()
 
 
 def run(rig: pamrs.Rig) -> pamrs.Simulation:
@@ -88,9 +97,9 @@ def test_a_simulator_goes_on_bit_for_bit(effect: str) -> None:
 
 
 def test_all_at_once_run_and_restart() -> None:
-    rig = pamrs.rigs.shoulder()
+    rig = with_outlet()
     for effect in EFFECTS:
-        if effect != "supply_regulator_deadband":  # the shoulder has a tank
+        if not effect.startswith("supply_regulator"):  # the shoulder has a tank
             rig = rig.with_effect(effect)
     whole, first = (pamrs.Simulator(rig, sample_time=0.01, initial=START) for _ in range(2))
     expected = whole.run(COMMAND)

@@ -28,7 +28,9 @@ def test_steps_of_the_packaged_rigs() -> None:
 def test_longest_stable_steps_of_the_effects() -> None:
     counts = {}
     for effect in EFFECTS:
-        rig = "regulated_joint" if effect == "supply_regulator_deadband" else "shoulder"
+        regulated = effect.startswith("supply_regulator")
+        rig = "regulated_joint" if regulated else "shoulder"
+        rig = "blow_down_tank" if effect == "line_flow_law" else rig
         core = core_rig(pamrs.rigs.named(rig).with_effect(effect))
         counts[f"{effect}: longest stable step [us]"] = round(1e6 * core.stable_step)
     compare("stable_steps", counts)

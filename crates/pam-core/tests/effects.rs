@@ -11,30 +11,13 @@ use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{
-    antagonists, effect, effect_at, every, lone_tank, regulated, shoulder, two_joints, warm,
+    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints, warm,
     Typical, FORMS, TYPICAL,
 };
 
 const DT: f64 = 0.01;
 const TIMING: Timing = Timing { sample_time: DT, substeps: 10 };
 const ROWS: usize = 80;
-
-fn spec_for(id: &str) -> RigSpec {
-    if id == "supply_regulator_deadband" {
-        regulated()
-    } else {
-        fitting(id, shoulder())
-    }
-}
-
-/// A rig whose gases have what an effect acts on: a temperature.
-fn fitting(id: &str, spec: RigSpec) -> RigSpec {
-    if id == "thermometer_lag" {
-        warm(spec)
-    } else {
-        spec
-    }
-}
 
 /// A command with edges, and one that goes up and down, for each valve; a set pressure for each
 /// regulator.
@@ -103,7 +86,7 @@ fn every_effect_is_tested() {
 #[test]
 fn switched_off_it_changes_nothing_bit_for_bit() {
     for typical in every() {
-        for spec in [spec_for(typical.id), antagonists(), two_joints()] {
+        for spec in [rig_for(typical.id), antagonists(), two_joints()] {
             let spec = fitting(typical.id, spec);
             if lacks_supply(typical.id, &spec) {
                 continue;
@@ -121,12 +104,13 @@ fn switched_off_it_changes_nothing_bit_for_bit() {
 #[test]
 fn switched_on_it_moves_its_channel() {
     for typical in every() {
-        let spec = spec_for(typical.id);
+        let spec = rig_for(typical.id);
         let (plain, on) = (with(spec.clone(), vec![]), with(spec, vec![typical.on()]));
         let (a, b) = (run(&plain, ROWS), run(&on, ROWS));
         let name = match EFFECTS.iter().find(|e| e.id == typical.id).map(|e| e.block) {
             _ if ["encoder_error", "sensor_lag"].contains(&typical.id) => "joint_angle",
             _ if typical.id == "thermometer_lag" => "temperature",
+            _ if typical.id == "load_cell_drift" => "joint_torque",
             Some("supply") => "supply_pressure",
             Some("valve" | "line" | "chamber" | "sensors") => "muscle_pressure",
             _ => "joint_angle",
@@ -140,7 +124,7 @@ fn switched_on_it_moves_its_channel() {
 
 #[test]
 fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
-    for typical in every().filter(|t| t.id != "supply_regulator_deadband") {
+    for typical in every().filter(|t| !t.id.starts_with("supply_regulator")) {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
         for (spec, names) in
             [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])]
@@ -196,9 +180,9 @@ fn one_block_alone_changes() {
 #[test]
 fn a_restart_is_bit_for_bit_with_every_effect_on() {
     let all = TYPICAL.iter().filter(|typical| !lacks_supply(typical.id, &shoulder()));
-    restarts(&with(shoulder(), all.map(Typical::on).collect()));
+    restarts(&with(fitting("line_flow_law", shoulder()), all.map(Typical::on).collect()));
     for typical in FORMS {
-        restarts(&with(spec_for(typical.id), vec![typical.on()]));
+        restarts(&with(rig_for(typical.id), vec![typical.on()]));
     }
 }
 
@@ -316,11 +300,13 @@ fn blind(id: &str) -> &'static [&'static str] {
 fn sensitivities_are_those_of_differences() {
     for typical in every() {
         let info = EFFECTS.iter().find(|e| e.id == typical.id).unwrap();
-        let spec = spec_for(typical.id);
+        let spec = rig_for(typical.id);
         let truth = run(&with(spec.clone(), vec![typical.on()]), ROWS);
         let block = match info.block {
             "supply" => "supply",
             _ if typical.id == "thermometer_lag" => "temperature",
+            _ if typical.id == "gauge_drift" => "arm",
+            _ if typical.id == "load_cell_drift" => "torque",
             "valve" | "line" | "chamber" | "sensors" => "chamber",
             _ => "arm",
         };
@@ -417,7 +403,7 @@ fn predictions_repeat_what_was_simulated() {
     // Measured without noise, cut anywhere, a block predicts what the whole rig did: to the error
     // of the signals' slopes.
     for typical in every() {
-        let rig = with(spec_for(typical.id), vec![typical.on()]);
+        let rig = with(rig_for(typical.id), vec![typical.on()]);
         let truth = run(&rig, ROWS);
         let inputs = signals(&rig, ROWS);
         let names = ["supply_pressure", "muscle_pressure", "joint_angle"];

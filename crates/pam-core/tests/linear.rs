@@ -8,7 +8,7 @@ use pam_core::effects::{Role, EFFECTS};
 use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::{Initial, Progress};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect_at, regulated, shoulder, two_joints, TYPICAL};
+use rigs::{antagonists, effect_at, regulated, rig_for, shoulder, two_joints, TYPICAL};
 
 fn linearised(rig: &Rig, side: Side) -> LinearModel {
     let start = Initial::rest(rig).with(rig, &rig.names().initial[1].0, 2e5).unwrap();
@@ -107,7 +107,7 @@ fn what_effects_move_has_a_row_each() {
                 "" => info.id.to_string(),
                 name => format!("{}.{name}", info.id),
             });
-        let spec = if typical.id == "supply_regulator_deadband" { regulated() } else { shoulder() };
+        let spec = rig_for(typical.id);
         let rig = Rig::new(RigSpec { effects: vec![typical.on()], ..spec }).unwrap();
         let model = linearised(&rig, Side::Fill);
         let mut found: Vec<String> = model.states[4..].to_vec();

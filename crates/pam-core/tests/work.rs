@@ -11,7 +11,7 @@ use pam_core::lanes::{simulate as side_by_side, Request, Signal, Spent};
 use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
 use pam_core::simulate::{Initial, Timing};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect, lone_tank, regulated, shoulder, two_joints, TYPICAL};
+use rigs::{antagonists, effect, lone_tank, regulated, rig_for, shoulder, two_joints, TYPICAL};
 
 mod rigs;
 
@@ -103,8 +103,7 @@ fn steps_of_a_sample() {
         writeln!(table, "{name}: {}", steps(spec)).unwrap();
     }
     for typical in TYPICAL {
-        let regulated_one = typical.id == "supply_regulator_deadband";
-        let mut spec = if regulated_one { regulated() } else { shoulder() };
+        let mut spec = rig_for(typical.id);
         spec.effects = vec![effect(typical.id, typical.parameters)];
         writeln!(table, "{}: {}", typical.id, steps(spec)).unwrap();
     }

@@ -35,6 +35,7 @@ _AS_TOLD: Final = (
     "tried",
     "same_everywhere",
     "time_constant",
+    "own",
     "restricts",
     "like",
 )

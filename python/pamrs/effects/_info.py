@@ -56,6 +56,8 @@ class EffectParameter:
         speaks against the effect.
     time_constant : bool
         Whether recordings must last as long as it, or so, to tell it.
+    own : bool
+        Whether it is another one in each recording, and is found again in a held-out one.
     restricts : bool
         Whether the effect falls with its inverse square (a pressure loss with a conductance).
     like : str
@@ -84,6 +86,7 @@ class EffectParameter:
     scan: tuple[float, float, int] | None = None
     same_everywhere: bool = False
     time_constant: bool = False
+    own: bool = False
     restricts: bool = False
     like: str = ""
     needed_in: tuple[str, ...] = ()
@@ -194,10 +197,15 @@ class Form:
 
     @property
     def transient(self) -> bool:
-        """Whether it happens at times of its own, or with a phase of its own, in each recording, so
-        that all recordings cannot share its parameters.
+        """Whether it happens at times of its own, with a phase or with a size of its own in each
+        recording, so that all recordings cannot share its parameters.
         """
-        return self.periodic or any(parameter.role == "time" for parameter in self.parameters)
+        return self.periodic or self.own or any(p.role == "time" for p in self.parameters)
+
+    @property
+    def own(self) -> bool:
+        """Whether it acts all the time with a size of its own in each recording."""
+        return any(parameter.own for parameter in self.parameters)
 
     @property
     def periodic(self) -> bool:
@@ -350,6 +358,11 @@ class EffectInfo:
     def lasting(self) -> tuple[Form, ...]:
         """Its forms that act all the time, the same in all recordings."""
         return tuple(form for form in self.forms if not form.transient)
+
+    @property
+    def own(self) -> bool:
+        """Whether its first form has a size of its own in each recording."""
+        return self.forms[0].own
 
     @property
     def leading(self) -> EffectParameter:

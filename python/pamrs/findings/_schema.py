@@ -26,7 +26,7 @@ _KINDS: dict[str, dict[str, Any]] = {
         "type": "array",
         "items": {
             "type": "object",
-            "required": ["recording", "time"],
+            "required": ["recording"],
             "properties": {"recording": {"type": "string"}},
             "additionalProperties": {"type": "number"},
         },

@@ -229,6 +229,8 @@ pub(super) struct Driven<'a, S> {
     zero: S,
     /// Time constant of its sensor [s].
     lag: S,
+    /// The gas whose gauge drifts.
+    drifting: Option<usize>,
     /// Whether another clock than the block's records it.
     shifted: bool,
     /// Length of the muscles at rest [m], where a length stands for the shortening of a linear
@@ -251,6 +253,7 @@ pub(super) fn driven<'a, S: Scalar>(
             signal: *signal,
             zero: if rest.is_some() { -zero } else { zero },
             lag: lag(plant, *place),
+            drifting: gas(plant, *place).filter(|gas| plant.gauge_drift(*gas, 0.0).is_some()),
             rest,
             // a block's own clock is that of what it predicts
             shifted: plant.skewed() && (*place < layout.angle(0)) == block.mechanical(),
@@ -278,12 +281,15 @@ pub(super) fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
     id.map_or(constant(0.0), |id| plant.values()[id])
 }
 
+/// The gas of a pressure.
+pub(super) fn gas<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> Option<usize> {
+    let layout = plant.rig().layout();
+    (layout.pressure(0)..layout.mass(0)).contains(&place).then(|| place - layout.supplies)
+}
+
 /// Time constant of the sensor of a state [s].
 fn lag<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
-    let layout = plant.rig().layout();
-    let gas =
-        (layout.pressure(0)..layout.mass(0)).contains(&place).then(|| place - layout.supplies);
-    gas.and_then(|gas| plant.lagging(gas)).map_or(constant(0.0), |(_, lag)| lag)
+    gas(plant, place).and_then(|gas| plant.lagging(gas)).map_or(constant(0.0), |(_, lag)| lag)
 }
 
 impl<S: Scalar> Driven<'_, S> {
@@ -311,6 +317,10 @@ impl<S: Scalar> Driven<'_, S> {
         let pressure = self.place < layout.angle(0);
         if pressure {
             state[self.place] = -self.zero + (value + rig.gas.ambient_pressure) + self.lag * slope;
+            let time = (k as f64 + fraction) * dt;
+            if let Some(drift) = self.drifting.and_then(|gas| plant.gauge_drift(gas, time)) {
+                state[self.place] -= drift;
+            }
         } else {
             state[self.place] = -self.zero + value;
             state[self.place + layout.coordinates] = constant(slope);

@@ -48,6 +48,8 @@ struct Reading<S> {
     lagging: Option<usize>,
     /// What the sensor adds.
     offset: S,
+    /// Gas whose pressure is read.
+    gas: Option<usize>,
     /// Coordinate whose angle is read.
     coordinate: Option<usize>,
     /// Length of the muscles at rest [m], where a length is read in the place of a shortening.
@@ -128,7 +130,7 @@ impl<'a, S: Number> Cut<'a, S> {
             let time = k as f64 * dt;
             let clocks = Clocks::of(&self.stepper.plant, self.block, time);
             self.command(k * self.measured.held, time, &clocks, &mut controls);
-            let value = self.read(&course);
+            let value = self.read(&course, time);
             sink(k, value, &self.stepper, &course.state, &controls);
             if k + 1 < n {
                 self.sample(k, &mut course, clocks, &mut controls);
@@ -138,11 +140,14 @@ impl<'a, S: Number> Cut<'a, S> {
     }
 
     /// The channel that is predicted.
-    fn read(&mut self, course: &Course<S>) -> S {
+    fn read(&mut self, course: &Course<S>, time: f64) -> S {
         let Stepper { plant, scratch, .. } = &mut self.stepper;
         match &self.output {
-            Output::State(reading) => reading.read(plant, &course.state),
-            Output::Pull(k, rest) => plant.pull(*k, &course.state, &course.memory, scratch) + *rest,
+            Output::State(reading) => reading.read(plant, &course.state, time),
+            Output::Pull(k, rest) => {
+                let pull = plant.pull(*k, &course.state, &course.memory, scratch) + *rest;
+                plant.cell_drift(time).map_or(pull, |drift| pull + drift)
+            }
             Output::Temperature(k, off) => match plant.thermometer(*k) {
                 Some((reading, _)) => course.state[reading] + *off,
                 None => plant.temperature(*k, &course.state) + *off,
@@ -177,7 +182,8 @@ impl<'a, S: Number> Cut<'a, S> {
         let before = course.state.clone();
         let state = &mut course.state;
         let dt = self.timing.sample_time;
-        let shift = Clocks::of(plant, self.block, k as f64 * dt).neighbour;
+        let time = k as f64 * dt;
+        let shift = Clocks::of(plant, self.block, time).neighbour;
         self.drivers.iter().for_each(|driver| driver.write(plant, k, 0.0, dt, shift, state));
         for (gas, valve) in &self.taps {
             let place = layout.pressure(*gas);
@@ -200,6 +206,9 @@ impl<'a, S: Number> Cut<'a, S> {
             (&self.output, signal)
         {
             state[*reading] = self.bumps[0] - *offset + signal.value[k];
+            if let Some(drift) = self.block.gas().and_then(|gas| plant.gauge_drift(gas, time)) {
+                state[*reading] -= drift;
+            }
         }
     }
 
@@ -377,6 +386,7 @@ impl<S: Scalar> Output<S> {
         let arm = coordinate.is_some();
         Self::State(Reading {
             coordinate,
+            gas,
             reading: gas.map_or(place, |k| plant.reading(k)),
             lagging: gas.and_then(|k| plant.lagging(k)).map(|(reading, _)| reading),
             offset: if arm { zero } else { zero - rig.gas.ambient_pressure },
@@ -387,13 +397,14 @@ impl<S: Scalar> Output<S> {
 
 impl<S: Scalar> Reading<S> {
     /// The channel at a state.
-    fn read(&self, plant: &Plant<'_, S>, state: &[S]) -> S {
+    fn read(&self, plant: &Plant<'_, S>, state: &[S], time: f64) -> S {
         let value = state[self.reading];
         let value = match (self.coordinate, self.mirrored) {
             (_, Some(rest)) => -value + rest,
             (Some(k), None) => plant.read_angle(k, value),
             _ => value,
         };
-        value + self.offset
+        let drift = self.gas.and_then(|gas| plant.gauge_drift(gas, time));
+        drift.map_or(value + self.offset, |drift| value + self.offset + drift)
     }
 }

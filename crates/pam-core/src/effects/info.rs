@@ -76,6 +76,8 @@ pub struct EffectParameter {
     pub same_everywhere: bool,
     /// Recordings must last as long as it, or so, to tell it.
     pub time_constant: bool,
+    /// It is another one in each recording, whatever its form has beside it.
+    pub own: bool,
     /// The effect falls with its inverse square, as a pressure loss does with a conductance.
     pub restricts: bool,
     /// Parameter of the rig (`valve.discharge_area_max`) in parts of which it is tried.
@@ -113,6 +115,7 @@ impl EffectParameter {
             scan: None,
             same_everywhere: false,
             time_constant: false,
+            own: false,
             restricts: false,
             like: "",
             needed_in: &[],
@@ -189,6 +192,12 @@ impl EffectParameter {
     #[must_use]
     pub const fn time_constant(self) -> Self {
         Self { time_constant: true, ..self }
+    }
+
+    /// The same for one that is another one in each recording.
+    #[must_use]
+    pub const fn own(self) -> Self {
+        Self { own: true, ..self }
     }
 
     /// The same for one with whose inverse square the effect falls.

@@ -2,6 +2,7 @@
 
 use crate::blocks::chamber::ChamberState;
 use crate::blocks::gas::Gas;
+use crate::blocks::supply::Supply;
 use crate::blocks::valve::Opening;
 use crate::scalar::{constant, Scalar};
 use serde::Serialize;
@@ -28,6 +29,8 @@ pub enum Port {
     Inflow,
     /// Supply: what it is asked for, and what fills it.
     Feed,
+    /// Line: the law of its flow. One effect at most.
+    Law,
     /// Chamber: the balance that gives its pressure. One effect at most.
     Balance,
     /// Muscle: the pressure that its force is that of.
@@ -55,6 +58,9 @@ pub enum Port {
     Thermometer,
     /// Joint: what the sensor of its angle reads. One effect at most.
     Encoder,
+    /// Chamber: what its gauge reads too much. Rig: what its load cell, or the sensors of its joints'
+    /// torques, do. One effect at most.
+    Zero,
     /// The clock of what is recorded.
     Clock,
     /// Valve: how late it sees its command.
@@ -86,7 +92,7 @@ pub enum At<S> {
         /// Sum of the openings through which its valves fill from it, 0 to 1 each.
         opening: S,
     },
-    /// A valve.
+    /// A valve or a line.
     Valve {
         /// Pressure of what it feeds.
         fed: S,
@@ -275,6 +281,12 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
         there
     }
 
+    /// [`Port::Law`]: mass flow [kg/s] between two pressures, in the direction of `own`, the flow
+    /// by the line's own law; `unit` is that from [`BAR`] above the ambient to the ambient.
+    fn along(&self, _gas: &Gas, own: S, _unit: S, _from: S, _to: S) -> S {
+        own
+    }
+
     /// [`Port::Clearance`]: discharge area [m2] of either path at a normalised position.
     fn clearance(&self, _gas: &Gas, _position: S) -> S {
         constant(0.0)
@@ -292,6 +304,9 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
 
     /// [`Port::Feed`]: change the mass flow that is drawn [kg/s] and the set pressure of a supply.
     fn feed(&self, _own: &[S], _pressure: S, _drawn: &mut S, _set: &mut S) {}
+
+    /// [`Port::Feed`]: change how a supply answers.
+    fn answers(&self, _supply: &mut Supply<S>) {}
 
     /// [`Port::Feed`]: bring the states to the end of a step [s] from one pressure to another;
     /// where it switched on the way, a mass flow [kg/s] and the time for which the supply gets it
@@ -399,6 +414,11 @@ pub trait Effect<S: Scalar>: Debug + Send + Sync {
     /// which is above -1.
     fn misread(&self, _angle: S) -> (S, S) {
         (constant(0.0), constant(0.0))
+    }
+
+    /// [`Port::Zero`]: what the sensor reads too much [Pa, N or N m] at a time [s].
+    fn drift(&self, _time: f64) -> S {
+        constant(0.0)
     }
 
     /// [`Port::Clock`]: how late pressures and angles are recorded at a time [s].

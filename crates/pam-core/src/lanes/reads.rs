@@ -59,7 +59,13 @@ impl Reads {
             }
             let stepper = &mut runs.of(lane).stepper;
             self.channels.iter_mut().for_each(Vec::clear);
-            stepper.plant.observe(&own, &self.memory, &mut stepper.scratch, &mut self.channels);
+            stepper.plant.observe(
+                &own,
+                0.0,
+                &self.memory,
+                &mut stepper.scratch,
+                &mut self.channels,
+            );
             for (k, read) in self.reads.iter().enumerate() {
                 if let Read::Observed(channel) = read {
                     out[k * plants + lane] = self.channels[*channel][0];

@@ -9,8 +9,12 @@ use crate::blocks::chamber::{
 };
 use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::valve::Opening;
-use crate::effects::Extremes;
+use crate::effects::{Extremes, BAR};
 use crate::scalar::{constant, Scalar};
+
+/// Pressures at which the slope of a line's law is looked at, and how many of them to a decade.
+const LAW_POINTS: i32 = 70;
+const LAW_PER_DECADE: f64 = 10.0;
 
 /// A pressure [Pa, absolute]: one of the states, by its place, or one that stays.
 #[derive(Debug, Clone, Copy)]
@@ -95,15 +99,15 @@ impl<S: Scalar> Plant<'_, S> {
                 here.pass(Node::Gas(unit.to), Node::Ambient, flow);
             }
         }
-        for (unit, line) in self.wiring.lines.iter().zip(&self.lines) {
+        for (k, (unit, line)) in self.wiring.lines.iter().zip(&self.lines).enumerate() {
             if unit.segments > 0 {
                 continue;
             }
             let (from, to) = (self.pressure_at(unit.from, state), self.pressure_at(unit.to, state));
-            let flow = match line {
-                Line::Orifice(area) => gas.mass_flow(*area, from, to),
-                Line::Tube(tube) => tube.mass_flow(from, to),
-            };
+            let mut flow = line.mass_flow(gas, from, to);
+            if self.altered.laws {
+                flow = self.altered_line_flow(k, flow, from, to);
+            }
             here.pass(unit.from, unit.to, flow);
         }
         if self.altered.waves {
@@ -214,6 +218,21 @@ impl<S: Scalar> Plant<'_, S> {
             None => opening.mass_flow(gas, upstream, downstream),
             Some(acting) => {
                 self.effect(acting).through(gas, opening, upstream, downstream, venting)
+            }
+        }
+    }
+
+    /// Mass flow through a line [kg/s] whose own law says `flow`.
+    #[inline(never)]
+    fn altered_line_flow(&self, line: usize, flow: S, from: S, to: S) -> S {
+        match &self.wiring.ports.law[line] {
+            None => flow,
+            Some(acting) => {
+                let gas = &self.rig.gas;
+                let ambient = gas.ambient_pressure;
+                let (above, ambient) = (constant(ambient + BAR), constant(ambient));
+                let unit = self.lines[line].mass_flow(gas, above, ambient);
+                self.effect(acting).along(gas, flow, unit, from, to)
             }
         }
     }
@@ -457,11 +476,8 @@ impl Plant<'_, f64> {
             add(Node::Gas(unit.to), unit.from, slope);
             add(unit.from, Node::Gas(unit.to), slope);
         }
-        for (unit, line) in wiring.lines.iter().zip(&self.lines).filter(|(u, _)| u.segments == 0) {
-            let slope = match line {
-                Line::Orifice(area) => gas.steepest(*area),
-                Line::Tube(tube) => tube.steepest(),
-            };
+        for (k, unit) in wiring.lines.iter().enumerate().filter(|(_, unit)| unit.segments == 0) {
+            let slope = self.steepest_line(k);
             add(unit.from, unit.to, slope);
             add(unit.to, unit.from, slope);
         }
@@ -496,6 +512,29 @@ impl Plant<'_, f64> {
             worst = (of_supplies, None);
         }
         worst
+    }
+
+    /// Largest change of the flow through a line per pressure [kg/(s Pa)]: its own law's next to
+    /// equal pressures, another one's wherever it is steepest.
+    fn steepest_line(&self, k: usize) -> f64 {
+        let gas = &self.rig.gas;
+        let own = match &self.lines[k] {
+            Line::Orifice(area) => gas.steepest(*area),
+            Line::Tube(tube) => tube.steepest(),
+        };
+        if self.wiring.ports.law[k].is_none() {
+            return own;
+        }
+        let (low, most) = (gas.ambient_pressure, self.rig.highest_pressure());
+        let flow = |above: f64| {
+            let (from, to) = (low + above, low);
+            self.altered_line_flow(k, self.lines[k].mass_flow(gas, from, to), from, to)
+        };
+        let grid = (0..LAW_POINTS).map(|j| {
+            let above = (most - low) * 10.0_f64.powf(-f64::from(j) / LAW_PER_DECADE);
+            (flow(above * 1.01) - flow(above)) / (0.01 * above)
+        });
+        grid.fold(own, f64::max)
     }
 
     /// Fastest rate of the supplies that move [1/s], of which openings draw so much per pressure

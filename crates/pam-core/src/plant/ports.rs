@@ -2,7 +2,7 @@
 //! there.
 
 use super::parameters::{ParameterId, Parameters};
-use super::units::{BodyUnit, Node, SupplyUnit, Wiring};
+use super::units::{BodyUnit, Node, Path, SupplyUnit, Wiring};
 use super::wiring::model;
 use super::wiring_motion::coordinate_names;
 use crate::description::{dotted, EffectSpec, RigSpec};
@@ -33,6 +33,7 @@ pub(crate) struct Acting {
 pub(crate) enum Place {
     Supply(usize),
     Valve(usize),
+    Line(usize),
     Gas(usize),
     Group(usize),
     Joint(usize),
@@ -71,6 +72,8 @@ pub(crate) struct Ports {
     pub area: Vec<Option<Acting>>,
     pub passage: Vec<Option<Acting>>,
     pub flows: Vec<(Flow, Acting)>,
+    /// Of each line.
+    pub law: Vec<Option<Acting>>,
     /// Of each supply.
     pub feed: Vec<Vec<Acting>>,
     /// Of each gas.
@@ -91,6 +94,9 @@ pub(crate) struct Ports {
     pub mounting: Option<Acting>,
     /// Of each coordinate.
     pub encoder: Vec<Option<Acting>>,
+    /// Of each gas.
+    pub gauge_zero: Vec<Option<Acting>>,
+    pub cell_zero: Option<Acting>,
     pub clock: Vec<Acting>,
     /// States of all effects.
     pub states: usize,
@@ -189,6 +195,7 @@ fn block_name(spec: &RigSpec, wiring: &Wiring, place: Place) -> String {
     match place {
         Place::Supply(k) => spec.supplies[k].name.clone(),
         Place::Valve(k) => spec.valves[k].name.clone(),
+        Place::Line(k) => spec.lines[k].name.clone(),
         Place::Gas(k) if k < wiring.chambers => spec.chambers[k].name.clone(),
         Place::Gas(k) => spec.lines[wiring.inlets[k - wiring.chambers].0].name.clone(),
         Place::Group(k) => spec.muscles[k].name.clone(),
@@ -210,6 +217,7 @@ pub(super) fn switch_on(
         switching: vec![None; wiring.valves.len()],
         area: vec![None; wiring.valves.len()],
         passage: vec![None; wiring.valves.len()],
+        law: vec![None; wiring.lines.len()],
         feed: vec![Vec::new(); wiring.supplies.len()],
         balance: vec![None; wiring.gases.len()],
         reading: vec![None; wiring.gases.len()],
@@ -220,6 +228,7 @@ pub(super) fn switch_on(
         push: vec![Vec::new(); wiring.coordinates.len()],
         weight: vec![Vec::new(); wiring.coordinates.len()],
         encoder: vec![None; wiring.coordinates.len()],
+        gauge_zero: vec![None; wiring.gases.len()],
         ..Ports::default()
     };
     let mut places = Vec::new();
@@ -337,6 +346,7 @@ fn acted_on(
     let own_energy = |k: &usize| info.frees_mass && wiring.gases[*k].has_energy();
     let places: Vec<Place> = chosen
         .filter(|k| info.at != "supply" || fits(k))
+        .filter(|k| info.at != "line" || matches!(wiring.lines[*k].path, Path::Orifice(_)))
         .filter(|k| !own_energy(k))
         .map(|k| place(info.at, k))
         .collect();
@@ -345,6 +355,12 @@ fn acted_on(
             "effect '{}' acts on a chamber of the kind coefficients, and what it would act on has \
             an energy balance of its own: its heat_transfer_coefficient is a parameter",
             effect.id
+        ));
+    }
+    if places.is_empty() && info.at == "line" {
+        let id = effect.id.as_str();
+        return model(format!(
+            "effect '{id}' acts on a line of the kind orifice, and none is here"
         ));
     }
     if places.is_empty() {
@@ -396,6 +412,7 @@ fn place(kind: &str, k: usize) -> Place {
     match kind {
         "supply" => Place::Supply(k),
         "valve" => Place::Valve(k),
+        "line" => Place::Line(k),
         "chamber" => Place::Gas(k),
         "muscle" => Place::Group(k),
         _ => Place::Joint(k),
@@ -417,6 +434,7 @@ fn names(spec: &RigSpec, kind: &str) -> Vec<String> {
     match kind {
         "supply" => spec.supplies.iter().map(|b| b.name.clone()).collect(),
         "valve" => spec.valves.iter().map(|b| b.name.clone()).collect(),
+        "line" => spec.lines.iter().map(|b| b.name.clone()).collect(),
         "chamber" => spec.chambers.iter().map(|b| b.name.clone()).collect(),
         "muscle" => spec.muscles.iter().map(|b| b.name.clone()).collect(),
         "joint" => coordinate_names(spec),
@@ -469,6 +487,7 @@ impl Ports {
                 self.tap[gas] = self.tap[gas].or(Some((k, acting)));
                 self.passage[k].replace(acting)
             }
+            (Port::Law, Place::Line(k)) => self.law[k].replace(acting),
             (Port::Clearance, Place::Valve(k)) => {
                 push(&mut self.flows, (Flow::Clearance(k), acting))
             }
@@ -507,6 +526,8 @@ impl Ports {
             (Port::Hanging, Place::Joint(k)) => self.hang(k, acting, wiring, spec)?,
             (Port::Mounting, Place::Whole) => self.mounting.replace(acting),
             (Port::Encoder, Place::Joint(k)) => self.encoder[k].replace(acting),
+            (Port::Zero, Place::Gas(k)) => self.gauge_zero[k].replace(acting),
+            (Port::Zero, Place::Whole) => self.cell_zero.replace(acting),
             (Port::Clock, Place::Whole) => push(&mut self.clock, acting),
             _ => {
                 let id = self.effects[acting.effect].info.id;

@@ -13,6 +13,7 @@ use super::units::{GasLaw, LineUnit, Passes, Path, SupplyUnit, ValveUnit, WaveUn
 use super::{Rig, Values};
 use crate::blocks::chamber::Polytropic;
 use crate::blocks::chamber::{cube_area, cylinder_area, gas_temperature};
+use crate::blocks::gas::Gas;
 use crate::blocks::supply::{SetPressure, Supply};
 use crate::blocks::tube::Tube;
 use crate::blocks::valve::Opening;
@@ -132,6 +133,17 @@ pub(crate) enum Line<S> {
     Tube(Tube<S>),
 }
 
+impl<S: Scalar> Line<S> {
+    /// Mass flow [kg/s] between two pressures [Pa, absolute], what it holds left out.
+    #[inline(always)]
+    pub fn mass_flow(&self, gas: &Gas, from: S, to: S) -> S {
+        match self {
+            Self::Orifice(area) => gas.mass_flow(*area, from, to),
+            Self::Tube(tube) => tube.mass_flow(from, to),
+        }
+    }
+}
+
 /// A rig with the values of its parameters in a scalar type.
 #[derive(Debug)]
 pub struct Plant<'a, S> {
@@ -165,6 +177,8 @@ pub(super) struct Altered {
     pub areas: bool,
     pub passages: bool,
     pub flows: bool,
+    /// Some line has a law of its own.
+    pub laws: bool,
     /// Some tube carries waves.
     pub waves: bool,
     pub balances: bool,
@@ -186,6 +200,7 @@ impl Altered {
             areas: ports.area.iter().any(Option::is_some),
             passages: ports.passage.iter().any(Option::is_some),
             flows: !ports.flows.is_empty(),
+            laws: ports.law.iter().any(Option::is_some),
             balances: ports.on_balance(),
             muscles: ports.muscles.iter().any(|muscle| muscle.some),
             motion: ports.on_motion(),
@@ -308,10 +323,22 @@ impl<'a, S: Number> Plant<'a, S> {
                 Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
             }),
         };
+        let effects: Vec<Box<dyn Effect<S>>> = (wiring.ports.effects.iter())
+            .map(|effect| {
+                let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
+                S::effect(&effect.form.make, &own, &rig.gas)
+            })
+            .collect();
+        let supplied = |(unit, feed): (&SupplyUnit, &Vec<Acting>)| {
+            let mut supply = supply(unit, &values);
+            feed.iter().for_each(|acting| effects[acting.effect].answers(&mut supply));
+            supply
+        };
+        let supplies = wiring.supplies.iter().zip(&wiring.ports.feed).map(supplied).collect();
         Ok(Self {
             layout: rig.layout,
             balanced,
-            supplies: wiring.supplies.iter().map(|unit| supply(unit, &values)).collect(),
+            supplies,
             fixed_volume: (wiring.gases.iter())
                 .map(|gas| {
                     let own = gas.volume.map_or(constant(0.0), |volume| values[volume]);
@@ -336,12 +363,7 @@ impl<'a, S: Number> Plant<'a, S> {
             body: Body::new(&wiring.body, &wiring.coordinates, &values)?,
             altered: Altered::at(wiring),
             wiring,
-            effects: (wiring.ports.effects.iter())
-                .map(|effect| {
-                    let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
-                    S::effect(&effect.form.make, &own, &rig.gas)
-                })
-                .collect(),
+            effects,
             rig,
             values,
         })
@@ -648,10 +670,11 @@ impl<'a, S: Scalar> Plant<'a, S> {
 }
 
 impl Plant<'_, f64> {
-    /// Value of each channel of the rig at a state, appended to `out`.
+    /// Value of each channel of the rig at a state and a time [s], appended to `out`.
     pub fn observe(
         &self,
         state: &[f64],
+        time: f64,
         memory: &[Memory<f64>],
         here: &mut Scratch<f64>,
         out: &mut [Vec<f64>],
@@ -671,7 +694,9 @@ impl Plant<'_, f64> {
             out.push(match *channel {
                 Channel::Supply(k) => state[layout.supply(k)] - ambient,
                 Channel::Pressure(k) => {
-                    state[self.reading(k)] - ambient + zero(wiring.gases[k].pressure_zero)
+                    state[self.reading(k)] - ambient
+                        + zero(wiring.gases[k].pressure_zero)
+                        + self.gauge_drift(k, time).unwrap_or(0.0)
                 }
                 Channel::Angle(k) => {
                     self.read_angle(k, state[layout.angle(k)]) + zero(wiring.coordinates[k].zero)
@@ -686,8 +711,12 @@ impl Plant<'_, f64> {
                 }
                 Channel::LengthRate => -state[layout.rate(0)],
                 Channel::Contraction(k) => here.contraction[k],
+                // a load cell reads what all muscles on a load pull
+                Channel::Force(0) if self.rig.spec().load.is_some() => {
+                    here.force[0] + self.cell_drift(time).unwrap_or(0.0)
+                }
                 Channel::Force(k) => here.force[k],
-                Channel::Torque(k) => here.torque[k],
+                Channel::Torque(k) => here.torque[k] + self.cell_drift(time).unwrap_or(0.0),
                 Channel::Volume(k) => here.volume[k],
                 Channel::Mass(k) => state[layout.mass(k)],
                 Channel::Flow(k) => state[layout.flow(k)],

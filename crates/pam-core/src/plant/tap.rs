@@ -43,6 +43,19 @@ impl<S: Scalar> Plant<'_, S> {
         Some((self.layout.effect(acting.first), self.effect(acting).lag()))
     }
 
+    /// What the gauge of a gas reads too much at a time [Pa]; None where it always reads the same.
+    #[inline]
+    pub fn gauge_drift(&self, gas: usize, time: f64) -> Option<S> {
+        self.wiring.ports.gauge_zero[gas].as_ref().map(|acting| self.effect(acting).drift(time))
+    }
+
+    /// What a load cell reads too much at a time [N], or the sensors of the joints' torques [N m];
+    /// None where they always read the same.
+    #[inline]
+    pub fn cell_drift(&self, time: f64) -> Option<S> {
+        self.wiring.ports.cell_zero.as_ref().map(|acting| self.effect(acting).drift(time))
+    }
+
     /// Write the pressures between valves and tubes, where sensors sit there: those of a state, its
     /// commands held.
     pub fn read_taps(&self, state: &mut [S], controls: &Controls<S>) {

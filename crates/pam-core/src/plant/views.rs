@@ -82,6 +82,7 @@ impl<S: Scalar> Plant<'_, S> {
             Place::Valve(k) => {
                 At::Valve { fed: state[self.layout.pressure(self.wiring.valves[k].to)] }
             }
+            Place::Line(k) => At::Valve { fed: self.pressure_at(self.wiring.lines[k].to, state) },
             Place::Gas(k) => self.at_chamber(k, state, spool, here.volume_rate[k]),
             Place::Group(k) => {
                 let force = here.felt.get(acting.first).copied().unwrap_or(constant(0.0));

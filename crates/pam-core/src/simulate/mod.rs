@@ -674,9 +674,10 @@ impl Progress {
         timing: Timing,
         out: &mut [Vec<f64>],
     ) {
-        plant.observe(&self.state, &self.memory, scratch, out);
+        let time = self.samples as f64 * timing.sample_time;
+        plant.observe(&self.state, time, &self.memory, scratch, out);
         if self.keeps_readings(plant) {
-            let late_by = Late::at(plant, self.samples as f64 * timing.sample_time);
+            let late_by = Late::at(plant, time);
             let first = plant.rig().names.inputs.len();
             for (column, (channel, pressure)) in readings(plant.rig()).enumerate() {
                 let shift = if pressure { late_by.pressures } else { late_by.motion };
@@ -706,14 +707,15 @@ impl Progress {
         sample: usize,
         timing: Timing,
     ) {
+        let time = self.samples as f64 * timing.sample_time;
         self.past.extend(drive.commands.iter().map(|commands| commands[sample]));
         if self.keeps_readings(plant) {
             let mut seen = vec![Vec::new(); plant.rig().names.channels.len()];
-            plant.observe(&self.state, &self.memory, scratch, &mut seen);
+            plant.observe(&self.state, time, &self.memory, scratch, &mut seen);
             let kept = readings(plant.rig());
             self.past.extend(kept.flat_map(|(channel, _)| seen[channel].last().copied()));
         }
-        let (pressures, angles) = plant.skew(self.samples as f64 * timing.sample_time);
+        let (pressures, angles) = plant.skew(time);
         let latest = pressures.max(angles).max(0.0) + plant.dead_time();
         let most = self.kept * (2 + (latest / timing.sample_time).ceil() as usize);
         self.past.drain(..self.past.len().saturating_sub(most));

@@ -2,7 +2,8 @@
 #![allow(dead_code)]
 
 use pam_core::description::{
-    ArmSpec, ChamberSpec, EffectSpec, JointSpec, LinkSpec, TransmissionSpec, ValveSpec,
+    dotted, ArmSpec, ChamberSpec, EffectSpec, JointSpec, LineSpec, LinkSpec, TransmissionSpec,
+    ValveSpec,
 };
 use pam_core::RigSpec;
 
@@ -101,6 +102,34 @@ pub fn regulated() -> RigSpec {
     spec
 }
 
+/// A rig with what an effect acts on: a temperature, an outlet without a valve.
+pub fn fitting(id: &str, mut spec: RigSpec) -> RigSpec {
+    match id {
+        "thermometer_lag" => warm(spec),
+        "line_flow_law" => {
+            spec.lines.push(LineSpec {
+                name: "outlet".into(),
+                kind: "orifice".into(),
+                from: dotted("chamber", &spec.chambers[0].name),
+                to: "ambient".into(),
+                length: 0.0,
+                diameter: 0.0,
+                discharge_area: 5e-7,
+                inlet_volume: 0.0,
+                segments: 0,
+                alpha: 1.0,
+            });
+            spec
+        }
+        _ => spec,
+    }
+}
+
+/// The shoulder with what an effect acts on.
+pub fn rig_for(id: &str) -> RigSpec {
+    fitting(id, if id.starts_with("supply_regulator") { regulated() } else { shoulder() })
+}
+
 /// Nothing but a tank.
 pub fn lone_tank() -> RigSpec {
     let mut spec = shoulder();
@@ -143,6 +172,19 @@ pub const TYPICAL: &[Typical] = &[
         &[("free_air_delivery", 0.0)],
     ),
     typical("supply_regulator_deadband", &[("dead_band", 2e4)], &[("dead_band", 0.0)]),
+    typical("supply_regulator_delay", &[("delay", 0.0123)], &[("delay", 0.0)]),
+    typical(
+        "supply_regulator_slew",
+        &[("rise_limit", 1e5), ("fall_limit", 8e4)],
+        &[("rise_limit", 1e12), ("fall_limit", 1e12)],
+    ),
+    typical(
+        "line_flow_law",
+        &[("laminar_part", 1.0), ("laminar_flow", 2.0)],
+        &[("laminar_part", 0.0)],
+    ),
+    typical("gauge_drift", &[("change", 2e4)], &[("change", 0.0)]),
+    typical("load_cell_drift", &[("change", 500.0)], &[("change", 0.0)]),
     typical("valve_dead_zone", &[("half_width", 0.03)], &[("half_width", 0.0)]),
     typical("valve_hysteresis", &[("half_width", 0.01)], &[("half_width", 0.0)]),
     typical(
@@ -388,6 +430,24 @@ pub const FORMS: &[Typical] = &[
             ("set_angle", 0.3),
         ],
         &[("sine", 0.0), ("cosine", 0.0), ("sine_2", 0.0), ("cosine_2", 0.0)],
+    ),
+    formed(
+        "line_flow_law",
+        "power",
+        &[("laminar_part", 0.8), ("laminar_flow", 2.0)],
+        &[("laminar_part", 0.0)],
+    ),
+    formed(
+        "gauge_drift",
+        "exponential",
+        &[("change", 2e4), ("time_constant", 0.4)],
+        &[("change", 0.0)],
+    ),
+    formed(
+        "load_cell_drift",
+        "exponential",
+        &[("change", 50.0), ("time_constant", 0.4)],
+        &[("change", 0.0)],
     ),
     formed("parameter_drift", "straight", &[("change", -0.8)], &[("change", 0.0)]),
     formed("external_torque", "constant", &[("torque", 6.0)], &[("torque", 0.0)]),

@@ -10,6 +10,9 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from typing import TypeVar
 
+import numpy as np
+
+from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
     Events,
@@ -29,12 +32,13 @@ from pamrs.diagnosis.fit import (
     predicted_with_doubt,
     residuals,
     with_effects_of,
+    without_term,
 )
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import left_out
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS, find_parameter, id_of, info_of, term_of
+from pamrs.effects import find_parameter, id_of, info_of, ports_of, term_in, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -276,7 +280,7 @@ class Attempts:
         """An effect with times of its own in every recording, held-out ones included, beside the
         effects of a candidate.
         """
-        if effect in {id_of(e) for e in beside.effects}:
+        if id_of(effect) in {id_of(e) for e in beside.effects}:
             return None  # it would replace what it is to happen beside
         if beside.fit.events is not None or beside.wrong:
             return None  # what happens beside other events, or wrong values, is not fitted
@@ -296,10 +300,10 @@ class Attempts:
         effects = (*beside.effects, effect)
         if self.same:
             return self.judged(effects, found)
-        bare = found.rig.without_effect(effect)
+        bare = without_term(found.rig, effect)
         quiet = residuals(self.outer, bare)
         form = found.events.form if found.events else ""
-        known = {n: found.values[f"{effect}.{n}"] for n in EFFECTS[effect].form(form).shared}
+        known = {n: found.values[f"{effect}.{n}"] for n in info_of(effect).form(form).shared}
         events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
             return self.judged(effects, found, quiet)
@@ -328,7 +332,6 @@ class Attempts:
             events=found.events,
             evaluations=self.settings.transients.evaluations_beside,
         )
-        happened = next(iter(found.events.values.values()))
         parts = {
             n: (found.values[n], found.std[n])
             for n in found.values
@@ -337,7 +340,7 @@ class Attempts:
         return replace(
             again,
             effects=(*beside.effects, effect),
-            rig=again.rig.with_effect(effect, happened, form=found.events.form),
+            rig=found.events.put_into(again.rig, next(iter(found.events.values))),
             values=again.values | {n: v for n, (v, _) in parts.items()},
             std=again.std | {n: s for n, (_, s) in parts.items()},
         )
@@ -472,7 +475,7 @@ class Attempts:
         some parameters freed; the rest as in :func:`pamrs.diagnosis.fit.fit`.
         """
         free, held, forms = parts_of(starts)
-        return fit(
+        found = fit(
             self.inner,
             self.nominal,
             tuple(start.effect for start in starts),
@@ -486,6 +489,9 @@ class Attempts:
             freed=wrong,
             forms=forms,
         )
+        if _emptier_than_empty(self.inner, found):
+            raise SimulationError("a pressure behind a slow gauge is below the ambient")
+        return found
 
     def _moved_alone(self, names: tuple[str, ...]) -> Fit:
         """Some parameters freed and fitted in a few steps with the others at their nominal values,
@@ -727,6 +733,31 @@ def _typical(name: str) -> float:
     return max(
         parameter.default or parameter.starts[-1], parameter.lower, 1e-3 * parameter.starts[0]
     )
+
+
+def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
+    """Whether the pressures behind a gauge that reads late (what it reads and its lag times the
+    slope of that) lie below the ambient for a while, where nothing that was recorded does: such a
+    lag stands for how the chamber empties.
+    """
+    settings = problem.settings.evidence
+    for entry in found.rig.effects:
+        if "reading" not in ports_of(entry) or term_in(entry) not in found.effects:
+            continue
+        lag = entry["parameters"]["time_constant"]
+        for prepared in problem.recordings:
+            for name, (value, slope) in prepared.signals.items():
+                block = name.partition(".")[2]
+                rows = prepared.recording.mask[name]
+                if channel_of(name) != "muscle_pressure" or not rows.any():
+                    continue
+                if entry.get("at", "") not in ("", block):
+                    continue
+                behind = np.quantile((value + lag * slope)[rows], settings.emptier_share)
+                lowest, highest = value[rows].min(), value[rows].max()
+                if behind < min(0.0, lowest) - settings.emptier_part * highest:
+                    return True
+    return False
 
 
 def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:

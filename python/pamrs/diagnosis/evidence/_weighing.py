@@ -533,12 +533,13 @@ def _trusted(
 
 def _pliable(candidate: Candidate) -> bool:
     """Whether it takes up a good part of anything: values of the baseline, and what happens
-    differently in every recording.
+    differently in every recording; a line or a curve over its whole length does not.
     """
     events = candidate.fit.events
-    return bool(candidate.wrong) or (
-        events is not None and not EFFECTS[events.effect].leading.same_everywhere
-    )
+    if events is None:
+        return bool(candidate.wrong)
+    info = info_of(events.effect)
+    return bool(candidate.wrong) or not (info.own or info.leading.same_everywhere)
 
 
 def capped(odds: float, most: float) -> float:

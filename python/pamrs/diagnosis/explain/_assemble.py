@@ -55,12 +55,13 @@ from pamrs.diagnosis.fit import (
     residuals,
     with_entry,
     with_known,
+    without_term,
 )
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual, Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
-from pamrs.effects import CATALOGUE, EFFECTS, id_of, info_of, is_effect, place_of, term_in
+from pamrs.effects import CATALOGUE, id_of, info_of, is_effect, place_of, term_in
 from pamrs.errors import SimulationError
 from pamrs.findings import (
     HEALTHY,
@@ -407,7 +408,7 @@ def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residua
     says.
     """
     return residuals(
-        problem, rig if events is None else rig.without_effect(events.effect), (), events
+        problem, rig if events is None else without_term(rig, events.effect), (), events
     )
 
 
@@ -764,7 +765,7 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     if events is None or events.effect != effect:
         return []
     found = []
-    rises = [p.name for p in EFFECTS[effect].with_role("rise")]
+    rises = [p.name for p in info_of(effect).with_role("rise")]
     for recording, values in events.values.items():
         for parameters in events_of(effect, events.form):
             own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}

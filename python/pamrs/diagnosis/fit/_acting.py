@@ -78,7 +78,7 @@ def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
         Those that are judged together.
     """
     info = EFFECTS[effect]
-    if not info.at or info.last_only or info.transient:
+    if not info.at or info.last_only or (info.transient and not info.own):
         return []
     found = [
         name

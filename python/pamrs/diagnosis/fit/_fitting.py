@@ -20,6 +20,7 @@ from pamrs._losses import Losses
 from pamrs.diagnosis.fit._acting import acts_in, core_names, depends
 from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._starts import without_term
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
 from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of, usual_values
@@ -106,7 +107,7 @@ class Events:
     Attributes
     ----------
     effect : str
-        Its id.
+        Its id, with a place where it acts at one block of several.
     values : dict of str to dict
         Its parameters (SI) by recording; a recording without an entry has none.
     form : str
@@ -120,8 +121,9 @@ class Events:
     def put_into(self, rig: Rig, recording: str) -> Rig:
         """A rig with what happened in one recording, and without it where nothing did."""
         own = self.values.get(recording)
-        rig = rig.without_effect(self.effect)
-        return rig.with_effect(self.effect, own, form=self.form) if own else rig
+        rig = without_term(rig, self.effect)
+        at = place_of(self.effect)
+        return rig.with_effect(id_of(self.effect), own, at=at, form=self.form) if own else rig
 
 
 @dataclass(frozen=True, eq=False)

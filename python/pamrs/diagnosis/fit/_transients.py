@@ -1,5 +1,6 @@
 """Effects that happen at times of their own in every recording: pushes from outside, a payload that
-changes; and those that repeat, with a phase of their own: a vibration.
+changes; those that repeat, with a phase of their own: a vibration; and those with a size of their
+own: a zero that drifts.
 
 No parameter that all recordings share can describe them. In each recording a pulse or a step of a
 typical size is moved through time; where its signature takes most of the residual a fit begins. On
@@ -10,6 +11,7 @@ only if little is left.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -34,7 +36,7 @@ from pamrs.diagnosis.fit._shaken import Shaken
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.diagnosis.settings import TransientSettings
-from pamrs.effects import EFFECTS, EffectParameter, find_parameter
+from pamrs.effects import EffectParameter, find_parameter, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -54,8 +56,10 @@ def events_of(effect: str, form: str = "") -> list[list[EffectParameter]]:
     form : str
         Its form; the usual one where it is empty.
     """
-    shape, leading = EFFECTS[effect].form(form), EFFECTS[effect].leading.name
+    shape, leading = info_of(effect).form(form), info_of(effect).leading.name
     own = shape.parameters
+    if shape.own:
+        return [list(own)]
     first = [
         p
         for p in own
@@ -84,7 +88,9 @@ def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
         "rise": settings.rise_scale,
     }
     first = _first_of(effect, parameter)
-    usual = settings.frequency_scale if first.unit == "Hz" else _tried(EFFECTS[effect].leading)
+    usual = settings.frequency_scale if first.unit == "Hz" else _tried(info_of(effect).leading)
+    if info_of(effect).own:
+        return _tried(first)
     return scales.get(first.role, usual)
 
 
@@ -113,8 +119,9 @@ def fit_events(
         None where nothing was found.
     """
     rig, base = baseline.rig, baseline.residuals
-    forms = [form for form in EFFECTS[effect].forms if form.transient]
-    found = look_for_events(effect, problem, rig, base, inflation)
+    forms = [form for form in info_of(effect).forms if form.transient]
+    timed = not info_of(effect).own
+    found = look_for_events(effect, problem, rig, base, inflation) if timed else None
     shaken = None
     least, last = problem.settings.transients.least_gain, None
     # what repeats begins at frequencies; other events begin where those of the usual form are
@@ -122,6 +129,8 @@ def fit_events(
         if form.periodic:
             shaken = shaken or Shaken.of(effect, problem, rig, base, inflation)
             begun = shaken.best(form.name)
+        elif form.own:
+            begun = _drifting(effect, form.name, problem, rig, base, inflation)
         else:
             usual = found if last is None else last.events
             begun = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
@@ -136,7 +145,7 @@ def fit_events(
     return replace(
         last,
         effects=(effect,),
-        rig=last.rig.with_effect(effect, first, form=last.events.form),
+        rig=last.events.put_into(last.rig, next(iter(last.events.values))),
         values=last.values | values,
     )
 
@@ -148,7 +157,7 @@ def _in_form(events: Events, form: str) -> Events:
     effect = events.effect
     values = {}
     for name, own in events.values.items():
-        told = {p.name: own.get(p.name, _tried(p)) for p in EFFECTS[effect].form(form).parameters}
+        told = {p.name: own.get(p.name, _tried(p)) for p in info_of(effect).form(form).parameters}
         new = [p for event in events_of(effect, form) for p in event if p.name not in own]
         early = sum(0.5 * told[p.name] for p in new if p.role == "duration")
         later = [p.name for event in events_of(effect, form) for p in event if p.role == "time"]
@@ -190,8 +199,8 @@ def look_for_events(
         None where no recording has one.
     """
     known = dict(known or {})
-    size = known.get(EFFECTS[effect].leading.name)
-    periodic = EFFECTS[effect].form(form).periodic
+    size = known.get(info_of(effect).leading.name)
+    periodic = info_of(effect).form(form).periodic
     shaken = (
         Shaken.of(effect, problem, rig, base, inflation, known).best(form) if periodic else None
     )
@@ -201,6 +210,8 @@ def look_for_events(
         name = prepared.recording.name
         if periodic:
             return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
+        if info_of(effect).own:
+            return _drifting(effect, form, alone, rig, base, inflation, known)
         own = {key: r for key, r in base.items() if key[1] == name}
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
         begun = Events(effect, {name: started}) if started else None
@@ -228,6 +239,42 @@ def look_for_events(
     return Events(effect, values, form) if values else None
 
 
+def _drifting(
+    effect: str,
+    form: str,
+    problem: Problem,
+    rig: Rig,
+    base: dict[Key, Residual],
+    inflation: dict[str, float],
+    known: Mapping[str, float] | None = None,
+) -> Events | None:
+    """Sizes of an effect that is another one in each recording, by its signature in each; without
+    those in which it is not worth it, None where it is in none.
+    """
+    info, settings, values = info_of(effect), problem.settings.transients, {}
+    leading = info.leading
+    shapes = [
+        [(p.name, x) for x in ([known[p.name]] if known and p.name in known else p.starts)]
+        for p in info.form(form).parameters
+        if p is not leading and p.name != leading.name
+    ]
+    for prepared in problem.recordings:
+        alone, name = replace(problem, recordings=[prepared]), prepared.recording.name
+        own = {key: r for key, r in base.items() if key[1] == name}
+        rows, _ = stacked(alone, own, inflation)
+        least = max(settings.least_gain, settings.least_share * float(rows @ rows))
+        for shape in itertools.product(*shapes):
+            tried = {leading.name: _tried(leading), **dict(shape)}
+            there = Events(effect, {name: tried}, form).put_into(rig, name)
+            moved, _ = stacked(alone, changes(alone, there, own, effect), inflation)
+            gain = _gain(rows, moved - rows, scaled=True)
+            if gain >= least:
+                least = gain
+                size = -float(rows @ (moved - rows)) / float(np.sum((moved - rows) ** 2))
+                values[name] = tried | {leading.name: size * tried[leading.name]}
+    return Events(effect, values, form) if values else None
+
+
 def _scan(
     effect: str,
     problem: Problem,
@@ -242,7 +289,7 @@ def _scan(
     it.
     """
     settings, slots = problem.settings.transients, len(events_of(effect))
-    typical = _tried(EFFECTS[effect].leading)
+    typical = _tried(info_of(effect).leading)
     length = prepared.n * prepared.dt
     times = np.arange(settings.first_time, length - settings.last_time, settings.spacing)
     rows, _ = stacked(problem, base, inflation)
@@ -325,7 +372,7 @@ def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float
             first = _first_of(effect, parameter.name)
             told = {"time": time, "duration": _tried(first)}
             values[parameter.name] = told.get(first.role, size)
-    return values | {p.name: _tried(p) for p in EFFECTS[effect].with_role("rise") if values}
+    return values | {p.name: _tried(p) for p in info_of(effect).with_role("rise") if values}
 
 
 def _fitted(
@@ -379,6 +426,8 @@ def _limits(
         "rise": (settings.least_rise, settings.most_rise),
     }
     size = max(info.lower, -settings.most_size), min(info.upper, settings.most_size)
+    if info_of(effect).own:
+        size = info.lower, info.upper
     return limits.get(_first_of(effect, parameter).role, size)
 
 
@@ -472,7 +521,7 @@ class _Joint:
     ) -> _Joint:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
-        shared = EFFECTS[effect].form(events.form).shared
+        shared = info_of(effect).form(events.form).shared
         names = list(baseline.moved)
         places = [("", p) for p in shared] + [
             (name, p) for name, own in events.values.items() for p in own if p not in shared

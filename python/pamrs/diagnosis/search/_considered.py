@@ -76,7 +76,7 @@ def _added(
     if beside.fit.events is not None:
         return None  # beside events nothing else is fitted
     if not info.lasting:
-        return trial.transient(id_of(effect), beside)
+        return trial.transient(effect if info.own else id_of(effect), beside)
     begun = [trial.start_of(beside.fit, e) for e in beside.effects]
     short: dict[str, list[Candidate]] = {}
     for one in _starts(trial, screened, beside, effect):

@@ -69,7 +69,16 @@ from pamrs.diagnosis.search._sets import (
 )
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.diagnosis.settings import SearchSettings
-from pamrs.effects import CATALOGUE, EFFECTS, EffectInfo, SameData, exclude, id_of, info_of
+from pamrs.effects import (
+    CATALOGUE,
+    EFFECTS,
+    EffectInfo,
+    SameData,
+    exclude,
+    id_of,
+    info_of,
+    place_of,
+)
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -297,7 +306,10 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
     marginal = _marginal(refit)
     acting = _acting(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
-    transient = [] if marginal else [e for e in acting if e in EFFECTS and EFFECTS[e].transient]
+    happens = [e for e in acting if e in EFFECTS and EFFECTS[e].transient and not EFFECTS[e].own]
+    transient = [] if marginal else happens
+    # gauges do not drift together
+    own = [e for e in acting if info_of(e).own and (place_of(e) or len(trial.terms_of(e)) == 1)]
     persistent = [e for e in acting if info_of(e).lasting]
     part = trial.inner.losses.part
     mistaken = part(
@@ -312,7 +324,7 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
         max(p.n * p.dt for p in trial.inner.recordings),
         visited(trial.inner),
     )
-    candidates = _hypotheses(refit, screened, mistaken, transient, terms, tell)
+    candidates = _hypotheses(refit, screened, mistaken, (own, transient), terms, tell)
     candidates, weighed = _weighed(trial, screened, candidates, terms, tell)
     return _Mismatch(refit, mismatch, screened, terms, marginal, candidates, weighed, tell)
 
@@ -456,14 +468,15 @@ def _hypotheses(
     refit: _Refit,
     screened: Screen,
     mistaken: list[Candidate],
-    transient: list[str],
+    happening: tuple[list[str], list[str]],
     terms: _Terms,
     tell: Say,
 ) -> list[Candidate]:
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
-    that are wrong.
+    that are wrong. ``happening`` are effects with sizes, and with times, of their own in each
+    recording.
     """
-    trial, start = refit.trial, refit.start
+    (own, transient), trial, start = happening, refit.trial, refit.start
 
     alone = partial(
         log_weight,
@@ -477,6 +490,7 @@ def _hypotheses(
     part = trial.inner.losses.part
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _with_same_data(trial, start, singles, terms.seconds), singles)
+    singles += [c for e in own if (c := trial.transient(e, start)) is not None]
     value = max(mistaken, key=alone, default=None)
     leads = value is not None and all(alone(c) <= alone(value) for c in singles)
     weight = partial(alone, value=value if leads else None)

@@ -50,6 +50,23 @@ class EvidenceSettings(SettingsGroup):
         reason="share that may be left of a mismatch that hardly is one, for a set to explain it",
         origin="docs/decisions/0021: what explains it has to take 30 % of it",
     )
+    emptier_share: float = setting(
+        0.05,
+        unit="1",
+        least=0.0,
+        most=1.0,
+        reason="share of the samples of a recording in which the pressure behind a late gauge may "
+        "be impossible: edges are smoothed, and their slopes too large",
+        origin="judgement",
+    )
+    emptier_part: float = setting(
+        0.02,
+        unit="of the highest pressure",
+        least=0.0,
+        reason="how far below the ambient that pressure has to be: more than noise of the slope",
+        origin="a tank that empties through a capillary, whose gauge seemed to lag by 0.38 s: 13 "
+        "to 16 % below",
+    )
     looks: float = setting(
         12.0,
         unit="1",

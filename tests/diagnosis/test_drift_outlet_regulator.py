@@ -1,0 +1,130 @@
+"""An outlet that is no orifice, zeros that drift, a regulator that waits and has limits: each is
+named.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.recordings import Recording, load_case
+from pamrs.rig import Rig, parse_rig
+from tests.diagnosis.noisy import noisy
+
+FAULTS = Path(__file__).parents[1] / "faults"
+REGULATED = """
+schema = "pamrs.rig/1"
+name = "regulated"
+[gas]
+[supply]
+kind             = "regulator"
+initial_pressure = { value = 0.5, unit = "bar" }
+time_constant    = { value = 0.03, unit = "s", tol = 0.01 }
+[line]
+kind     = "tube"
+length   = { value = 1.0, unit = "m", tol = 0.02 }
+diameter = { value = 6.0, unit = "mm", tol = 0.05 }
+[chamber]
+dead_volume = { value = 0.1, unit = "l", tol = 0.002 }
+alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
+alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
+alpha       = { value = 1.2, unit = "1" }
+"""
+NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
+SLEW, DELAY = "supply_regulator_slew", "supply_regulator_delay"
+
+
+def diagnosed(rig: Rig, recordings: list[Recording]) -> pamrs.Diagnosis:
+    return pamrs.diagnose(pamrs.Case("case", rig, recordings, Path()))
+
+
+def steps_of(rig: Rig, role: str, seed: int) -> Recording:
+    """Eight seconds at 200 Hz of steps of the set pressure."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 8.0, 0.005)
+    levels = np.concatenate([[0.5e5], rng.uniform(0.5e5, 6e5, 15)])  # at rest before the log
+    command = levels[(time / 0.5).astype(int)]
+    run = pamrs.simulate(rig, supply_command=command, sample_time=0.005)
+    channels = {"supply_command": command} | {name: run[name] for name in NOISE}
+    return noisy(f"r{seed}", role, 0.005, channels, NOISE, [7, seed])
+
+
+def regulated(**effects: dict[str, float]) -> pamrs.Diagnosis:
+    rig = nominal = parse_rig(REGULATED)
+    for effect, values in effects.items():
+        rig = rig.with_effect(effect, values)
+    return diagnosed(
+        nominal, [steps_of(rig, role, k) for k, role in enumerate(("fit", "held_out"))]
+    )
+
+
+def test_dead_time_and_slew_limits_of_a_regulator_are_found_without_a_guess() -> None:
+    found = regulated(
+        supply_regulator_delay={"delay": 0.024},
+        supply_regulator_slew={"rise_limit": 73e5, "fall_limit": 21e5},
+    )
+    best = max(found.probabilities, key=lambda key: found.probabilities[key])
+    # a late clock of the pressures is the same data as a dead time
+    assert best == f"{DELAY}+{SLEW}"
+    sizes = {name: p.value for e in found.effects for name, p in e.parameters.items()}
+    assert sizes["delay"] == pytest.approx(0.024, abs=1e-3)
+    assert sizes["rise_limit"] == pytest.approx(73e5, rel=0.05)
+    assert sizes["fall_limit"] == pytest.approx(21e5, rel=0.05)
+
+
+def test_a_regulator_without_limits_has_no_name() -> None:
+    found = regulated()
+    assert not found.effects, found
+
+
+def test_an_outlet_that_is_laminar_is_no_lag_of_the_gauge() -> None:
+    found = pamrs.diagnose(load_case(FAULTS / "05_laminar_outlet"))
+    best = max(found.probabilities, key=lambda key: found.probabilities[key])
+    assert best in ("line_flow_law", "unlisted"), found
+    told = {e.id for e in found.effects}
+    assert "pressure_lag" not in told
+    if "line_flow_law" in told:
+        assert "laminar" in {e.form or "laminar" for e in found.effects}
+
+
+def test_a_load_cell_that_drifts_is_no_modulus_that_does() -> None:
+    found = pamrs.diagnose(load_case(FAULTS / "06_load_cell_drift"))
+    best = max(found.probabilities, key=lambda key: found.probabilities[key])
+    assert "load_cell_drift" in best.split("+"), found
+
+
+def stroked(role: str, seed: int, drift: float, gauge: float) -> Recording:
+    """Forty seconds of slow strokes at three held pressures, with zeros that drift [per minute]."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 42.0, 0.1)
+    held = rng.permutation([1e5, 2e5, 3e5])[(time // 14).astype(int)]
+    length = 0.25 + 0.02 * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * time / 10 + seed))
+    rig = load_case(FAULTS / "06_load_cell_drift").rig
+    run = pamrs.simulate(rig, length=length, pressure=held, sample_time=0.1)
+    channels = {
+        "length": length,
+        "muscle_pressure": held + gauge * time / 60.0,
+        "force": run["muscle_force"] + drift * time / 60.0,
+    }
+    noise = {"length": 1e-6, "muscle_pressure": 50.0, "force": 0.5}
+    return noisy(f"r{seed}", role, 0.1, channels, noise, [3, seed])
+
+
+@pytest.mark.parametrize(
+    ("effect", "sizes"), [("load_cell_drift", (9, -5)), ("gauge_drift", (3e3, -2e3))]
+)
+def test_each_recording_has_a_drift_of_its_own(effect: str, sizes: tuple[float, float]) -> None:
+    cell = effect == "load_cell_drift"
+    recordings = [
+        stroked(role, seed, size * cell, size * (not cell))
+        for (seed, role), size in zip(enumerate(("fit", "fit")), sizes, strict=True)
+    ]
+    found = diagnosed(load_case(FAULTS / "06_load_cell_drift").rig, recordings)
+    best = max(found.probabilities, key=lambda key: found.probabilities[key])
+    assert best == effect, found
+    (named,) = found.effects
+    told = {event["recording"]: event["change"] for event in named.events}
+    assert [told["r0"], told["r1"]] == pytest.approx(sizes, rel=0.15)
