@@ -725,9 +725,9 @@ def _singles(
     )
 
     if screened.strong:
-        chosen, near = _shortlisted(trial, worth, ranked, baseline, weight)
+        chosen, near, short = _shortlisted(trial, worth, ranked, baseline, weight)
     else:
-        chosen, near = [], {}
+        chosen, near, short = [], {}, {}
         for rank, places in enumerate(worth[: settings.most_singles]):
             leads = rank < settings.effects_with_starts
             close = [e for e in places if gains[e] >= settings.near_place * gains[places[0]]]
@@ -741,12 +741,27 @@ def _singles(
     found = []
     for effect in chosen:
         tried = two_at_a_time(
-            lambda start: trial.fitted([start], baseline, trial.white), near[effect]
+            lambda start: _ended(trial, start, baseline, short.get((start.effect, start.form))),
+            near[effect],
         )
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
             found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
     return found
+
+
+def _ended(
+    trial: Attempts, start: Start, baseline: Fit, short: Candidate | None
+) -> Candidate | None:
+    """An effect fitted from a start beside the baseline; where that leaves more than a few steps to
+    the same start had left, from where these had moved the baseline too.
+    """
+    found = trial.fitted([start], baseline, trial.white)
+    if short is None or (found is not None and found.misfit <= short.misfit):
+        return found
+    again = trial.fitted([start], short.fit, trial.white)
+    both = [c for c in (found, again) if c is not None]
+    return min(both, key=lambda c: c.misfit, default=None)
 
 
 def _begun(scores: Iterable[Score]) -> list[Start]:
@@ -760,9 +775,9 @@ def _shortlisted(
     ranked: dict[str, list[Score]],
     baseline: Fit,
     weight: Weight,
-) -> tuple[list[str], dict[str, list[Start]]]:
-    """Of many effects (each a list of its places) those that leave least after a few steps, and
-    where the best of these steps led.
+) -> tuple[list[str], dict[str, list[Start]], dict[tuple[str, str], Candidate]]:
+    """Of many effects (each a list of its places) those that leave least after a few steps, where
+    the best of these steps led, and what they came to, by effect and form.
 
     Signatures rank the starts of a form and rule no effect out: they are linear in what a strong
     effect is not. Each form of each effect gets a few steps from its best start, and the effects
@@ -795,7 +810,8 @@ def _shortlisted(
     )
     first.sort(key=lambda places: -most(places[0]))
     best: list[str] = []
-    starts = {}
+    starts: dict[str, list[Start]] = {}
+    ends: dict[tuple[str, str], Candidate] = {}
     for rank, places in enumerate(first):
         leads = rank < settings.effects_with_starts
         tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
@@ -806,8 +822,9 @@ def _shortlisted(
             kept = sorted(forms.values(), key=weight, reverse=True)
             count = settings.most_forms if leads else 1
             starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
+            ends |= {(effect, form_in(c.fit.rig, effect)): c for c in kept[:count]}
             best.append(effect)
-    return best, starts
+    return best, starts, ends
 
 
 def _by_family(terms: list[str]) -> list[list[str]]:
