@@ -99,22 +99,22 @@ def test_a_load_cell_that_drifts_is_no_modulus_that_does() -> None:
 def stroked(role: str, seed: int, drift: float, gauge: float) -> Recording:
     """Forty seconds of slow strokes at three held pressures, with zeros that drift [per minute]."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 42.0, 0.1)
+    time = np.arange(0.0, 42.0, 0.05)
     held = rng.permutation([1e5, 2e5, 3e5])[(time // 14).astype(int)]
     length = 0.25 + 0.02 * (2 / np.pi) * np.arcsin(np.sin(2 * np.pi * time / 10 + seed))
     rig = load_case(FAULTS / "06_load_cell_drift").rig
-    run = pamrs.simulate(rig, length=length, pressure=held, sample_time=0.1)
+    run = pamrs.simulate(rig, length=length, pressure=held, sample_time=0.05)
     channels = {
         "length": length,
         "muscle_pressure": held + gauge * time / 60.0,
         "force": run["muscle_force"] + drift * time / 60.0,
     }
     noise = {"length": 1e-6, "muscle_pressure": 50.0, "force": 0.5}
-    return noisy(f"r{seed}", role, 0.1, channels, noise, [3, seed])
+    return noisy(f"r{seed}", role, 0.05, channels, noise, [3, seed])
 
 
 @pytest.mark.parametrize(
-    ("effect", "sizes"), [("load_cell_drift", (9, -5)), ("gauge_drift", (3e3, -2e3))]
+    ("effect", "sizes"), [("load_cell_drift", (40.0, -25.0)), ("gauge_drift", (1.5e4, -1e4))]
 )
 def test_each_recording_has_a_drift_of_its_own(effect: str, sizes: tuple[float, float]) -> None:
     cell = effect == "load_cell_drift"
