@@ -11,7 +11,7 @@ use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{
-    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints, warm,
+    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints,
     Typical, FORMS, TYPICAL,
 };
 
