@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -97,6 +98,51 @@ def test_sensitivities_are_those_of_the_value_elsewhere(error: str, slope: float
     assert np.abs(alone.jacobian).max() > 1e-3
 
 
+AREA = "valve.discharge_area_max"
+AREAS = {"narrow": 3.0e-6, "wide": 8.7e-6, "between": 5.0e-6}
+
+
+def nozzles(*, error: str) -> list[Recording]:
+    """A shoulder with another nozzle in each recording, whose size nobody knows."""
+    found = []
+    nominal = SHOULDER.parameter(AREA).value
+    for k, (name, area) in enumerate(AREAS.items()):
+        time = np.arange(0.0, 10.0, DT)
+        command = 5.0 + 0.4 * np.sin(1.2 * time + k) + 0.2 * np.sin(4.4 * time)
+        run = pamrs.simulate(SHOULDER.with_parameters({AREA: area}), command, sample_time=DT)
+        channels = {"valve_command": command} | {n: run[n] for n in NOISE}
+        own = {AREA: OwnValue(nominal, nominal, error)} if error else {}
+        role = "held_out" if name == "between" else "fit"
+        found.append(noisy(name, role, DT, channels, NOISE, [37, k], own))
+    return found
+
+
+def test_a_value_of_each_recording_is_found_there() -> None:
+    found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error="own"), Path()))
+    assert found.verdict in ("none", "parameters")
+    (told,) = (w for w in found.warnings if w.startswith(f"{AREA} is free in each recording"))
+    assert "the largest is 2.9 times the smallest" in told
+    values = [float(v) for v in re.findall(r": ([\de.-]+) in narrow, ([\de.-]+) in wide", told)[0]]
+    assert values == pytest.approx([AREAS["narrow"], AREAS["wide"]], rel=0.02)
+    # the whole rig has them too
+    (run,) = found.free_run or []
+    assert run.channels["muscle_pressure"].after < 3.0 * NOISE["muscle_pressure"]
+
+
+def test_nozzles_that_nobody_told_are_no_single_value() -> None:
+    found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error=""), Path()))
+    assert found.verdict not in ("none", "parameters") or found.wrong_parameters
+
+
+def test_a_leak_of_each_day_is_a_value_of_its_own() -> None:
+    rig = SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9})
+    (record, *_) = nozzles(error="")
+    name = "leak_muscle.conductance"
+    own = replace(record, parameters={name: OwnValue(3e-9, 1e-9, "own")})
+    assert own.rig_there(rig).effects[0]["parameters"]["conductance"] == 3e-9
+    assert rig.effects[0]["parameters"]["conductance"] == 1e-9
+
+
 def written(folder: Path, parameters: str) -> Path:
     SHOULDER.to_toml(folder / "rig.toml")
     time = np.arange(0.0, 0.5, DT)
@@ -113,6 +159,16 @@ def test_a_case_file_says_them_in_any_unit(tmp_path: Path) -> None:
     (recording,) = load_case(folder).recordings
     assert recording.parameters == {NAME: OwnValue(12.0, LOADS["light"], "none")}
     assert recording.rig_there(SHOULDER).parameter(NAME).value == 12.0
+
+
+def test_a_case_file_leaves_a_value_to_the_recording(tmp_path: Path) -> None:
+    (one,) = load_case(written(tmp_path, '{ "arm.payload" = { error = "own" } }')).recordings
+    assert one.parameters == {NAME: OwnValue(LOADS["light"], LOADS["light"], "own")}
+    told = '{ "leak_muscle.conductance" = { value = 2e-9, unit = "m3/(s Pa)", error = "own" } }'
+    folder = written(tmp_path, told)
+    SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9}).to_toml(folder / "rig.toml")
+    (one,) = load_case(folder).recordings
+    assert one.parameters == {"leak_muscle.conductance": OwnValue(2e-9, 1e-9, "own")}
 
 
 @pytest.mark.parametrize(

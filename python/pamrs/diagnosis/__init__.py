@@ -40,10 +40,12 @@ from pamrs.diagnosis.prepare import (
     noted_units,
     prepare,
     said_of_beginnings,
+    said_of_own,
     said_of_tanks,
     suspected_units,
     unjudged_blocks,
     unread_tanks,
+    with_own_values,
     with_tanks,
     without_copies,
     without_impossible,
@@ -418,6 +420,7 @@ def _problems(
     blocks, core = blocks_beside_tanks(rig, channels, settings.prepare), core_rig(rig)
     tanks = unread_tanks(rig, channels, settings.prepare)
     fitted, held = ([with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held))
+    fitted, held = ([with_own_values(blocks, core, p) for p in part] for part in (fitted, held))
     judged = {b.name for b in blocks}
     every_block = unjudged_blocks(rig, channels, settings.prepare)
     without = [
@@ -464,4 +467,5 @@ def _problems(
     outer = replace(inner, recordings=held) if held else inner
     begun += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
     begun += said_of_tanks(rig, inner.blocks)
+    begun += said_of_own([*fitted, *held], settings.prepare)
     return inner, outer, unjudged, begun

@@ -15,13 +15,15 @@ import numpy as np
 
 from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
 from pamrs.channels import channel_of
+from pamrs.effects import find_parameter
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings._suspicion import ambient_of, limits_of
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
-from pamrs.rig import Rig, load_rig
+from pamrs.rig import Parameter, Rig, load_rig
+from pamrs.rig.schema import qualified
 from pamrs.units import to_si
 
 __all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
@@ -34,7 +36,7 @@ _LOG: Final = ("channels", "time", "split", "pieces")
 _DIALECT: Final = ("delimiter", "decimal", "thousands", "header")
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
 _ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
-_ERRORS: Final = ("same", "proportional", "none")
+_ERRORS: Final = ("same", "proportional", "none", "own")
 _RIG: Final = "rig.toml"
 _TURN: Final = 2.0 * np.pi
 _GIVE_BOTH: Final = (
@@ -357,6 +359,9 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
     """One of them."""
     table = dict(entry) if isinstance(entry, Mapping) else {"value": entry}
     value, unit, error = (table.pop(key, None) for key in ("value", "unit", "error"))
+    if error == "own" and value is None and unit is None and rig is not None and not table:
+        known = _known(rig, name)
+        return OwnValue(known.value, known.value, error)
     if table or isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ParameterError(
             f"{entry!r} is not allowed: a table with value, unit and maybe error is needed"
@@ -365,7 +370,7 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
         raise ParameterError(f"error = {error!r} is not allowed: {', '.join(_ERRORS)}")
     if rig is None:  # said already
         return OwnValue(float(value), float(value))
-    known = rig.parameter(name)
+    known = _known(rig, name)
     if not isinstance(unit, str):
         raise ParameterError(
             f"unit = {unit!r} is not allowed: a unit like {known.unit!r} is needed"
@@ -373,8 +378,20 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
     found = OwnValue(to_si(float(value), unit, known.unit), known.value, error or "same")
     if error == "proportional" and known.value == 0.0:
         raise ParameterError("error = 'proportional' needs a value in the rig file that is not 0")
-    rig.with_parameters({name: found.value})  # says what is possible
+    if name in rig.parameters:
+        rig.with_parameters({name: found.value})  # says what is possible
     return found
+
+
+def _known(rig: Rig, name: str) -> Parameter:
+    """A parameter of a rig, or of an effect that it holds."""
+    for entry in rig.effects:
+        full, _, short = name.rpartition(".")
+        if full == qualified(entry["id"], entry.get("at", "")) and short in entry["parameters"]:
+            info = find_parameter(f"{entry['id']}.{short}")
+            value = float(entry["parameters"][short])
+            return Parameter(name, value, info.unit, 0.0, info.lower, info.upper)
+    return rig.parameter(name)
 
 
 def _check_logs(home: Path, entries: list[Mapping[str, Any]]) -> None:

@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
 from pamrs.channels import UNITS, channel_of
+from pamrs.effects import EFFECTS
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._faults import Fault, find_faults
 from pamrs.recordings._suspicion import suspicions
+from pamrs.rig.schema import qualified
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -114,7 +116,8 @@ class OwnValue:
         What the rig file of the case says, SI.
     error : str
         What the rig file is wrong by there: ``same`` (a fit moves it by as much as elsewhere),
-        ``proportional`` (by the same share), or ``none`` (its value is exact).
+        ``proportional`` (by the same share), ``none`` (its value is exact), or ``own`` (nobody
+        knows it: it is found in this recording, and free around that).
     """
 
     value: float
@@ -123,7 +126,7 @@ class OwnValue:
 
     def at(self, elsewhere: float) -> float:
         """Its value in this recording where a model has another one elsewhere, SI."""
-        if self.error == "none":
+        if self.error in ("none", "own"):
             return self.value
         if self.error == "proportional":
             return self.value * elsewhere / self.nominal
@@ -132,7 +135,9 @@ class OwnValue:
     @property
     def slope(self) -> float:
         """How much it changes in this recording with its value elsewhere."""
-        return {"none": 0.0, "proportional": self.value / self.nominal}.get(self.error, 1.0)
+        if self.error in ("none", "own"):
+            return 0.0
+        return self.value / self.nominal if self.error == "proportional" else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +228,25 @@ class Recording:
         ParameterError
             If the rig has no such parameter, or it cannot have that value.
         """
-        values = {n: own.at(rig.parameter(n).value) for n, own in self.parameters.items()}
+        for entry in rig.effects:
+            full = qualified(entry["id"], entry.get("at", "")) + "."
+            there = {
+                n.removeprefix(full): own.at(entry["parameters"][n.removeprefix(full)])
+                for n, own in self.parameters.items()
+                if n.startswith(full)
+            }
+            if there:
+                rig = rig.with_effect(
+                    entry["id"],
+                    entry["parameters"] | there,
+                    at=entry.get("at", ""),
+                    form=entry.get("form", ""),
+                )
+        values = {
+            n: own.at(rig.parameter(n).value)
+            for n, own in self.parameters.items()
+            if n.partition(".")[0] not in EFFECTS
+        }
         return rig.with_parameters(values) if values else rig
 
     def valid(self, *channels: str) -> Mask:

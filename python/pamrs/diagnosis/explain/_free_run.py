@@ -54,10 +54,6 @@ _FREED = ("muscle_force", "joint_torque", "temperature")
 
 _COMMANDS = ("valve_command", "supply_command", "pressure_command")
 """Channels that drive a free run."""
-_LATE = 0.5
-"""Standard deviation of when a command takes effect [samples]."""
-_ROWS = 2000
-"""Samples of a channel by which what a free run misses is compared."""
 
 Stages = dict[str, dict[Key, Residual]]
 
@@ -184,8 +180,8 @@ def _left(
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:-1], strict=True))
-        late = _late(logged, _LATE * float(moved[-1]))
-        return _misses(with_known(final, values), late, logged, prepared.noise)
+        late = _late(logged, settings.off_late * float(moved[-1]))
+        return _misses(with_known(final, values), late, logged, prepared.noise, settings.off_rows)
 
     at, least = np.zeros(len(known.names) + 1), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
@@ -233,15 +229,17 @@ def _moved(
 
 
 def _misses(
-    rig: Rig, driving: Recording, logged: Recording, noise: Mapping[str, float]
+    rig: Rig, driving: Recording, logged: Recording, noise: Mapping[str, float], most: int
 ) -> dict[str, Array]:
-    """What a free run misses of each measured channel, in units of its noise, thinned."""
+    """What a free run misses of each measured channel, in units of its noise, at about so many
+    samples at the most.
+    """
     result = replay(rig, driving)
     out = {}
     for name in differences(result, logged):
         channel = recorded_as(name)
         rows = np.flatnonzero(logged.mask[channel])
-        rows = rows[:: max(1, rows.size // _ROWS)]
+        rows = rows[:: max(1, rows.size // most)]
         level = noise.get(channel, 0.0)
         if level > 0.0:
             out[name] = (result[name][rows] - logged.channels[channel][rows]) / level

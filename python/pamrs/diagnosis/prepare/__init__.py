@@ -10,7 +10,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
 (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`, `with_tanks`,
-`said_of_tanks` (tanks without a gauge, which are simulated).
+`said_of_tanks` (tanks without a gauge, which are simulated), `with_own_values`, `said_of_own`
+(values that are free in each recording).
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from pamrs.diagnosis.prepare._blocks import (
     unjudged_blocks,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
+from pamrs.diagnosis.prepare._own import said_of_own, with_own_values
 from pamrs.diagnosis.prepare._plausible import (
     check_plausible,
     check_sense,
@@ -82,6 +84,7 @@ __all__ = [
     "prepare",
     "residual",
     "said_of_beginnings",
+    "said_of_own",
     "said_of_tanks",
     "smoothed",
     "suspected_units",
@@ -93,5 +96,6 @@ __all__ = [
     "without_impossible",
     "without_poor_thermometers",
     "without_rails",
+    "with_own_values",
     "with_tanks",
 ]

@@ -873,16 +873,9 @@ def _begun_off(triangle: Array, inside: Array) -> Array:
     return np.asarray(np.linalg.pinv(triangle) @ inside, dtype=np.float64)
 
 
-def _levels(
-    block: Block,
-    core: _core.Rig,
-    prepared: Prepared,
-    prediction: Array,
-    rows: NDArray[np.bool_],
-    starts: list[tuple[int, int, Array]],
-) -> Array:
-    """What the levels of simulated drives can do to a prediction, (n, k), orthonormal, beside what
-    the starts of windows can; `core` is the rig as it was in the recording.
+def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
+    """What the level of each simulated drive does to a prediction; `core` is the rig as it was in
+    the recording.
     """
     columns = []
     for name in block.floating:
@@ -890,14 +883,32 @@ def _levels(
         step = 1e-3 * max(1.0, float(np.abs(value).max()))
         there = prepared.shaken({name: (value + step, slope)})
         bare = replace(there, recording=replace(there.recording, parameters={}))
-        column = np.where(rows, (predicted(block, core, bare) - prediction) / step, 0.0)
+        columns.append((predicted(block, core, bare) - prediction) / step)
+    return columns
+
+
+def _beside_starts(columns: list[Array], starts: list[tuple[int, int, Array]]) -> Array:
+    """What is free in a whole recording (n, k), orthonormal, beside what the starts of its windows
+    can do.
+    """
+    kept, rounding = [], float(np.finfo(np.float64).eps) ** 0.5
+    for column in columns:
+        whole = float(np.linalg.norm(column))
         for a, b, q in starts:
             column[a:b] -= q @ (q.T @ column[a:b])
-        if column.any():
-            columns.append(column / np.linalg.norm(column))
-    if not columns:
-        return np.zeros((prepared.n, 0))
-    return np.asarray(np.linalg.qr(np.array(columns).T)[0])
+        left = float(np.linalg.norm(column))
+        if left > rounding * whole:
+            kept.append(column / left)
+    if not kept:
+        return np.zeros((0, 0))
+    basis, triangle = np.linalg.qr(np.array(kept).T)
+    return np.asarray(basis[:, np.abs(np.diag(triangle)) > rounding])
+
+
+def _own(core: _core.Rig, prepared: Prepared) -> list[str]:
+    """Parameters whose value a recording has of its own and nobody knows."""
+    given = prepared.recording.parameters.items()
+    return [n for n, own in given if own.error == "own" and n in core.parameter_names]
 
 
 def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list[str]) -> Residual:
@@ -919,7 +930,8 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     least = prepared.settings.prepare.window_samples_per_state
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
-    names = parameters or [
+    own = _own(core, prepared)
+    names = list(dict.fromkeys([*parameters, *own])) or [
         next(
             (n for n in core.parameter_names if n.endswith("pressure_zero")),
             core.parameter_names[0],
@@ -938,9 +950,10 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     )
     if jacobian is None:
         raise AssertionError("the core returns a jacobian when parameters are named")
-    for name, own in prepared.recording.parameters.items():
+    free = jacobian[:, [names.index(n) for n in own]].T.copy()
+    for name, there in prepared.recording.parameters.items():
         if name in parameters:
-            jacobian[:, names.index(name)] *= own.slope
+            jacobian[:, names.index(name)] *= there.slope
     measured = np.where(
         prepared.recording.mask[block.channel], prepared.recording.channels[block.channel], 0.0
     )
@@ -970,14 +983,15 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
         value[a:b] -= correction
         shifted[a:b] += correction
         slopes -= q @ (q.T @ slopes)
-    levels = _levels(block, core, prepared, prediction, rows, bases)
-    if levels.size:
-        correction = levels @ (levels.T @ value)
+    every = [*_levels(block, core, prepared, prediction), *free]
+    of_recording = _beside_starts([np.where(rows, v, 0.0) for v in every], bases)
+    if of_recording.size:
+        correction = of_recording @ (of_recording.T @ value)
         value -= correction
         shifted += correction
-        jacobian[:, :k] -= levels @ (levels.T @ jacobian[:, :k])
-        bases.append((0, prepared.n, levels))
-    jac = jacobian[:, :k] if parameters else None
+        jacobian[:, :k] -= of_recording @ (of_recording.T @ jacobian[:, :k])
+        bases.append((0, prepared.n, of_recording))
+    jac = jacobian[:, : len(parameters)] if parameters else None
     # a whole recording is shown from its measured start; a window from the start that suits it best
     shown = prediction if block.window is None else shifted
     return Residual(value, jac, shown, rows, noise, bases, moved)

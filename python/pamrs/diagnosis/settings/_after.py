@@ -336,6 +336,20 @@ class WarningSettings(SettingsGroup):
         "known of them than they may be to explain what the whole rig misses",
         origin="judgement",
     )
+    off_late: float = setting(
+        0.5,
+        unit="samples",
+        least=0.0,
+        reason="standard deviation of when a command takes effect, within its sample",
+        origin="judgement",
+    )
+    off_rows: int = setting(
+        2000,
+        unit="count",
+        least=100,
+        reason="samples of a channel by which what the whole rig misses is compared",
+        origin="judgement: as many as tell a course of some seconds",
+    )
     off_steps: int = setting(
         2,
         unit="1",

@@ -13,6 +13,21 @@ __all__ = ["NoiseSettings", "OverlapSettings", "PlausibilitySettings", "PrepareS
 class PrepareSettings(SettingsGroup):
     """How recordings are made ready for the cut chain."""
 
+    own_steps: int = setting(
+        12,
+        unit="1",
+        least=1,
+        reason="steps in which a value is found that a recording has of its own; each moves it to "
+        "three times at the most",
+        origin="judgement: three orders of magnitude and a few steps to settle",
+    )
+    own_apart: float = setting(
+        1.5,
+        unit="1",
+        least=1.0,
+        reason="ratio of such values between recordings from which it is said",
+        origin="judgement",
+    )
     smoothing_time: float = setting(
         0.06,
         unit="s",
