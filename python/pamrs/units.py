@@ -167,7 +167,7 @@ _FROM_AMBIENT: Final = frozenset(("g", "gauge", "ü", "rel", "relative"))
 _FROM_NOTHING: Final = frozenset(("a", "abs", "absolute", "absolut"))
 _BEHIND: Final = "|".join(sorted(_FROM_AMBIENT | _FROM_NOTHING, key=len, reverse=True))
 _MEASURED_FROM = re.compile(
-    rf"(?P<unit>.+?)(?:[\s_-]*\(\s*(?P<inside>{_BEHIND})\.?\s*\)|[\s_-]*(?P<behind>{_BEHIND})\.?)",
+    rf"(?P<unit>.+?)(?:[\s_-]*\(\s*(?P<inside>{_BEHIND})\.?\s*\)|[\s_,-]*(?P<behind>{_BEHIND})\.?)",
     re.IGNORECASE,
 )
 _FACTOR = re.compile(r"(?P<symbol>[^\d\s^*·/()-]+|1|-|%)\^?(?P<power>-?\d+)?")

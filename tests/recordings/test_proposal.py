@@ -261,6 +261,39 @@ def test_sound_recordings_are_not_suspected() -> None:
     assert suspicions(held, {"muscle_pressure": "bar"}, rig) == []
 
 
+@pytest.mark.parametrize("lasting", [6.0, 12.0, 25.0])
+def test_a_curve_that_only_passes_the_ambient_pressure_is_not_called_absolute(
+    lasting: float,
+) -> None:
+    rig = pamrs.rigs.named("blow_down_tank")
+    end = 101325.0 + 5e3
+    for falling in (
+        end + 5e5 * (np.exp(-TIME / lasting) - np.exp(-TIME[-1] / lasting)),
+        end + 5e5 * (1.0 - TIME / TIME[-1]),
+        end + 2e5 * np.sin(np.pi * TIME / 5.0) ** 2,
+    ):
+        assert suspicions({"muscle_pressure": falling}, {"muscle_pressure": "bar"}, rig) == []
+    rested = 101325.0 + 5e5 * np.exp(-TIME)
+    (found,) = suspicions({"muscle_pressure": rested}, {"muscle_pressure": "bar"}, rig)
+    assert (found.likely, 'unit = "bar(a)" makes them gauge' in found.text) == ("absolute", True)
+
+
+def test_a_pressure_that_another_one_agrees_with_is_not_suspected() -> None:
+    """Whatever the rig file says that the tank once had."""
+    low = pamrs.rigs.shoulder().with_parameters({"supply.initial_pressure": 1e5})
+    muscle = np.maximum(6.2 * LIFT - 0.2, 0.0) * BAR
+    channels = {"muscle_pressure": muscle, "supply_pressure": np.full(len(TIME), 6.2 * BAR)}
+    assert suspicions(channels, {"muscle_pressure": "bar", "supply_pressure": "kPa"}, low) == []
+    alone = {"muscle_pressure": muscle}
+    assert [s.likely for s in suspicions(alone, {"muscle_pressure": "bar"}, low)] == ["psi"]
+    high = {"muscle_pressure": 10.0 * muscle, "supply_command": 10.0 * muscle}
+    units = {"muscle_pressure": "bar", "supply_command": "MPa"}
+    assert suspicions(high, units) == []
+    assert [s.likely for s in suspicions(high, units | {"supply_command": "bar"})] == ["psi"]
+    tank = pamrs.rigs.named("blow_down_tank").with_parameters({"chamber.initial_pressure": 60e5})
+    assert suspicions({"muscle_pressure": 10.0 * muscle}, {"muscle_pressure": "bar"}, tank) == []
+
+
 def test_a_regulator_goes_as_far_as_it_is_set() -> None:
     """What the rig file begins with says nothing of it."""
     rig = pamrs.rigs.named("regulated_joint").with_parameters({"supply.initial_pressure": 1e5})

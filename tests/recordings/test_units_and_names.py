@@ -72,13 +72,13 @@ GAUGES = [
     ("p_muscle [N/mm2]", 1e6), ("p_muscle [atm]", STANDARD),
     ("p_muscle {bar}", 1e5), ("p_muscle_(kPa)", 1e3), ("p_muscle <psi>", PSI),
     ("p_muscle / bar", 1e5), ("p_muscle in psi", PSI), ("p_muscle_kPa", 1e3),
-    ("p_muscle mbar", 1e2),
+    ("p_muscle mbar", 1e2), ("p_muscle/kPa", 1e3),
 ]  # fmt: skip
 ABSOLUTE = [
     ("p_muscle [bar(a)]", 1e5), ("p_muscle (bar(a))", 1e5), ("p_muscle [bara]", 1e5),
     ("p_muscle [psi(a)]", PSI), ("p_muscle [PSIA]", PSI), ("p_muscle [kPa abs]", 1e3),
     ("p_muscle [hPa(a)]", 1e2), ("p_muscle [mmHg abs.]", MERCURY), ("p_muscle_bar_abs", 1e5),
-    ("p_muscle_abs [bar]", 1e5), ("p_muscle bar(a)", 1e5),
+    ("p_muscle_abs [bar]", 1e5), ("p_muscle bar(a)", 1e5), ("p_muscle (bar, abs)", 1e5),
 ]  # fmt: skip
 
 
@@ -129,6 +129,18 @@ def test_what_is_no_unit_of_pressure_is_left_and_told(
     toml = proposal.case_toml(tmp_path)
     assert f"# {text}:\n# muscle_pressure = {{ column = " in toml  # a line to fill in
     assert ("from = [4.0, 20.0]" in toml) == ("mA" in told)
+
+
+@pytest.mark.parametrize("unit", ["bar(a)", "(bar(a))", "[bar abs]"])
+def test_a_row_of_units_below_the_headings(tmp_path: Path, unit: str) -> None:
+    file = log(tmp_path, {"p_muscle": (GAUGE + STANDARD) / 1e5, "angle": ANGLE, "x": ANGLE})
+    head, _, rest = file.read_text(encoding="utf-8").partition("\n")
+    for odd in ("mm", "%", "zz"):  # one that is not known does not make them headings
+        lines = [head.replace("time [s]", "time"), f"s;{unit};deg;{odd}", rest]
+        file.write_text("\n".join(lines), encoding="utf-8")
+        proposal = propose([file], SHOULDER)
+        np.testing.assert_allclose(pressure(tmp_path, proposal)[0], GAUGE, atol=2.0)
+        assert [each.unit for each in proposal.logs[0].listed][2] == "deg"
 
 
 def test_a_calibration_in_the_heading_is_taken(tmp_path: Path) -> None:
@@ -203,6 +215,8 @@ NAMES = [
     ({"Set 1/p1 [bar]": "muscle_pressure"}, ""),
     ({"p1 [bar]": "muscle_pressure", "p2 [bar]": ""}, "not found in this log: "),
     ({"pressure sensor [V]": "", "angle [deg]": "joint_angle"}, ""),
+    ({"p_ref": "", "u": "valve_command"}, "p_ref is called like a command"),
+    ({"Kraftsensor [V]": "", "p [bar]": "muscle_pressure"}, ""),
     ({"torque [V]": "", "p [bar]": "muscle_pressure"}, "is in V: give from and to"),
     ({"force [kg]": "", "p [bar]": "muscle_pressure"}, ""),
 ]

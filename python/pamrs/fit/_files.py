@@ -98,11 +98,7 @@ def read_map(
     delimiter = delimiter or _delimiter(file)
     table = _table(file, delimiter, columns)
     headings, lines = _renamed(table, columns, source)
-    found, strange = _understood(headings, source)
-    found = {
-        name: column._replace(line=lines.get(column.position, column.line))
-        for name, column in found.items()
-    }
+    found, strange = _understood(headings, lines, source)
     decimal = decimal or decimal_of(_texts(table, found), source)
     wanted = {heading: str(value) for heading, value in (where or {}).items()}
     title = name or "_".join([file.name.removesuffix(".gz").rsplit(".", 1)[0], *wanted.values()])
@@ -294,7 +290,9 @@ def _split(heading: str) -> tuple[str, str | None]:
     return (plain, unit) if plain in _UNITS else (text, None)
 
 
-def _understood(headings: Sequence[str], source: str) -> tuple[dict[str, _Column], list[str]]:
+def _understood(
+    headings: Sequence[str], lines: Mapping[int, Calibration], source: str
+) -> tuple[dict[str, _Column], list[str]]:
     """Columns by channel, and the headings that are none."""
     problems: list[str] = []
     found: dict[str, _Column] = {}
@@ -324,7 +322,7 @@ def _understood(headings: Sequence[str], source: str) -> tuple[dict[str, _Column
             to_si(1.0, unit, _UNITS[channel])
         except ParameterError as error:
             problems.append(f"column {heading!r}: {error}")
-        found[channel] = _Column(index, heading, unit)
+        found[channel] = _Column(index, heading, unit, lines.get(index, Calibration()))
     if not problems:
         lacking = [] if {"length", "contraction"} & set(found) else ["length"]
         lacking += [channel for channel in ("pressure", "force") if channel not in found]

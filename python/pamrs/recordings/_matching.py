@@ -40,7 +40,7 @@ _WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
     channel: (frozenset(strong.split()), frozenset(weak.split()))
     for channel, strong, weak in (
         ("valve_command", "valve ventil servo spool uvalve", f"u ao voltage volt input {_SET}"),
-        ("supply_command", "setpoint regulator regler psoll pset", f"supply p pressure {_SET}"),
+        ("supply_command", "setpoint regulator regler psoll pset", f"supply {_SET}"),
         (
             "supply_pressure",
             "supply tank reservoir source versorgung psup ps psupply ptank vorrat speise kessel "
@@ -85,6 +85,12 @@ _NEEDED: Final = frozenset(
     ("muscle_pressure", "valve_command", "supply_command", "joint_angle", "length", "force")
 )
 _COMMANDS: Final = frozenset({"valve_command", "supply_command", "pressure_command", "reference"})
+#: Words of what no valve and no regulator is commanded in.
+_QUANTITIES: Final = frozenset(
+    word
+    for channel in ("joint_angle", "length", "force", "joint_torque", "temperature")
+    for word in _WORDS[channel][0]
+)
 #: Channels of files that are played, which no log has.
 _PLAYED: Final = frozenset({"pressure_command"})
 _NOT: Final = frozenset(
@@ -403,7 +409,7 @@ def _score(series: Series, name: str, several: bool) -> float:
         if not _measures(written, channel):
             electric = any(same_dimension(written.unit, unit) for unit in _READINGS)
             weighed = channel == "force" and same_dimension(written.unit, "kg")
-            return score - 1.0 if (electric or weighed) and score >= _STRONG else 0.0
+            return 0.5 * score if electric or weighed else 0.0
         score += 2.0
     if channel == "ambient_pressure" and written is not None and not _like_weather(good, written):
         return 0.0
@@ -427,6 +433,9 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
     named = channel in "_".join(words_of(series.name))
     score = _STRONG * len(strong & words) + 1.0 * len(weak & words)
     if channel in PRESSURES and _WORDS["ambient_pressure"][0] & words:
+        return 0.0
+    others = _QUANTITIES | (frozenset(_PRESSURE.split()) if channel == "valve_command" else set())
+    if channel in ("valve_command", "supply_command") and others & words and not strong & words:
         return 0.0
     if channel in _ONLY_STRONG and not (strong & words or named):
         return 0.0

@@ -15,7 +15,7 @@ from pamrs.errors import RecordingError
 from pamrs.recordings.logs._dates import is_moment, moments
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
 from pamrs.recordings.logs._serial import arrows_apart, labelled_rows
-from pamrs.recordings.logs._words import split_heading, understood_unit
+from pamrs.recordings.logs._words import split_heading, understood_unit, unwrapped
 from pamrs.recordings.table import (
     NO_VALUE,
     numbers_in,
@@ -347,7 +347,7 @@ def _headings(
         return [f"{_UNNAMED}{i + 1}" for i in range(width)], [""] * width, []
     full = full or [comment or []]
     used = full[-1:]
-    last = [cell.strip("[]() ") for cell in full[-1]]
+    last = [unwrapped(cell) for cell in full[-1]]
     units = [""] * width
     if len(full) > 1 and _all_units(last):
         units = ([*last, *[""] * width])[:width]
@@ -358,8 +358,9 @@ def _headings(
 
 
 def _all_units(cells: list[str]) -> bool:
+    """Whether a row is one of units: more than half of what it says are some that are known."""
     said = [cell for cell in cells if cell not in ("", "-", "1", "%")]
-    return bool(said) and all(understood_unit(cell) for cell in said)
+    return 2 * sum(understood_unit(cell) is not None for cell in said) > len(said)
 
 
 def _named(headings: list[str]) -> tuple[list[str], list[str]]:

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 from pamrs.errors import ParameterError
 from pamrs.units import measured_from, parse_unit
 
-__all__ = ["Written", "split_heading", "understood_unit"]
+__all__ = ["Written", "split_heading", "understood_unit", "unwrapped"]
 
 _PAIRS: Final = {"[": "]", "(": ")", "{": "}", "<": ">"}
 _BRACKETS = re.compile(
@@ -16,6 +16,7 @@ _BRACKETS = re.compile(
     r"|(?P<other>\((?:[^()]|\([^()]*\))*\)|\{[^{}]*\}|<[^<>]*>))\s*$"
 )
 _SLASH = re.compile(r"^\s*(?P<name>.+?)\s+(?:/|in)\s*(?P<unit>[^\s/]+)\s*$")
+_DIVIDED = re.compile(r"^\s*(?P<name>[^/]+)/(?P<unit>[^/\s]+)\s*$")  # as DIN has it, U/V
 _TAIL = re.compile(
     r"^\s*.+?[_.\s-](?P<unit>(?P<alone>[A-Za-z°]+(?:[2-3]?[A-Za-z]*)?)"
     r"(?:[_\s-]*\(?(?:a|g|abs|gauge)\)?)?)\s*$"
@@ -106,7 +107,7 @@ def understood_unit(text: str) -> Written | None:
     """
     if len(text) > _LONGEST:
         return None
-    plain = _unwrapped(text.translate(_PLAIN))
+    plain = unwrapped(text.translate(_PLAIN))
     if not plain or plain == "1" or plain.lower() in _COUNTS or plain in ("a", "g", "l", "-"):
         return None
     calibration = _CALIBRATION.fullmatch(plain)
@@ -127,7 +128,7 @@ def understood_unit(text: str) -> Written | None:
 _PLAIN: Final = str.maketrans({"²": "2", "³": "3", "₂": "2", "\N{MICRO SIGN}": "u", "μ": "u"})
 
 
-def _unwrapped(text: str) -> str:
+def unwrapped(text: str) -> str:
     """A text without brackets around all of it."""
     plain = text.strip()
     while len(plain) > 1 and _PAIRS.get(plain[0]) == plain[-1] and _closed(plain[1:-1]):
@@ -167,7 +168,7 @@ _ELECTRIC: Final = tuple(parse_unit(unit).dimension for unit in ("A", "V"))
 
 
 def split_heading(heading: str) -> tuple[str, str]:
-    """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1_{bar}``, ``p1 / bar``, ``p1 in
+    """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1_{bar}``, ``p1/bar``, ``p1 in
     bar``, ``p1_bar``, ``p1 bar``.
 
     Parameters
@@ -190,6 +191,9 @@ def split_heading(heading: str) -> tuple[str, str]:
             return match["name"], unit.strip()
     match = _SLASH.match(heading)
     if match and understood_unit(match["unit"]):
+        return match["name"], match["unit"]
+    match = _DIVIDED.match(heading)
+    if match and match["unit"] in _TAILS | {"m", "A", "°"}:
         return match["name"], match["unit"]
     match = _TAIL.match(heading)
     if match and match["alone"] in _TAILS and understood_unit(match["unit"]):
