@@ -205,7 +205,17 @@ CLOCKS = {
         table("seconds,millis", lambda i: f"{7 + i // 50},{20 * (i % 50)}"),
         ("seconds and millis are one clock",),
     ),
-    "German dates": Case(DE.replace(".0", ".0")),
+    "dates and milliseconds": Case(
+        table(
+            "Zeitstempel,ms",
+            date("%d.%m.%Y %H:%M:%S,%f"),
+        ),
+        ("Zeitstempel and ms are one clock, here Zeitstempel",),
+    ),
+    "dates beside a finer clock": Case(
+        table("Timestamp,Elapsed ms", lambda i: f"{date('%m/%d/%Y %I:%M:%S %p')(i)},{20 * i}")
+    ),
+    "German dates": Case(DE),
     "ISO": Case(table("when", date("%Y-%m-%dT%H:%M:%S.%fZ"))),
     "ISO with a zone": Case(table("datetime", date("%Y-%m-%d %H:%M:%S.%f+01:00", digits=6))),
     "American dates": Case(table("Moment", date("%m/%d/%Y %I:%M:%S.%f %p"))),

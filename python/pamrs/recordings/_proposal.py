@@ -346,6 +346,9 @@ def _like_a_clock(series: Series) -> bool:
     words = words_of(series.name)
     called = bool(words) and (words[-1] in CLOCK_WORDS or words[0] in CLOCK_WORDS)
     called |= series.stamps or words == ["x", "value"]  # LabVIEW calls its time X_Value
+    known = understood_unit(series.unit)
+    if known is not None and not same_dimension(known.unit, "s"):
+        return False
     good = series.values[np.isfinite(series.values)]
     if series.labels or not called or len(good) < 2:
         return False
@@ -368,7 +371,7 @@ class _Clocks:
 
     def _column(self, series: Series) -> dict[str, Any]:
         """The key ``time`` for a series without a clock: the one of its length nearest by name,
-        stamps of messages before those of their arrival.
+        fine ones before coarse ones, stamps of messages before those of their arrival.
         """
         if series.time is not None or series in self._rising:
             return {}
@@ -376,9 +379,10 @@ class _Clocks:
         if not fitting:
             return {}
 
-        def rank(other: Series) -> tuple[int, int, int]:
+        def rank(other: Series) -> tuple[bool, int, bool, int]:
+            fine = 2 * len(np.unique(other.values)) > len(other.values)
             near = len(os.path.commonprefix([other.name, series.name]))
-            return near, "header" in words_of(other.name), -len(other.name)
+            return fine, near, "header" in words_of(other.name), -len(other.name)
 
         best = max(fitting, key=rank)
         known = understood_unit(best.unit)

@@ -204,15 +204,13 @@ def _join(log: Log, name: str) -> None:
     whole = log.series.get(name)
     for other, rest in list(log.series.items()):
         beyond = _BEYOND.get(_parted(other)[1])
-        prefixes = (before, before.replace("tv_", ""))
-        if whole is None or beyond is None or _parted(other)[0] not in prefixes:
+        if whole is None or beyond is None or len(whole.values) != len(rest.values):
             continue
-        if word not in _SECONDS or len(whole.values) != len(rest.values):
+        alike = _parted(other)[0] in (before, before.replace("tv_", "")) and word in _SECONDS
+        if not (alike or whole.stamps) or not _parts_of_a_second(whole.values, rest.values, beyond):
             continue
-        if not _parts_of_a_second(whole.values, rest.values, beyond):
-            continue
-        stem = before.strip(" ._-/") or "stamp"
-        joined = f"{stem} stamp" if stem in log.series else stem
+        stem = name if whole.stamps else before.strip(" ._-/") or "stamp"
+        joined = f"{stem} stamp" if stem in log.series and stem != name else stem
         values = whole.values + beyond * rest.values
         made = Series(joined, values, "s", whole.time, stamps=True)
         why = f"it is part of the clock {joined}"
@@ -232,7 +230,8 @@ def _parts_of_a_second(whole: Array, beyond: Array, scale: float) -> bool:
     rest = beyond[good] * scale
     if not good.any() or np.any(np.diff(whole[good]) < 0.0) or np.ptp(rest) == 0.0:
         return False
-    return bool(np.all(whole[good] % 1.0 == 0.0) and rest.min() >= 0.0 and rest.max() < 1.0)
+    parts = bool(np.all(whole[good] % 1.0 == 0.0) and rest.min() >= 0.0 and rest.max() < 1.0)
+    return parts and bool(np.mean(np.diff(whole[good] + rest) >= 0.0) > 0.9)
 
 
 def numbers_of(values: Any) -> Array | None:
