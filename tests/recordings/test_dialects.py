@@ -505,6 +505,21 @@ def test_recordings_of_one_encoder_lie_on_one_turn(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.degrees(second.channels["joint_angle"]), 22.0, atol=0.03)
 
 
+def test_a_clock_that_is_coarser_than_the_samples_gives_their_rate(tmp_path: Path) -> None:
+    """1500 Hz by a clock in milliseconds, with a pause: one and two rows of each stamp."""
+    time = np.arange(3000) / 1500.0 + 0.5 * (np.arange(3000) >= 2000)
+    wanted = 1.0 + np.sin(9.0 * time)
+    lines = [f"{int(1e3 * t)},5,{p:.5f},20" for t, p in zip(time, wanted, strict=True)]
+    text = "\n".join([",".join(["time [ms]", *HEAD]), *lines])
+    (read,) = loaded(tmp_path, text)
+    assert read.sample_time == pytest.approx(1.0 / 1500.0, rel=1e-3)
+    assert [issue.kind for issue in read.issues if issue.channel == "time"] == ["log", "gap"]
+    used = read.mask["muscle_pressure"]
+    assert used.sum() >= 2990
+    clean = 1e5 * (1.0 + np.sin(9.0 * read.time))
+    assert np.max(np.abs(read.channels["muscle_pressure"] - clean)[used]) < 9e5 * 1e-3
+
+
 def test_a_dropout_of_an_encoder_is_no_turn(tmp_path: Path) -> None:
     def edit(lines: list[str]) -> None:
         for row in range(1, N + 1):

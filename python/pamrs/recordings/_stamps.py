@@ -94,6 +94,7 @@ _OVERFLOW: Final = (0.2, 3.0)  # usual steps that a counter goes on by where it 
 _LONG: Final = 20.0  # usual steps; a shorter period has to show several times that it is one
 _OFTEN: Final = 3
 _LATE: Final = 20  # rows that may come late, one after the other
+_MANY: Final = 50  # stamps between pauses from which on a line through their rows is known
 _CROWDED: Final = 1.5  # usual density of rows; what is denser are two recordings, not one
 _SAME: Final = 3.0  # how far beyond the largest step of an angle one over a full turn may be
 
@@ -306,10 +307,34 @@ def spread(time: Array) -> tuple[Array, str]:
         where = "before it"
     else:
         laid, where = _spread_on(time), "to the next one"
+    laid = _evenly(time, laid, firsts)
     return laid, (
         f"{len(time)} rows have {len(firsts)} different times (up to {int(counts.max())} rows of "
         f"one): spread evenly over the time {where}"
     )
+
+
+def _evenly(time: Array, laid: Array, firsts: Rows) -> Array:
+    """Times of a clock that is coarser than the samples: even from pause to pause, where no row is
+    further from its stamp than the next one.
+    """
+    lasting = np.diff(time[firsts])
+    usual = float(np.median(lasting[lasting > 0.0]))
+    pauses = np.flatnonzero((lasting < 0.0) | (lasting > GAP * usual)) + 1
+    bounds = [0, *pauses.tolist(), len(firsts)]
+    edges = np.append(firsts, len(time))
+    result = laid.copy()
+    for first, last in zip(bounds[:-1], bounds[1:], strict=True):
+        start, stop = int(edges[first]), int(edges[last])
+        if last - first < _MANY:
+            continue
+        rows = np.arange(stop - start, dtype=np.float64)
+        slope, begin = np.polyfit(rows, laid[start:stop], 1)
+        line = begin + slope * rows
+        away = time[start:stop] - line
+        if slope > 0.0 and float(np.ptp(away)) <= GAP * usual:
+            result[start:stop] = line
+    return result
 
 
 def _uneven(steps: Array) -> float:
