@@ -5,6 +5,7 @@ user is told. Nothing is guessed in the place of a unit that is written.
 from __future__ import annotations
 
 import json
+import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,16 @@ from numpy.typing import NDArray
 
 import pamrs
 from pamrs.diagnosis.prepare import noted_units
-from pamrs.recordings import Case, LogProposal, Proposal, Recording, load_case, propose
+from pamrs.errors import RecordingError
+from pamrs.recordings import (
+    Case,
+    LogProposal,
+    Proposal,
+    Recording,
+    load_case,
+    load_recording,
+    propose,
+)
 from pamrs.rig import load_rig
 
 Array = NDArray[np.float64]
@@ -197,6 +207,33 @@ def test_the_ambient_pressure_of_the_rig_file_is_subtracted(tmp_path: Path) -> N
     columns = {"p_muscle [bar(a)]": (GAUGE + 9.3e4) / 1e5, "angle [deg]": ANGLE}
     case = read(tmp_path, propose([log(tmp_path, columns)], rig), rig)
     np.testing.assert_allclose(case.recordings[0].channels["muscle_pressure"], GAUGE, atol=2.0)
+
+
+def test_headings_that_say_it_all_say_that_they_are_absolute(tmp_path: Path) -> None:
+    """Of files that need no mapping."""
+    file = log(tmp_path, {"muscle_pressure [bar(a)]": (GAUGE + STANDARD) / 1e5})
+    only = load_recording(file, delimiter=";")
+    np.testing.assert_allclose(only.channels["muscle_pressure"], GAUGE, atol=2.0)
+    assert "the standard atmosphere, since nothing says another" in only.notes["muscle_pressure"]
+    (tmp_path / "case.toml").write_text(
+        'schema = "pamrs.case/1"\n[[recording]]\nfile = "run.csv"\ndelimiter = ";"\n'
+    )
+    SHOULDER.to_toml(tmp_path / "rig.toml")
+    (only,) = load_case(tmp_path).recordings
+    assert "the ambient pressure that the rig file says" in only.notes["muscle_pressure"]
+    file = log(tmp_path, {"muscle_pressure [Pa(a)]": GAUGE, "ambient_pressure [hPa]": 0.0 * TIME})
+    with pytest.raises(RecordingError, match="column 'ambient_pressure': 0 Pa and"):
+        load_recording(file, delimiter=";")
+
+
+def test_a_heading_writes_no_line_of_its_own_into_the_case(tmp_path: Path) -> None:
+    name = '"p_muscle\nrig = ""evil.toml""\n\x7f [zz]"'
+    file = log(tmp_path, {name: GAUGE / 1e5, "angle [deg]": ANGLE})
+    for heading in (name, name.replace(" [zz]", "")):
+        file.write_text(file.read_text(encoding="utf-8").replace(name, heading), encoding="utf-8")
+        toml = propose([file], SHOULDER).case_toml(tmp_path)
+        assert tomllib.loads(toml)["rig"] == "rig.toml"
+        assert "\nrig = " not in toml.replace('\nrig = "rig.toml"', "")
 
 
 # --------------------------------------------------------------------------- names

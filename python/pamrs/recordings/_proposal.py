@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs._checks import positive
-from pamrs._files import resolved
+from pamrs._files import resolved, shown
 from pamrs.channels import channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
@@ -167,7 +167,8 @@ class Proposal:
         self, item: LogProposal, folder: Path, role: str, pieces: list[int] | None
     ) -> list[str]:
         file = os.path.relpath(resolved(item.log.path), resolved(folder))
-        lines = ["", *(f"# {text}" for text in item.remarks if role == "fit" or pieces is None)]
+        said = item.remarks if role == "fit" or pieces is None else []
+        lines = ["", *(f"# {shown(text)}" for text in said)]
         lines += ["[[recording]]", f"file = {_toml(Path(file).as_posix())}", f'role = "{role}"']
         if self.columns is not None:
             lines.append(f"columns = {_toml(list(self.columns))}")
@@ -198,7 +199,7 @@ class Proposal:
             entry = {"column": each.series, "unit": each.unit}
             if each.readings:
                 entry |= {"from": list(each.readings), "to": [0, 1]}
-            lines += [f"# {each.text}:", f"# {_key(each.channel)} = {_toml(entry)}"]
+            lines += [f"# {shown(each.text)}:", f"# {_key(each.channel)} = {_toml(entry)}"]
         return lines
 
 
@@ -212,7 +213,7 @@ def _toml(value: Any) -> str:
         return "{ " + ", ".join(f"{key} = {_toml(inside)}" for key, inside in value.items()) + " }"
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def propose(
