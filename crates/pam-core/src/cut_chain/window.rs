@@ -30,6 +30,13 @@ pub(super) struct Cut<'a, S> {
     output: Output<S>,
 }
 
+/// How much faster than at the beginning of a step a joint may become within it.
+const FASTER: f64 = 1.5;
+/// Share of a step before a stop over which a joint moves as fast as it does.
+const NEAR_STOP: f64 = 0.1;
+/// Share of a step that leads over a stop.
+const AT_STOP: f64 = 1e-3;
+
 /// How the predicted channel is read off the plant.
 enum Output<S> {
     /// Off the state.
@@ -316,6 +323,26 @@ impl<'a, S: Number> Cut<'a, S> {
         least.div_ceil(held) * held
     }
 
+    /// How much of a step [s] is taken next, some of it being done. The push of a stop jumps where a
+    /// joint meets it, and a step over the jump turns the joint back too late: one ends just before
+    /// it, and one that is next to nothing leads over it.
+    fn part(&self, state: &[S], step: f64, done: f64) -> f64 {
+        let left = 1.0 - done;
+        if !matches!(self.block, Block::Arm(_)) {
+            return left;
+        }
+        let until = self.stepper.plant.time_to_stop(state) / step;
+        if until > FASTER * left {
+            return left;
+        }
+        let part = match until {
+            _ if until > NEAR_STOP => 0.5 * until,
+            _ if until > AT_STOP => until - 0.5 * AT_STOP,
+            _ => AT_STOP,
+        };
+        part.min(left)
+    }
+
     /// The steps from sample `k` to the next.
     fn sample(
         &mut self,
@@ -335,24 +362,30 @@ impl<'a, S: Number> Cut<'a, S> {
                 self.command(k * held + i * held / substeps, time, &clocks, controls);
             }
             let (driving, taps) = (&self.driving, &self.driving_taps);
-            let drive =
-                |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
-                    let (rig, share) = (plant.rig(), (i as f64 + fraction) * h);
-                    for driver in driving {
-                        driver.write(plant, k, share, dt, clocks.neighbour, y);
-                    }
-                    for (gas, valve) in taps {
-                        let place = rig.layout().pressure(*gas);
-                        // a smooth signal goes from one reading to the next, and so do the commands
-                        // that they were read under
-                        let (was, now) = (last.spool[*valve], controls.spool[*valve]);
-                        // a spool with a motion of its own is already where it is at that instant
-                        let moving = rig.wiring.ports.moves_valve(*valve);
-                        let spool = if moving { now } else { was + (now - was) * share };
-                        y[place] = plant.behind_tube(*gas, y[place], y, spool);
-                    }
-                };
-            self.stepper.step(state, memory, controls, time, step, &self.simulated, drive);
+            let mut from = 0.0;
+            while from < 1.0 {
+                let length = self.part(state, step, from);
+                let drive =
+                    |plant: &Plant<'a, S>, controls: &Controls<S>, fraction: f64, y: &mut [S]| {
+                        let (rig, share) = (plant.rig(), (i as f64 + from + fraction * length) * h);
+                        for driver in driving {
+                            driver.write(plant, k, share, dt, clocks.neighbour, y);
+                        }
+                        for (gas, valve) in taps {
+                            let place = rig.layout().pressure(*gas);
+                            // a smooth signal goes from one reading to the next, and so do the commands
+                            // that they were read under
+                            let (was, now) = (last.spool[*valve], controls.spool[*valve]);
+                            // a spool with a motion of its own is already where it is at that instant
+                            let moving = rig.wiring.ports.moves_valve(*valve);
+                            let spool = if moving { now } else { was + (now - was) * share };
+                            y[place] = plant.behind_tube(*gas, y[place], y, spool);
+                        }
+                    };
+                let (time, step) = (time + from * step, step * length);
+                self.stepper.step(state, memory, controls, time, step, &self.simulated, drive);
+                from += length;
+            }
         }
         if !self.taps.is_empty() {
             last.spool.clone_from(&self.stepper.controls(controls, 2).spool);

@@ -13,6 +13,7 @@ mod muscle_force;
 pub mod parameters;
 mod ports;
 pub mod rates;
+mod stops;
 mod switching;
 mod tap;
 mod units;

@@ -95,6 +95,8 @@ pub(crate) struct Stepper<'a, S> {
     switches: Option<Switches<S>>,
     /// Contraction ratios of the muscles before a step, where kinks of their volume are asked for.
     from: Vec<f64>,
+    /// Where the coordinates were before it, where their stops are asked for.
+    were: Vec<f64>,
     /// Whether anybody asks what the sensors read.
     pub reads: bool,
 }
@@ -116,6 +118,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             start: zeros(),
             end: zeros(),
             from: Vec::with_capacity(groups),
+            were: Vec::new(),
             remembers: plant.remembers(),
             plant,
         }
@@ -148,9 +151,33 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         simulated: &Simulated,
         mut drive: impl FnMut(&Plant<'a, S>, &Controls<S>, f64, &mut [S]),
     ) {
-        if self.switches.is_some() {
-            return self.step_in_pieces(state, memory, controls, (time, dt), simulated, &mut drive);
+        let stops = self.plant.asks_for_stops(simulated);
+        if stops {
+            self.plant.where_coordinates_are(state, &mut self.were);
         }
+        if self.switches.is_some() {
+            self.step_in_pieces(state, memory, controls, (time, dt), simulated, &mut drive);
+        } else {
+            self.plain_step(state, memory, controls, (time, dt), simulated, &mut drive);
+        }
+        if stops {
+            let Self { plant, scratch, start, were, stages, .. } = self;
+            let controls = stages.as_ref().map_or(controls, |stages| &stages[2]);
+            plant.meet_stops(were, state, controls, memory, start, simulated, scratch);
+        }
+    }
+
+    /// A step in which no valve switches.
+    #[inline]
+    fn plain_step(
+        &mut self,
+        state: &mut [S],
+        memory: &mut [Memory<S>],
+        controls: &Controls<S>,
+        (time, dt): (f64, f64),
+        simulated: &Simulated,
+        drive: Drives<'_, 'a, S>,
+    ) {
         let Self {
             plant, scratch, method, start, end, from, remembers, stages, before, reads, ..
         } = self;
