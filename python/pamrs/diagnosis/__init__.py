@@ -25,7 +25,7 @@ from typing import Any
 from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
-from pamrs.diagnosis.fit import Problem, fits, holdable, without_passing
+from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -233,12 +233,13 @@ def diagnose(
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
     with _in_range(case.name):
-        read = misread(inner, case.rig)
+        read, moved = misread(inner, case.rig), list[str]()
         if read is not None:
             diagnosis = misread_diagnosis(case, inner, outer, read, unjudged)
         else:
+            inner, outer, moved = _on_time(inner, outer, case.rig)
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
-    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *begun]
+    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *begun, *moved]
     warnings += diagnosis.warnings
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
@@ -291,6 +292,14 @@ def _lost(every: Sequence[Block], judged: Problem) -> list[Unjudged]:
     """Blocks whose judgement failed."""
     kept = {block.name for block in judged.blocks}
     return [Unjudged(b.name, b.covers, "its judgement failed") for b in every if b.name not in kept]
+
+
+def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem, list[str]]:
+    """Recordings to fit and held-out ones whose commands act when they did, and which were moved;
+    the same problem where nothing is held out.
+    """
+    found, said = with_offsets([inner] if outer is inner else [inner, outer], rig)
+    return found[0], found[-1], said
 
 
 def _check_rig(case: Case) -> None:

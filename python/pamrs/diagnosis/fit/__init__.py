@@ -38,6 +38,7 @@ from pamrs.diagnosis.fit._held import (
     without_passing,
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
+from pamrs.diagnosis.fit._offsets import with_offsets
 from pamrs.diagnosis.fit._spread import spread_over_pieces
 from pamrs.diagnosis.fit._starts import (
     CHOSEN,
@@ -86,6 +87,7 @@ __all__ = [
     "with_effects_of",
     "with_entry",
     "with_known",
+    "with_offsets",
     "with_priors",
     "without_passing",
     "without_term",

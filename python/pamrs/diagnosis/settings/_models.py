@@ -41,6 +41,45 @@ class FitSettings(SettingsGroup):
         ),
         origin="docs/decisions/0034",
     )
+    offset_stds: float = setting(
+        4.0,
+        unit="standard deviations",
+        above=0.0,
+        reason="how far from none an offset of the commands of a recording, below a sample, has to "
+        "be before they are moved by it",
+        origin="judgement: each of a few recordings is asked",
+    )
+    offset_parts: int = setting(
+        64,
+        unit="count",
+        least=1,
+        reason="parts of a sample of the log by which commands are moved that seldom change",
+        origin="judgement: a step at 100 Hz is off by 0.08 ms at the most",
+    )
+    offset_few_parts: int = setting(
+        8,
+        unit="count",
+        least=1,
+        reason="the same of commands that change at more than one sample in so many: each part is "
+        "a step of the integration",
+        origin="judgement",
+    )
+    most_offset: float = setting(
+        1.0,
+        unit="samples",
+        above=0.0,
+        reason="offset of commands from which it is left to the effects, and standard deviation of "
+        "what is known of it before",
+        origin="a log sees a command at its next sample",
+    )
+    most_offsets: int = setting(
+        40,
+        unit="count",
+        least=0,
+        reason="changes of the commands of a recording up to which each has an offset of its own "
+        "where there is one: each takes two predictions",
+        origin="judgement: steps, and no controller",
+    )
     least_scale: float = setting(
         0.01,
         unit="1",

@@ -1,0 +1,181 @@
+"""When commands acted: a part of a sample earlier or later than their log has them.
+
+A log that runs by itself beside the loop sees a command at its next sample, and a loop may send it
+after the sensors were read. What that does to a pressure is neither a lag nor a value of the rig;
+it is a nuisance of the recording, as the start of a window is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.diagnosis.fit._fitting import Problem, free_baseline, residuals
+from pamrs.diagnosis.fit._held import known_parameters
+from pamrs.diagnosis.prepare import Block, Prepared, change
+from pamrs.errors import SimulationError
+from pamrs.rig import Rig
+
+__all__ = ["with_offsets"]
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+
+class _Change(NamedTuple):
+    """Changes of the commands of a recording, by their numbers, that are moved alike."""
+
+    recording: int
+    which: Rows
+
+
+def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Problem], list[str]]:
+    """Recordings whose commands begin to act when they did, as far as that is less than a sample.
+
+    How much later they act is fitted for each recording together with the parameters inside their
+    tolerances, by the blocks that a command drives. Only an offset that is told from none counts,
+    and one of a sample or more is left to the effects. Where there is one and commands seldom
+    change, each change has its own: two clocks are not in step.
+
+    Parameters
+    ----------
+    problems : sequence of Problem
+        Recordings to fit and held-out ones, or one of both.
+    nominal : Rig
+        The model.
+
+    Returns
+    -------
+    problems : list of Problem
+        The same, with the commands of some recordings moved.
+    said : list of str
+        Which, in words.
+    """
+    first = problems[0]
+    recordings = list({p.recording.name: p for q in problems for p in q.recordings}.values())
+    blocks = [b for b in first.blocks if not b.mechanical and _commanded(b)]
+    if not blocks:
+        return list(problems), []
+    whole = replace(first, blocks=blocks, recordings=recordings)
+    try:
+        moved, offsets = _moved_alike(whole, nominal)
+        if moved:
+            moved |= _moved_each(whole, nominal, list(moved))
+    except SimulationError:
+        return list(problems), []  # the fit says what cannot be predicted
+    said = [
+        f"recording {recordings[k].recording.name}: its commands act {abs(offset):.2f} of a sample "
+        f"of the log {'later' if offset > 0 else 'earlier'} than it has them, as if two clocks "
+        "wrote it; they were moved so far"
+        for k, offset in offsets.items()
+    ]
+    there = {recordings[k].recording.name: p for k, p in moved.items()}
+    return [
+        replace(q, recordings=[there.get(p.recording.name, p) for p in q.recordings])
+        for q in problems
+    ], said
+
+
+def _commanded(block: Block) -> bool:
+    """Whether a command drives a block."""
+    return any(name.partition(".")[0].endswith("_command") for name in block.drives)
+
+
+def _changes(prepared: Prepared) -> Rows:
+    """Samples of the log at which commands change."""
+    each = np.stack(list(prepared.held.values()))
+    return np.flatnonzero(np.any(np.diff(each) != 0.0, axis=0)) + 1
+
+
+def _later(prepared: Prepared, shares: Array) -> Prepared:
+    """A recording each of whose changes of a command acts such a share of a sample of the log
+    later.
+    """
+    at = _changes(prepared)
+    size = next(iter(prepared.held.values())).size
+    own = prepared.settings.fit
+    seldom = at.size * own.offset_few_parts < size
+    parts = own.offset_parts if seldom else own.offset_few_parts
+    moved = np.maximum.accumulate(np.maximum(1, parts * at + np.rint(parts * shares).astype(int)))
+    now = np.searchsorted(moved, np.arange(size * parts), side="right")
+    rows = np.concatenate([[0], at])[now]
+    return replace(prepared, held={name: values[rows] for name, values in prepared.held.items()})
+
+
+def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], dict[int, float]]:
+    """Recordings, by their numbers, with all commands moved alike, and by what share of a sample;
+    those alone in which that is told from none.
+    """
+    all_of = [
+        _Change(k, np.arange(at.size))
+        for k, p in enumerate(problem.recordings)
+        if (at := _changes(p)).size
+    ]
+    best, spread = _fitted(problem, nominal, all_of)
+    own = problem.settings.fit
+    offsets = {
+        change.recording: float(offset)
+        for change, offset, std in zip(all_of, best, spread, strict=True)
+        if own.offset_stds * std < abs(offset) < own.most_offset
+    }
+    recordings = problem.recordings
+    return {
+        k: _later(recordings[k], np.full(_changes(recordings[k]).size, offset))
+        for k, offset in offsets.items()
+    }, offsets
+
+
+def _moved_each(problem: Problem, nominal: Rig, those: list[int]) -> dict[int, Prepared]:
+    """Recordings, by their numbers, in which each change of a command has an offset of its own."""
+    counts = {k: _changes(problem.recordings[k]).size for k in those}
+    few = {k: n for k, n in counts.items() if n <= problem.settings.fit.most_offsets}
+    each = [_Change(k, np.array([i])) for k, n in few.items() for i in range(n)]
+    if not each:
+        return {}
+    best, _ = _fitted(problem, nominal, each)
+    shares, most = {k: np.zeros(n) for k, n in few.items()}, problem.settings.fit.most_offset
+    for one, offset in zip(each, best, strict=True):
+        shares[one.recording][one.which] = np.clip(offset, -most, most)
+    return {k: _later(problem.recordings[k], own) for k, own in shares.items()}
+
+
+def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[Array, Array]:
+    """Offsets in samples of the log, and their standard deviations: of a fit that is linear, with
+    the parameters inside their tolerances beside them.
+    """
+    names = free_baseline(problem, nominal)
+    known = known_parameters(nominal, problem.settings.fit)
+    found = residuals(problem, nominal, names)
+    scales = np.array([known[name].tol for name in names])
+    size = len(names) + len(moving)
+    normal, right, total, count = np.eye(size), np.zeros(size), 0.0, 0  # tolerances are priors
+    normal[len(names) :, len(names) :] /= problem.settings.fit.most_offset**2
+    for k, prepared in enumerate(problem.recordings):
+        own = [(len(names) + j, one.which) for j, one in enumerate(moving) if one.recording == k]
+        for block in problem.blocks:
+            base = found[block.name, prepared.recording.name]
+            slopes = np.zeros((prepared.n, size))
+            if base.jacobian is not None and names:
+                slopes[:, : len(names)] = base.jacobian * scales
+            for column, which in own:
+                shares = np.zeros(_changes(prepared).size)
+                shares[which] = 0.5
+                later, sooner = (
+                    change(block, problem.core, _later(prepared, sign * shares), base)
+                    for sign in (1.0, -1.0)
+                )
+                slopes[:, column] = sooner - later  # residuals go the other way
+            slopes, value = slopes[base.rows] / base.noise, base.value[base.rows] / base.noise
+            normal += slopes.T @ slopes
+            right += slopes.T @ value
+            total, count = total + float(value @ value), count + value.size
+    inverse = np.linalg.inv(normal)
+    best = inverse @ right
+    # what is left beyond noise makes them less certain
+    rough = max(1.0, (total - float(best @ right)) / max(1, count))
+    first = len(names)
+    return best[first:], rough * np.sqrt(np.diag(inverse))[first:]
