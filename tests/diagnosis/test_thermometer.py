@@ -132,14 +132,34 @@ def test_a_thermometer_that_the_rig_file_knows_hides_no_wall() -> None:
     assert not found.effects
 
 
+def test_a_thermometer_that_shows_a_share_of_the_wall_vetoes_nothing() -> None:
+    """Where it reads 0.7 of what the gas does, a right wall is none other, a wrong one is told."""
+    nominal = parse_rig(TANK)
+    room = nominal.model["gas"]["temperature"]
+    for wall in (20.0, 60.0):
+        recordings = [
+            replace(r, channels=r.channels | {"temperature": room + 0.7 * (own - room)})
+            for r in blown(nominal.with_parameters({WALL: wall}))
+            for own in [r.channels["temperature"]]
+        ]
+        found = found_in(nominal, recordings)
+        assert not found.effects or found.verdict != "effects"
+        told = [w.value for w in found.wrong_parameters if w.name == WALL]
+        assert told == ([pytest.approx(60.0, rel=0.1)] if wall == 60.0 else [])
+        error = found.fit.held_out["muscle_pressure"]
+        assert error.after < 1.2 * error.noise
+
+
 def test_a_log_may_begin_while_the_gas_is_warm() -> None:
-    """What the gas began with is no missing physics where a thermometer says it."""
+    """What the gas began with is no missing physics, whether a thermometer says it or not."""
     rig = parse_rig(TEXT)
     recordings = filled(rig, 0.6)
     first = [r.channels["temperature"][0] for r in recordings]
     assert max(abs(t - rig.model["gas"]["temperature"]) for t in first) > 8.0
     assert found_in(rig, recordings).verdict == "none"
-    assert found_in(rig, without(recordings)).verdict != "none"
+    begun = found_in(rig, without(recordings))
+    assert begun.verdict == "none"
+    assert not begun.off
 
 
 def test_holes_of_either_sensor_are_not_judged() -> None:

@@ -97,7 +97,9 @@ def free_run(
         try:
             there = _with(final, events, recording)
             run = _of(prepared, problem, found, nominal, there)
-            runs.append(_judged(run, prepared, there, known, problem.settings))
+            # a run begins at rest, and a gas that nobody knows to have begun so is no fault
+            certain = known if all(b.warm is None for b in problem.blocks) else None
+            runs.append(_judged(run, prepared, there, certain, problem.settings))
         except RecordingError as error:  # it lacks a command
             missing.append(str(error))
     if not runs:

@@ -874,10 +874,11 @@ def _begun_off(triangle: Array, inside: Array) -> Array:
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
-    """What the level of each simulated drive does to a prediction; `core` is the rig as it was in
-    the recording.
+    """What the level of each simulated drive does to a prediction, and of a temperature a share of
+    the wall's in what the thermometer reads; `core` is the rig as it was in the recording.
     """
-    columns = []
+    # a wall is as warm as the room: a share of it makes what the gas does smaller by that share
+    columns = [prediction - float(np.mean(prediction))] if block.kind == "temperature" else []
     for name in block.floating:
         value, slope = prepared.signals[name]
         step = 1e-3 * max(1.0, float(np.abs(value).max()))
