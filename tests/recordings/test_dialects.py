@@ -310,6 +310,17 @@ CELLS = {
     "labels in lines of their own": Case(
         labelled("t: {t:.2f}\nvalve: {u:g}\np_muscle: {p:.4f}\nangle: {a:.3f}")
     ),
+    "points that part thousands": Case(
+        "\n".join(
+            ["time [ms];valve [V];p_muscle [Pa];angle [deg]"]
+            + [
+                f"{f'{20 * i:,}'.replace(',', '.')};{u:g};"
+                f"{f'{1e5 * p:,.0f}'.replace(',', '.')};{f'{a:.3f}'.replace('.', ',')}"
+                for i, (_, u, p, a) in enumerate(DATA.tolist())
+            ]
+        ),
+        ("time: points part thousands", "p_muscle: points part thousands"),
+    ),
     "decimal commas in quotes": Case(
         "\n".join(
             [

@@ -35,6 +35,7 @@ _HEAD: Final = 5000  # rows above the table, at most
 _BEGUN: Final = 20  # rows of an earlier run that may stand above the headings
 _MOST_TEXTS: Final = 1000  # different texts of a column that can name pieces
 _CUT: Final = 20  # one row in so many may be cut short; more are rows whose last cells are empty
+_BESIDE_COMMAS = re.compile(r"[-+]?(?:[1-9]\d{0,2}(?:\.\d{3})+|\d{1,3})(?:,\d+)?")
 _THOUSANDS = re.compile(r"[-+]?(\d{1,3}(\.\d{3})+|0)")
 
 
@@ -108,6 +109,8 @@ def _quick(
     middle = len(lines) // 2
     if form.thousands is not None or '"' in "".join(lines[:_LINES]):
         return None
+    if dialect.decimal == "," and any("." in line for line in lines[len(lines) // 2 :]):
+        return None  # points may part thousands
     head, sample = (
         [_stripped(row) for row in split_rows("\n".join(some), dialect.delimiter)]
         for some in (lines[:_HEAD], lines[middle : middle + _LINES])
@@ -253,7 +256,7 @@ def _stripped(row: Sequence[str]) -> list[str]:
 def _is_number(cell: str, decimal: str, thousands: str | None) -> bool:
     cell = cell.replace(thousands, "") if thousands else cell
     if decimal == "," and "." in cell:
-        return False
+        return _BESIDE_COMMAS.fullmatch(cell) is not None
     try:
         float(cell.replace(",", ".") if decimal == "," else cell)
     except ValueError:
@@ -274,6 +277,8 @@ def _dialect(lines: list[str], form: TextFormat, path: Path) -> _Dialect:
         if form.delimiter not in (None, mark) or form.decimal not in (None, decimal):
             continue
         if mark == "," and decimal == "," and '"' not in sample:
+            continue
+        if decimal == "," and form.decimal is None and "," not in sample:
             continue
         rows = [_stripped(row) for row in split_rows(sample, mark)]
         cells = [cell for row in rows for cell in row if cell.lower() not in NO_VALUE]
@@ -384,6 +389,9 @@ def _column(
         if not name.startswith(_UNNAMED):
             unread[name] = "it is empty"
         return
+    if thousands is None and decimal == "," and _grouped_beside_commas(cells):
+        thousands = "."
+        remarks.append(f"{name}: points part thousands, as commas are decimals in this file")
     values, strange = numbers_of_cells(cells, thousands, decimal)
     if strange and thousands is None and _grouped(cells):
         values, strange = numbers_of_cells(cells, ".", decimal)
@@ -411,3 +419,10 @@ def _column(
 def _grouped(cells: Sequence[str]) -> bool:
     """Whether points part thousands: ``1.000.000`` beside ``900.000``, and no other number."""
     return all(_THOUSANDS.fullmatch(cell) or cell.lower() in NO_VALUE for cell in cells)
+
+
+def _grouped_beside_commas(cells: Sequence[str]) -> bool:
+    """Whether points part thousands where decimals are commas: ``1.520`` after ``980``."""
+    return any("." in cell for cell in cells) and all(
+        _BESIDE_COMMAS.fullmatch(cell) or cell.lower() in NO_VALUE for cell in cells
+    )
