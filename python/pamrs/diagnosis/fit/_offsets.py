@@ -14,11 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fit._fitting import Problem, free_baseline, residuals
+from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._held import known_parameters
 from pamrs.diagnosis.prepare import Block, Prepared, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 
 __all__ = ["with_offsets"]
 
@@ -62,9 +63,11 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
         return list(problems), []
     whole = replace(first, blocks=blocks, recordings=recordings)
     try:
-        moved, offsets = _moved_alike(whole, nominal)
+        # offsets are small and linear, parameters inside wide tolerances are not
+        near = fit(whole, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
+        moved, offsets = _moved_alike(whole, near)
         if moved:
-            moved |= _moved_each(whole, nominal, list(moved))
+            moved |= _moved_each(whole, near, list(moved))
     except SimulationError:
         return list(problems), []  # the fit says what cannot be predicted
     said = [
@@ -149,7 +152,7 @@ def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[
     """
     names = free_baseline(problem, nominal)
     known = known_parameters(nominal, problem.settings.fit)
-    found = residuals(problem, nominal, names)
+    found, core = residuals(problem, nominal, names), core_rig(nominal, problem.core)
     scales = np.array([known[name].tol for name in names])
     size = len(names) + len(moving)
     normal, right, total, count = np.eye(size), np.zeros(size), 0.0, 0  # tolerances are priors
@@ -165,7 +168,7 @@ def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[
                 shares = np.zeros(_changes(prepared).size)
                 shares[which] = 0.5
                 later, sooner = (
-                    change(block, problem.core, _later(prepared, sign * shares), base)
+                    change(block, core, _later(prepared, sign * shares), base)
                     for sign in (1.0, -1.0)
                 )
                 slopes[:, column] = sooner - later  # residuals go the other way
