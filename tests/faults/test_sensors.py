@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,6 +16,8 @@ import pamrs
 from pamrs.diagnosis.prepare import prepare, without_rails
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.settings import DiagnosisSettings, PlausibilitySettings
+from pamrs.errors import DiagnosisError
+from pamrs.recordings import Case, Recording
 from pamrs.report import render_html
 
 HERE = Path(__file__).parent
@@ -125,3 +128,73 @@ def test_noise_does_not_follow_interpolation(tmp_path: Path, grid: float) -> Non
 def test_noise_of_what_is_on_its_own_grid_is_as_it_was() -> None:
     case = pamrs.load_case(HERE / "13_gauge_clipped")
     assert not any(recording.logged for recording in case.recordings)
+
+
+def _healthy(change: Callable[[dict[str, np.ndarray]], None]) -> pamrs.recordings.Case:
+    """A sound rig at 100 Hz, of which a sensor or logger spoils something."""
+    case = pamrs.load_case(HERE / "12_absolute_as_gauge")
+    spoilt = []
+    for recording in case.recordings:
+        channels = {name: values.copy() for name, values in recording.channels.items()}
+        channels["muscle_pressure"] -= 101325.0
+        change(channels)
+        mask = {name: np.isfinite(values) for name, values in channels.items()}
+        spoilt.append(replace(recording, channels=channels, mask=mask))
+    return replace(case, recordings=spoilt)
+
+
+def test_rounding_to_eight_bits_is_no_physics() -> None:
+    """Of a coarse converter the rounding is not white: it stays for as long as a step lasts."""
+
+    def rounded(channels: dict[str, np.ndarray]) -> None:
+        for name, top in (("supply_pressure", 1.6e6), ("muscle_pressure", 1.6e6)):
+            step = top / 256
+            channels[name][:] = np.round(channels[name] / step) * step
+        step = np.pi / 256
+        channels["joint_angle"][:] = np.round(channels["joint_angle"] / step) * step
+
+    case = _healthy(rounded)
+    made = prepare(case.recordings[0], case.rig, DiagnosisSettings())
+    assert made.steps["muscle_pressure"] == pytest.approx(6250.0)
+    found = pamrs.diagnose(case)
+    assert found.verdict in ("none", "parameters")
+
+
+def test_blocks_without_a_value_are_no_physics() -> None:
+    def holes(channels: dict[str, np.ndarray]) -> None:
+        channels["muscle_pressure"][300:380] = np.nan
+        channels["joint_angle"][600:650] = np.nan
+
+    assert pamrs.diagnose(_healthy(holes)).verdict in ("none", "parameters")
+
+
+def test_a_command_that_was_not_logged_is_refused_with_its_evidence() -> None:
+    def dead(channels: dict[str, np.ndarray]) -> None:
+        channels["valve_command"][:] = 5.0
+
+    with pytest.raises(DiagnosisError, match="valve_command has one value throughout"):
+        pamrs.diagnose(_healthy(dead))
+
+
+@pytest.mark.parametrize(("count", "apart"), [(16, 2.0), (37, 1.0)])
+@pytest.mark.parametrize("leak", [0.0, 0.01])
+def test_few_samples_tell_a_leak(count: int, apart: float, leak: float) -> None:
+    rng = np.random.default_rng(count)
+    time = np.arange(count) * apart
+    recordings = []
+    for name in ("one", "two"):
+        pressure = 4e5 * np.exp(-leak * time) + rng.normal(0.0, 300.0, count)
+        recordings.append(
+            Recording(
+                name,
+                "fit",
+                time,
+                apart,
+                {"muscle_pressure": pressure},
+                {"muscle_pressure": np.ones(count, dtype=bool)},
+                units={"muscle_pressure": "Pa"},
+            )
+        )
+    rig = pamrs.load_rig(ROOT / "sealed_chamber.toml")
+    found = pamrs.diagnose(Case("short", rig, recordings, HERE))
+    assert [effect.id for effect in found.effects][:1] == (["leak_muscle"] if leak else [])

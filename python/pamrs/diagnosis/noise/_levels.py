@@ -139,18 +139,19 @@ def noise_levels(
                         else shaken
                     )
                 means, _ = binned(shaken, rows, width)
-                own = rng.normal(0.0, base.noise, int(seen.sum())) / np.sqrt(counts[seen])
-                squares = [
-                    float(np.mean(v**2)) for v in (shaken[rows], means[seen], means[seen] + own)
-                ]
-                powers.append(squares)
-            sample, drives, _ = np.mean(powers, axis=0) if powers else (0.0, 0.0, 0.0)
+                own = _own(block, base, prepared, counts, width, rng)[seen]
+                told = (shaken[rows], means[seen], means[seen] + own, own)
+                powers.append([float(np.mean(v**2)) for v in told])
+            sample, drives, _, rounded = np.mean(powers, axis=0) if powers else np.zeros(4)
             white = float(np.mean(1.0 / counts[seen])) if seen.any() else 1.0
+            single = base.noise**2 * white
             # mean squares of few modes are skew, their logarithms hardly
             scatter = (
-                float(np.std(np.log([both for *_, both in powers]), ddof=1)) if powers else 0.0
+                float(np.std(np.log([both for _, _, both, _ in powers]), ddof=1)) if powers else 0.0
             )
-            noise = base.noise**2 * white + drives
+            if block.channel in prepared.steps:
+                single = max(single, float(rounded))
+            noise = single + drives
             key = block.name, prepared.recording.name
             bent = None
             if known:
@@ -174,12 +175,42 @@ def _power(curves: Array) -> float:
     return float(np.mean(np.sum(curves**2, axis=1))) if curves.size else 0.0
 
 
+def _own(
+    block: Block,
+    base: Residual,
+    prepared: Prepared,
+    counts: Array,
+    width: int,
+    rng: np.random.Generator,
+) -> Array:
+    """One realisation of the output's own noise in bin means (m,): white, or where its converter is
+    coarse the rounding of what the model predicts.
+    """
+    step = prepared.steps.get(block.channel)
+    if step is None:
+        return rng.normal(0.0, base.noise, counts.size) / np.sqrt(np.maximum(counts, 1.0))
+    error = base.freed(_rounding(base.prediction, step, rng))
+    return binned(error, base.rows, width)[0]
+
+
+def _rounding(values: Array, step: float, rng: np.random.Generator) -> Array:
+    """What a converter with such steps, which lie anywhere, adds to values."""
+    place = step * rng.uniform()
+    seen = values + place
+    return np.asarray(np.round(seen / step) * step - place - values, dtype=np.float64)
+
+
 def _shaken(prepared: Prepared, names: Iterable[str], rng: np.random.Generator) -> Prepared:
     """The recording with one more realisation of noise, as smoothed, on some drives."""
     signals = {}
     for name in names:
-        raw = rng.normal(0.0, prepared.noise[name], prepared.n)
         value, slope = prepared.signals[name]
+        step = prepared.steps.get(name)
+        raw = (
+            rng.normal(0.0, prepared.noise[name], prepared.n)
+            if step is None
+            else _rounding(value, step, rng)
+        )
         more, steeper = smoothed(raw, prepared.dt, prepared.lengths[name])
         signals[name] = (value + more, slope + steeper)
     return prepared.shaken(signals)

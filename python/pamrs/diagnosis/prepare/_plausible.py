@@ -497,6 +497,10 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         both = recording.valid(name, pressure)
         if both.sum() < 32:
             continue
+        if np.ptp(recording.channels[name][both]) == 0.0:
+            ambient = float(rig.model["gas"]["ambient_pressure"])
+            yield from _dead(recording, name, pressure, ambient, settings)
+            continue
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
         beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
         if beyond > settings.command_time_share:
@@ -539,6 +543,35 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
                 f"{100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or "
                 "column right?"
             )
+
+
+def _dead(
+    recording: Recording,
+    command: str,
+    pressure: str,
+    ambient: float,
+    settings: PlausibilitySettings,
+) -> Iterator[str]:
+    """A command of one value beside a pressure that stands still and then is filled or vented: at
+    one opening a pressure comes to rest once, and what moves changes it by less.
+    """
+    mask = recording.mask[pressure]
+    absolute = np.where(mask, recording.channels[pressure] + ambient, np.nan)
+    width = max(2, round(settings.dead_command_time / recording.sample_time))
+    if absolute.size <= 3 * width:
+        return
+    before, now, later = absolute[: -2 * width], absolute[width:-width], absolute[2 * width :]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        still = np.abs(now / before - 1.0) < settings.dead_command_still
+        change = np.exp(np.abs(np.log(later / now)))
+    largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
+    if largest > settings.dead_command_ratio:
+        yield (
+            f"{command} has one value throughout while {pressure} stands still and then changes "
+            f"{largest:.3g}-fold (absolute) within {settings.dead_command_time:g} s; at most "
+            f"{settings.dead_command_ratio:g}-fold is allowed: a command that was not logged; map "
+            "the right column, or leave this one out"
+        )
 
 
 def check_sense(

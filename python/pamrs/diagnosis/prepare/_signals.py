@@ -70,6 +70,9 @@ class Prepared:
         Samples of the filter at each sample of a channel.
     settings : DiagnosisSettings
         What it was made ready by.
+    steps : dict of str to float
+        Step of the converter of each channel whose own noise is smaller than that, so that its
+        rounding is not white.
     unsettled : dict of str to int
         First samples of a channel that are not judged, since they show where something that nobody
         measured began.
@@ -88,6 +91,7 @@ class Prepared:
     noise: dict[str, float]
     lengths: dict[str, Lengths]
     settings: DiagnosisSettings
+    steps: dict[str, float] = field(default_factory=dict)
     unsettled: dict[str, int] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
@@ -442,7 +446,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         )
     core = core_rig(rig)
     _check_commands(recording, rig, core.inputs)
-    signals, raw, noise, lengths = {}, {}, {}, {}
+    signals, raw, noise, lengths, steps = {}, {}, {}, {}, {}
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
     for name in (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values()):
         if name not in recording.channels:
@@ -455,6 +459,9 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
         noise[name] = _noise_of(recording, name, settings)
+        step = _lattice(_as_logged(recording, name))
+        if noise[name] < own.rounded_share * step:
+            steps[name] = step
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
         lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
@@ -465,7 +472,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         name: recording.commands.get(name, np.repeat(values, logged))
         for name, values in commands.items()
     }
-    return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings)
+    return Prepared(recording, commands, as_logged, signals, raw, noise, lengths, settings, steps)
 
 
 def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> float:
@@ -482,6 +489,14 @@ def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> f
     there = np.isfinite(logged)
     single = noise_level(np.where(there, logged, 0.0), there, own, seed=seed)
     return single * math.sqrt(max(1.0, apart / recording.sample_time))
+
+
+def _as_logged(recording: Recording, name: str) -> Array:
+    """Usable values of a channel as they were recorded, not interpolated."""
+    if name not in recording.logged:
+        return np.unique(recording.channels[name][recording.mask[name]])
+    values = recording.logged[name][1]
+    return np.unique(values[np.isfinite(values)])
 
 
 def few_usable(mask: Mask, settings: PrepareSettings) -> bool:

@@ -118,6 +118,7 @@ class Reading:
             signals=signals,
             raw=turned(prepared.raw),
             noise=noise,
+            steps={name: maps.get(name, 1.0) * step for name, step in prepared.steps.items()},
             _begun={},
         )
 

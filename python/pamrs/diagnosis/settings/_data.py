@@ -150,12 +150,20 @@ class PrepareSettings(SettingsGroup):
         reason="longest hole in a driving signal that is bridged by a line",
         origin="judgement",
     )
+    rounded_share: float = setting(
+        0.5,
+        unit="1",
+        least=0.0,
+        reason="noise of a channel, in steps of its converter, below which its rounding is not "
+        "white: it stays the same for as long as the channel stays on a step",
+        origin="a dither of half a step makes rounding white to a few per cent",
+    )
     least_samples: int = setting(
-        32,
+        12,
         unit="count",
         least=8,
-        reason="fewest samples of a recording that can be diagnosed",
-        origin="judgement",
+        reason="fewest samples of a recording that can be diagnosed: noise takes eleven of them",
+        origin="judgement: a leak is seen in sixteen samples of a shut chamber",
     )
     ample_samples: int = setting(
         1000,
@@ -187,7 +195,7 @@ class PrepareSettings(SettingsGroup):
         origin="judgement: the recordings of printed chambers",
     )
     least_channel_samples: int = setting(
-        16,
+        11,
         unit="count",
         least=8,
         reason="fewest usable samples of a channel",
@@ -749,6 +757,30 @@ class PlausibilitySettings(SettingsGroup):
         most=1.0,
         reason="share of the time that a logger may lose a valve's command for; more is how the "
         "controller is",
+        origin="judgement",
+    )
+    dead_command_time: float = setting(
+        0.5,
+        unit="s",
+        above=0.0,
+        reason="how long a pressure stands still, and then takes for a change that a valve's "
+        "command of one value cannot have made",
+        origin="judgement: leaks are slower",
+    )
+    dead_command_still: float = setting(
+        0.02,
+        unit="1",
+        above=0.0,
+        reason="share of an absolute pressure by which it changes at most in that time to stand "
+        "still",
+        origin="judgement: beyond the noise of a gauge",
+    )
+    dead_command_ratio: float = setting(
+        1.5,
+        unit="1",
+        least=1.0,
+        reason="how far, as a ratio of absolute pressures, it may change then: what moves changes "
+        "the volume of a muscle that is shut by less in that time",
         origin="judgement",
     )
     rail_samples: int = setting(
