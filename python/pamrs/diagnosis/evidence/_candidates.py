@@ -748,8 +748,10 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
         for prepared in problem.recordings:
             for name, (value, slope) in prepared.signals.items():
                 block = name.partition(".")[2]
+                if channel_of(name) != "muscle_pressure":
+                    continue
                 rows = prepared.recording.mask[name]
-                if channel_of(name) != "muscle_pressure" or not rows.any():
+                if not rows.any():
                     continue
                 if entry.get("at", "") not in ("", block):
                     continue
