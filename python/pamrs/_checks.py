@@ -13,7 +13,53 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["check_column", "checked_number", "checked_table", "positive"]
+__all__ = ["as_numbers", "as_said", "check_column", "checked_number", "checked_table", "positive"]
+
+
+def as_said(value: object) -> str:
+    """A value as a message has it: a line of it at most, and no error of its own."""
+    try:
+        text = repr(value)
+    except ValueError:  # a whole number of more digits than Python prints
+        text = f"a {type(value).__name__} that is too long to print"
+    return text if len(text) <= _MOST_SAID else f"{text[: _MOST_SAID - 3]}..."
+
+
+def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
+    """An array of numbers that is not larger than it may be.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    values : array_like
+        What was given.
+    most : int
+        Numbers that it may have.
+
+    Returns
+    -------
+    ndarray
+
+    Raises
+    ------
+    ParameterError
+        If it is no numbers, or too many.
+    """
+    import numpy as np
+
+    size = getattr(values, "size", 0)  # an array that repeats one number is larger than it looks
+    if isinstance(size, int) and size > most:
+        raise ParameterError(f"{name} has {size} numbers, which is not allowed: at most {most} are")
+    try:
+        return np.asarray(values, dtype=np.float64, order="C")
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(
+            f"{name} = {as_said(values)} is not allowed: numbers are needed"
+        ) from None
+
+
+_MOST_SAID = 60
 
 
 def positive(name: str, value: float, *, zero: bool = False) -> float:
@@ -40,8 +86,8 @@ def positive(name: str, value: float, *, zero: bool = False) -> float:
     allowed = f"a finite number {'from' if zero else 'above'} zero is needed"
     try:
         number = float(value)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {value!r} is not allowed: {allowed}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ParameterError(f"{name} = {as_said(value)} is not allowed: {allowed}") from None
     if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
         raise ParameterError(f"{name} = {value} is not allowed: {allowed}")
     return number
@@ -85,7 +131,8 @@ def checked_number(
         number = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ParameterError(
-            f"{name} = {value!r} is not allowed: {'' if whole else 'a number is needed, '}{allowed}"
+            f"{name} = {as_said(value)} is not allowed: "
+            f"{'' if whole else 'a number is needed, '}{allowed}"
         ) from None
     if not (math.isfinite(number) and lower <= number <= upper) or (
         whole and not number.is_integer()
@@ -144,7 +191,9 @@ def checked_table(name: str, values: Any) -> dict[str, Any]:
         If it is no mapping, or a key is no text.
     """
     if not isinstance(values, Mapping):
-        raise ParameterError(f"{name} = {values!r} is not allowed: a mapping of names is needed")
+        raise ParameterError(
+            f"{name} = {as_said(values)} is not allowed: a mapping of names is needed"
+        )
     for key in values:
         if not isinstance(key, str):
             raise ParameterError(f"{name} has the key {key!r}, which is not allowed: a name is one")

@@ -5,7 +5,11 @@ run.json says.
 import hashlib
 import json
 import os
+import signal
+import subprocess
 import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -175,6 +179,46 @@ def test_interrupted_workers_are_ended(tmp_path):
         prove(home, jobs=2, say=stop, command=[sys.executable, str(script)])
     with pytest.raises(ProcessLookupError):
         os.kill(int((home / "results" / "pid").read_text()), 0)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are those of POSIX")
+@pytest.mark.parametrize(
+    ("number", "wait"),
+    [(signal.SIGTERM, 0.0), (signal.SIGTERM, 0.3), (signal.SIGHUP, 0.1), (signal.SIGINT, 0.1)],
+)
+def test_a_signal_leaves_no_worker_and_no_folder(tmp_path, number, wait):
+    home = make(tmp_path / "home", "a", "b", "c")
+    slow = (
+        "import os, sys, time; open(sys.argv[2] + '.pid', 'w').write(str(os.getpid())); "
+        "time.sleep(60)"
+    )
+    program = f"""
+import sys
+from pamrs.diagnosis.prove import prove
+prove({str(home)!r}, jobs=2, command=[sys.executable, "-c", {slow!r}])
+"""
+    temporary = tmp_path / "tmp"
+    temporary.mkdir()
+    own = str(Path(pamrs.__file__).parents[1])
+    paths = os.pathsep.join([own, os.environ.get("PYTHONPATH", "")])
+    with subprocess.Popen(
+        [sys.executable, "-c", program],
+        env={**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths},
+        stderr=subprocess.DEVNULL,
+    ) as process:
+        began = time.monotonic()
+        while not list(home.glob("results/*/out.json.pid")) and time.monotonic() - began < 60.0:
+            time.sleep(0.02)
+        time.sleep(wait)
+        process.send_signal(number)
+        ended = process.wait(30)
+    assert ended == (-signal.SIGINT if number == signal.SIGINT else 128 + number)
+    workers = [int(f.read_text()) for f in home.glob("results/*/out.json.pid") if f.read_text()]
+    assert workers
+    for pid in workers:
+        with pytest.raises(ProcessLookupError):
+            os.kill(pid, 0)
+    assert list(temporary.iterdir()) == []
 
 
 def test_a_case_that_takes_too_long_is_given_up(tmp_path):

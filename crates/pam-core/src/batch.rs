@@ -11,6 +11,7 @@ use std::sync::Arc;
 use crate::lanes::group::{grouped, Group, Rigs, Row};
 use crate::lanes::Spent;
 use crate::plant::Rig;
+use crate::room::{counted, room};
 use crate::simulate::drive::{
     check_frame, check_value, command_missing, input_range, prescribable, set_pressure, Drive,
 };
@@ -88,8 +89,9 @@ impl Batch {
             let (name, why) = ("initial".into(), "one for each row".into());
             return Err(Error::Length { name, found: initial.len(), expected: rigs.len(), why });
         }
+        counted::<f64>("channels of all plants", &[rigs.len(), first.names().channels.len()])?;
         let mut distinct: Vec<Arc<Rig>> = Vec::new();
-        let mut rig_of = Vec::with_capacity(rigs.len());
+        let mut rig_of = room("plants", &[rigs.len()], 0)?;
         for (row, rig) in rigs.iter().enumerate() {
             // Equal rigs mostly stand next to each other, and then often one is all there is.
             let known = distinct.iter().rposition(|other| Arc::ptr_eq(other, rig));
@@ -97,7 +99,7 @@ impl Batch {
                 same_ports(first, rig).map_err(|e| of_row(row, e))?;
                 distinct.push(Arc::clone(rig));
             }
-            rig_of.push(known.unwrap_or(distinct.len() - 1));
+            rig_of[row] = known.unwrap_or(distinct.len() - 1);
         }
         let valves = first.spec().valves.len();
         let default = |input: usize| {
@@ -112,7 +114,8 @@ impl Batch {
             let end = (begin + size).min(rigs.len());
             chunks.push(Chunk::new(begin, &rigs[begin..end], timing, &initial[begin..end])?);
         }
-        let substeps = distinct.iter().map(|rig| timing.stable(rig).substeps).max().unwrap_or(1);
+        let steps = distinct.iter().map(|rig| Ok(timing.stable(rig)?.substeps));
+        let substeps = steps.collect::<Result<Vec<_>>>()?.into_iter().max().unwrap_or(1);
         Ok(Self {
             rigs: distinct,
             rig_of,
@@ -350,7 +353,7 @@ impl Chunk {
                 known.push(Arc::clone(rig));
             }
             let progress = Progress::start(rig, initial).map_err(at)?;
-            let timing = timing.stable(rig);
+            let timing = timing.stable(rig).map_err(at)?;
             progress.observe(rig, timing, &mut Trajectory::new(rig, 1)).map_err(at)?;
             let rig = place.unwrap_or(known.len() - 1);
             rows.push(Row { place: first + k, rig, timing, progress, failure: None });

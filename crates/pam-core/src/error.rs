@@ -7,7 +7,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum Error {
     /// A parameter or argument outside its allowed range (NaN included).
-    #[error("{name} = {value} is not allowed: {allowed}")]
+    #[error("{name} = {} is not allowed: {allowed}", told(*value))]
     Parameter {
         /// The parameter's dotted name, for example `muscle.braid_angle`.
         name: String,
@@ -28,6 +28,16 @@ pub enum Error {
         /// Where the expectation comes from.
         why: String,
     },
+    /// More room is asked for than is allowed, or than there is.
+    #[error("room for {} {name} is not allowed: {allowed}", told(*count))]
+    Room {
+        /// What it is for.
+        name: String,
+        /// Entries that were asked for.
+        count: f64,
+        /// What is allowed.
+        allowed: String,
+    },
     /// A parameter has a name for its value that is not known, or does not belong to the model
     /// chosen.
     #[error("{name} = {value} is not allowed: {allowed}")]
@@ -43,7 +53,7 @@ pub enum Error {
     #[error("{0}")]
     Model(String),
     /// The integration left the range in which the model holds.
-    #[error("integration stopped at time = {time} s: {name} = {value}, {allowed}")]
+    #[error("integration stopped at time = {time} s: {name} = {}, {allowed}", told(*value))]
     Integration {
         /// Simulated time [s].
         time: f64,
@@ -60,6 +70,16 @@ impl Error {
     /// A [`Error::Parameter`] from its parts.
     pub fn parameter(name: impl Into<String>, value: f64, allowed: impl Into<String>) -> Self {
         Self::Parameter { name: name.into(), value, allowed: allowed.into() }
+    }
+}
+
+/// A number as a message has it: not in three hundred digits.
+fn told(value: f64) -> String {
+    match value.abs() {
+        size if size.is_finite() && size != 0.0 && !(1e-12..1e16).contains(&size) => {
+            format!("{value:e}")
+        }
+        _ => value.to_string(),
     }
 }
 

@@ -25,6 +25,7 @@ pub mod error;
 pub mod lanes;
 pub mod muscle;
 pub mod plant;
+mod room;
 pub mod scalar;
 pub mod simulate;
 

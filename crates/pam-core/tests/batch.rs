@@ -74,7 +74,7 @@ fn alone(rig: &Rig, initial: &Initial, row: usize, samples: usize) -> (Vec<f64>,
     let mut progress = Progress::start(rig, initial).unwrap();
     let mut out = Trajectory::new(rig, samples);
     let drive = Drive::new(rig, samples, &[("valve_command", &signal)]).unwrap();
-    progress.advance(rig, TIMING.stable(rig), &drive, &mut out).unwrap();
+    progress.advance(rig, TIMING.stable(rig).unwrap(), &drive, &mut out).unwrap();
     (progress.to_vec(), out)
 }
 
@@ -179,7 +179,7 @@ fn beyond_the_curves_a_plant_runs_alone_and_a_restart_is_still_exact() {
         let mut out = Trajectory::new(&base, samples);
         let signal = vec![10.0; samples];
         let drive = Drive::new(&base, samples, &[("valve_command", &signal)]).unwrap();
-        progress.advance(&base, TIMING.stable(&base), &drive, &mut out).unwrap();
+        progress.advance(&base, TIMING.stable(&base).unwrap(), &drive, &mut out).unwrap();
         for (channel, values) in out.channels.iter().enumerate() {
             let size = values.iter().fold(1e-6_f64, |size, value| size.max(value.abs()));
             let found = whole.observe()[channel * 6 + row];

@@ -55,8 +55,14 @@ fn borrowed(signals: &[(String, Vec<f64>)]) -> Vec<(&str, &[f64])> {
 
 fn run(rig: &Rig, rows: usize) -> Trajectory {
     let signals = signals(rig, rows);
-    pam_core::simulate::simulate(rig, rows, &borrowed(&signals), TIMING.stable(rig), &initial(rig))
-        .unwrap()
+    pam_core::simulate::simulate(
+        rig,
+        rows,
+        &borrowed(&signals),
+        TIMING.stable(rig).unwrap(),
+        &initial(rig),
+    )
+    .unwrap()
 }
 
 /// Whether a rig has no supply of the kind that an effect acts on.
@@ -248,7 +254,7 @@ fn sensitivities(
             rig,
             Block::from_name(rig, block).unwrap(),
             &measured,
-            TIMING.stable(rig),
+            TIMING.stable(rig).unwrap(),
             &[0, 40],
             ids,
         )
@@ -360,7 +366,8 @@ fn predictions_repeat_what_a_transducer_at_the_valve_reads() {
         let signals: Vec<_> = known.iter().map(signal).collect();
         let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &signals).unwrap();
         let block = Block::from_name(rig, block).unwrap();
-        let found = predict(rig, block, &measured, TIMING.stable(rig), &[0], &[]).unwrap().value;
+        let found =
+            predict(rig, block, &measured, TIMING.stable(rig).unwrap(), &[0], &[]).unwrap().value;
         let was = truth.get(rig, name).unwrap();
         let span = was.iter().copied().fold(f64::MIN, f64::max)
             - was.iter().copied().fold(f64::MAX, f64::min);

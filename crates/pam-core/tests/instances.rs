@@ -38,7 +38,7 @@ fn run(rig: &Rig) -> Trajectory {
     let start = ["muscle_pressure.flexor", "muscle_pressure.extensor"]
         .iter()
         .fold(Initial::rest(rig), |start, name| start.with(rig, name, 2e5).unwrap());
-    simulate(rig, ROWS, &borrowed(&commands(rig)), TIMING.stable(rig), &start).unwrap()
+    simulate(rig, ROWS, &borrowed(&commands(rig)), TIMING.stable(rig).unwrap(), &start).unwrap()
 }
 
 fn last(rig: &Rig, out: &Trajectory, name: &str) -> f64 {
@@ -122,8 +122,15 @@ fn predicted(rig: &Rig, truth: &Trajectory, block: &str, names: &[&str]) -> Pred
         .collect();
     let measured = Measured::new(rig, ROWS, &borrowed(&inputs), &measured).unwrap();
     let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
-    predict(rig, Block::from_name(rig, block).unwrap(), &measured, TIMING.stable(rig), &[0], &ids)
-        .unwrap()
+    predict(
+        rig,
+        Block::from_name(rig, block).unwrap(),
+        &measured,
+        TIMING.stable(rig).unwrap(),
+        &[0],
+        &ids,
+    )
+    .unwrap()
 }
 
 #[test]

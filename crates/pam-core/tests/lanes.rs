@@ -79,7 +79,7 @@ fn apart(rig: &Rig, request: &Request<'_>, outcome: &Outcome) -> f64 {
                 Signal::Each(values) => (*name, &values[plant * ROWS..(plant + 1) * ROWS]),
             })
             .collect();
-        let timing = TIMING.stable(&alone);
+        let timing = TIMING.stable(&alone).unwrap();
         let wanted = simulate(&alone, ROWS, &signals, timing, &Initial::rest(&alone)).unwrap();
         for (found, wanted) in outcome.recorded.iter().zip(&wanted.channels) {
             let size = wanted.iter().fold(1e-6_f64, |size, value| size.max(value.abs()));
@@ -194,7 +194,7 @@ fn lone(
     let signals: Vec<(&str, &[f64])> =
         signals.iter().map(|(name, values)| (name.as_str(), &values[..])).collect();
     let drive = Drive::new(rig, ROWS, &signals).unwrap();
-    let timing = TIMING.stable(rig);
+    let timing = TIMING.stable(rig).unwrap();
     let (mut progress, mut out) =
         (Progress::start(rig, start).unwrap(), Trajectory::new(rig, ROWS));
     progress.observe_in(run, timing, &mut out).unwrap();

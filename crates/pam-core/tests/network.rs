@@ -68,7 +68,7 @@ fn run(
     sample_time: f64,
     step: f64,
 ) -> Trajectory {
-    let timing = Timing::new(sample_time, step).unwrap().stable(rig);
+    let timing = Timing::new(sample_time, step).unwrap().stable(rig).unwrap();
     simulate(rig, rows, signals, timing, &Initial::rest(rig)).unwrap()
 }
 
@@ -370,7 +370,7 @@ fn the_block_of_a_bottle_is_drawn_from_by_its_regulator() {
     let (rows, dt) = (400, 0.005);
     let set: Vec<f64> = (0..rows).map(|k| if k < 100 { 3e5 } else { 6e5 }).collect();
     let command: &[(&str, &[f64])] = &[("supply_command.regulator", &set)];
-    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig).unwrap();
     let truth = simulate(&rig, rows, command, timing, &Initial::rest(&rig)).unwrap();
     let names = ["supply_pressure.bottle", "supply_pressure.regulator", "muscle_pressure"];
     let slopes: Vec<_> = names.iter().map(|name| slopes(&truth, &rig, name, dt)).collect();
@@ -382,7 +382,7 @@ fn the_block_of_a_bottle_is_drawn_from_by_its_regulator() {
         let begins = [("supply.regulator", 4e5)];
         let measured = Measured::new(rig, rows, command, &own)?.beginning(rig, &begins)?;
         let block = Block::from_name(rig, block)?;
-        let timing = timing.at_most(block.longest_step(rig, &measured)?);
+        let timing = timing.at_most(block.longest_step(rig, &measured)?).unwrap();
         let asked: Vec<_> = rig.parameters().find(parameter).into_iter().collect();
         predict(rig, block, &measured, timing, &[0], &asked)
     };
@@ -499,7 +499,7 @@ fn stops_and_choking_are_recorded_with_their_times() {
 #[test]
 fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
     let rig = Rig::new(two_joints()).unwrap();
-    let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig);
+    let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig).unwrap();
     let (a, b) = (wave(120, 0.0), wave(120, 1.0));
     let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
     let drive = pam_core::simulate::drive::Drive::new(&rig, 120, &signals).unwrap();
@@ -644,7 +644,7 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
     let rig = Rig::new(fed_through_a_tube(5e-6, 2.0)).unwrap();
     let (rows, dt) = (400, 0.005);
     let command = wave(rows, 0.0);
-    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig).unwrap();
     let start = Initial::rest(&rig);
     let truth = simulate(&rig, rows, &[("valve_command", &command)], timing, &start).unwrap();
     let names = ["supply_pressure", "line_pressure", "muscle_pressure", "joint_angle"];
@@ -656,7 +656,7 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
     let missed = |rig: &Rig| {
         let measured = Measured::new(rig, rows, &[("valve_command", &command)], &signals).unwrap();
         let block = Block::from_name(rig, "line").unwrap();
-        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap());
+        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap()).unwrap();
         let found = predict(rig, block, &measured, timing, &[0], &[]).unwrap().value;
         let read = truth.get(rig, "line_pressure").unwrap();
         found.iter().zip(read).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
@@ -675,7 +675,7 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
     let rig = Rig::new(spec).unwrap();
     let (rows, dt) = (200, 0.005);
     let (command, still, flat) = (vec![3e5; rows], vec![0.0; rows], vec![0.0; rows]);
-    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig);
+    let timing = Timing::new(dt, 0.001).unwrap().stable(&rig).unwrap();
     let begun = |outlets: &[(&str, f64)]| {
         let signal = Signal { value: &still, slope: &flat };
         let measured = Measured::new(
@@ -687,7 +687,7 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
         .unwrap()
         .beginning(&rig, outlets)?;
         let block = Block::from_name(&rig, "chamber").unwrap();
-        let timing = timing.at_most(block.longest_step(&rig, &measured)?);
+        let timing = timing.at_most(block.longest_step(&rig, &measured)?).unwrap();
         predict(&rig, block, &measured, timing, &[0], &[]).map(|found| found.value)
     };
     let (fed, full) = (begun(&[]).unwrap(), begun(&[("supply", 3e5)]).unwrap());
@@ -719,7 +719,7 @@ fn a_gas_beside_driven_pressures_takes_longer_steps() {
     let longest = block.longest_step(&rig, &measured).unwrap();
     assert!((longest / rig.gas_step() - 2.0).abs() < 0.3, "{longest} {}", rig.gas_step());
     let end = |step: f64| {
-        let timing = Timing::new(dt, dt).unwrap().at_most(step);
+        let timing = Timing::new(dt, dt).unwrap().at_most(step).unwrap();
         let found = predict(&rig, block, &measured, timing, &[0], &[]).unwrap().value;
         assert!(found.windows(2).all(|pair| pair[1] >= pair[0] - 1e-6), "it oscillates");
         found[rows - 1]

@@ -37,7 +37,7 @@ impl Log {
     fn of(rig: &Rig, from: usize) -> Self {
         let rows = ROWS + from;
         let command = command(rows);
-        let timing = Timing { sample_time: DT, substeps: 10 }.stable(rig);
+        let timing = Timing { sample_time: DT, substeps: 10 }.stable(rig).unwrap();
         let start = Initial::rest(rig).with(rig, "muscle_pressure", 2e5).unwrap();
         let start = start.with(rig, "joint_angle", 0.9).unwrap();
         let signals = [("valve_command", command.as_slice())];
@@ -62,7 +62,7 @@ impl Log {
         let measured = Measured::new(rig, ROWS, &commands, &signals).unwrap();
         let measured = measured.anchored(anchors).unwrap();
         let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
-        let timing = Timing { sample_time: DT, substeps: 10 }.stable(rig);
+        let timing = Timing { sample_time: DT, substeps: 10 }.stable(rig).unwrap();
         predict(rig, Block::from_name(rig, block).unwrap(), &measured, timing, &[0], &ids).unwrap()
     }
 }

@@ -260,7 +260,7 @@ fn a_stiff_spring_shortens_the_step_and_a_fast_one_too() {
         );
         // and the shortened one is stable
         let rig = with(shoulder(), vec![spring(form, "", [2e4, 0.3, 1e-3])]);
-        let (fine, rough) = (Timing { substeps: 400, ..TIMING }, TIMING.stable(&rig));
+        let (fine, rough) = (Timing { substeps: 400, ..TIMING }, TIMING.stable(&rig).unwrap());
         assert!(rough.substeps < 400, "{}", rough.substeps);
         let [a, b] =
             [fine, rough].map(|t| run_at(&rig, t).get(&rig, "joint_angle").unwrap().to_vec());

@@ -71,7 +71,7 @@ fn run(
     sample_time: f64,
     initial: &Initial,
 ) -> Trajectory {
-    let timing = Timing::new(sample_time, sample_time).unwrap().stable(rig);
+    let timing = Timing::new(sample_time, sample_time).unwrap().stable(rig).unwrap();
     simulate(rig, rows, signals, timing, initial).unwrap()
 }
 
@@ -236,7 +236,7 @@ fn any_tube_is_stable_at_its_own_step_and_accurate() {
             let rest = Initial::rest(&rig);
             simulate(&rig, 40, &[("valve_command", &u)], timing, &rest).unwrap()
         };
-        let own = Timing::new(0.01, 0.01).unwrap().stable(&rig);
+        let own = Timing::new(0.01, 0.01).unwrap().stable(&rig).unwrap();
         let finer = Timing { substeps: 4 * own.substeps, ..own };
         let (coarse, fine) = (at(own), at(finer));
         for name in ["line_pressure", "muscle_pressure", "joint_angle"] {
@@ -252,7 +252,7 @@ fn any_tube_is_stable_at_its_own_step_and_accurate() {
 #[test]
 fn a_run_goes_on_from_its_numbers_bit_for_bit() {
     let rig = Rig::new(fed(4.0, 5)).unwrap();
-    let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig);
+    let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig).unwrap();
     let u = wave(120);
     let signals: [(&str, &[f64]); 1] = [("valve_command", &u)];
     let drive = Drive::new(&rig, 120, &signals).unwrap();
@@ -329,7 +329,7 @@ fn a_block_is_predicted_through_the_tube_before_it() {
     let rig = Rig::new(gas(vec![chamber("a", 2e-4, 5e5), chamber("b", 1e-4, 0.0)], vec![line]));
     let rig = rig.unwrap();
     let (rows, dt) = (400, 5e-4);
-    let timing = Timing::new(dt, dt).unwrap().stable(&rig);
+    let timing = Timing::new(dt, dt).unwrap().stable(&rig).unwrap();
     let truth = simulate(&rig, rows, &[], timing, &Initial::rest(&rig)).unwrap();
     let read = ["muscle_pressure.a", "muscle_pressure.b"].map(|n| truth.get(&rig, n).unwrap());
     let slopes = read.map(|p| {
@@ -344,7 +344,7 @@ fn a_block_is_predicted_through_the_tube_before_it() {
         ];
         let measured = Measured::new(rig, rows, &[], &signals).unwrap();
         let block = Block::from_name(rig, "chamber.b").unwrap();
-        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap());
+        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap()).unwrap();
         let found = predict(rig, block, &measured, timing, &[0, 200], &[]).unwrap().value;
         found.iter().zip(read[1]).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
     };

@@ -90,7 +90,7 @@ fn cells_of_the_tables() {
 /// longer ones.
 #[test]
 fn steps_of_a_sample() {
-    let steps = |spec: RigSpec| SAMPLE.stable(&Rig::new(spec).unwrap()).substeps;
+    let steps = |spec: RigSpec| SAMPLE.stable(&Rig::new(spec).unwrap()).unwrap().substeps;
     let mut table = String::from("# rig or effect: least steps of a sample of 100 ms\n");
     let plain = [
         ("shoulder", shoulder()),

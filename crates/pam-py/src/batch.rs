@@ -54,7 +54,8 @@ impl Batch {
         threads: usize,
     ) -> PyResult<Self> {
         let rigs: Vec<_> = rigs.iter().map(|rig| rig.get().shared()).collect();
-        let start: Vec<_> = start.iter().map(|(name, given)| (name, values(given))).collect();
+        let start = start.iter().map(|(name, given)| Ok((name, values(given)?)));
+        let start = start.collect::<PyResult<Vec<_>>>()?;
         let made = py.detach(|| {
             let initial = rigs.iter().enumerate().map(|(row, rig)| {
                 let given = |initial: Initial, (name, values): &(&String, Vec<f64>)| {
@@ -76,7 +77,7 @@ impl Batch {
         signals: Signals<'py>,
         strict: bool,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let signals = owned(&signals);
+        let signals = owned(&signals)?;
         let signals = borrowed(&signals);
         self.with(|plants| {
             watched(py, |look| plants.advance(samples, &signals, strict, look))?;
@@ -111,7 +112,7 @@ impl Batch {
         states: Vec<PyReadonlyArray1<'_, f64>>,
         status: Vec<Ended>,
     ) -> PyResult<()> {
-        let states: Vec<_> = states.iter().map(values).collect();
+        let states = states.iter().map(values).collect::<PyResult<Vec<_>>>()?;
         let ended = |e: Ended| e.map(|(time, message)| Failure { time, message });
         let failures: Vec<_> = status.into_iter().map(ended).collect();
         self.with(|plants| plants.restore(samples, &states, &failures).map_err(|e| error(py, &e)))

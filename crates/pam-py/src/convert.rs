@@ -1,6 +1,7 @@
 //! Errors and arrays.
 
-use numpy::{PyArray1, PyReadonlyArray1};
+use numpy::ndarray::Dimension;
+use numpy::{PyArray1, PyReadonlyArray};
 use pyo3::exceptions::{PyArithmeticError, PyValueError};
 use pyo3::prelude::*;
 
@@ -22,9 +23,23 @@ pub fn error(py: Python<'_>, e: &pam_core::Error) -> PyErr {
     }
 }
 
-/// Copy a one-dimensional array (any stride) out of Python.
-pub fn values(array: &PyReadonlyArray1<'_, f64>) -> Vec<f64> {
-    array.as_array().iter().copied().collect()
+/// Numbers of an array that are copied at most: 2 GB. One with a stride of zero holds none of them.
+const MOST_NUMBERS: usize = 250_000_000;
+
+/// Copy an array (any stride) out of Python.
+///
+/// # Errors
+/// `ValueError` for one of more than 2 GB, or than there is memory for.
+pub fn values<D: Dimension>(array: &PyReadonlyArray<'_, f64, D>) -> PyResult<Vec<f64>> {
+    let (array, mut copied) = (array.as_array(), Vec::new());
+    if array.len() > MOST_NUMBERS || copied.try_reserve_exact(array.len()).is_err() {
+        return Err(PyValueError::new_err(format!(
+            "an array of {} numbers is not allowed: at most {MOST_NUMBERS} (2 GB)",
+            array.len()
+        )));
+    }
+    copied.extend(array.iter().copied());
+    Ok(copied)
 }
 
 /// Hand a vector to Python.

@@ -54,7 +54,8 @@ impl Gas {
         };
         check_range("area", area, 0.0, 1.0, "m2").map_err(|e| error(py, &e))?;
         check_range("upstream", upstream, 1.0, 1e9, "Pa (absolute)").map_err(|e| error(py, &e))?;
-        let flows: pam_core::Result<Vec<f64>> = values(&downstream).into_iter().map(flow).collect();
+        let flows: pam_core::Result<Vec<f64>> =
+            values(&downstream)?.into_iter().map(flow).collect();
         flows.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }
 
@@ -81,7 +82,8 @@ impl Gas {
             check_range("downstream", p, 0.0, 1e9, "Pa (absolute)")?;
             Ok(tube.mass_flow(upstream, p))
         };
-        let flows: pam_core::Result<Vec<f64>> = values(&downstream).into_iter().map(flow).collect();
+        let flows: pam_core::Result<Vec<f64>> =
+            values(&downstream)?.into_iter().map(flow).collect();
         flows.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }
 

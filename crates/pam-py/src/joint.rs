@@ -28,7 +28,7 @@ impl Joint {
             }
             Ok(f(self.inner.eval(angle)))
         };
-        let result: pam_core::Result<Vec<f64>> = values(angle).into_iter().map(at).collect();
+        let result: pam_core::Result<Vec<f64>> = values(angle)?.into_iter().map(at).collect();
         result.map(|v| array(py, v)).map_err(|e| error(py, &e))
     }
 }
@@ -73,9 +73,9 @@ impl Joint {
         &self,
         py: Python<'py>,
         angle: PyReadonlyArray1<'py, f64>,
-    ) -> Bound<'py, PyArray1<f64>> {
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let within =
             |angle: f64| f64::from(u8::from(angle.is_finite() && self.inner.reaches(angle)));
-        array(py, values(&angle).into_iter().map(within).collect())
+        Ok(array(py, values(&angle)?.into_iter().map(within).collect()))
     }
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::convert::{array, error};
+use crate::convert::{array, error, values};
 use crate::rig::Rig;
 use crate::simulator::watched;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -40,7 +40,7 @@ pub fn side_by_side<'py>(
     threads: usize,
 ) -> PyResult<Results<'py>> {
     let core = rig.shared();
-    let (signals, parameters, initial) = (owned(&signals), owned(&parameters), owned(&initial));
+    let (signals, parameters, initial) = (owned(&signals)?, owned(&parameters)?, owned(&initial)?);
     let request = request(
         &core,
         (plants, rows, every.max(1), threads),
@@ -70,9 +70,8 @@ pub fn side_by_side<'py>(
 /// Name, values, and whether there is a line for each plant.
 type Owned = Vec<(String, Vec<f64>, bool)>;
 
-fn owned(arrays: &Arrays<'_>) -> Owned {
-    let values = |a: &PyReadonlyArrayDyn<'_, f64>| a.as_array().iter().copied().collect();
-    arrays.iter().map(|(name, a)| (name.clone(), values(a), a.ndim() == 2)).collect()
+fn owned(arrays: &Arrays<'_>) -> PyResult<Owned> {
+    arrays.iter().map(|(name, a)| Ok((name.clone(), values(a)?, a.ndim() == 2))).collect()
 }
 
 fn request<'a>(

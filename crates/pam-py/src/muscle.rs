@@ -25,7 +25,7 @@ impl ForceTable {
         contraction: PyReadonlyArray1<'_, f64>,
         force: PyReadonlyArray1<'_, f64>,
     ) -> PyResult<Self> {
-        MapSurface::of(&values(&pressure), &values(&contraction), &values(&force))
+        MapSurface::of(&values(&pressure)?, &values(&contraction)?, &values(&force)?)
             .map(|inner| Self { inner })
             .map_err(|e| error(py, &e))
     }
@@ -36,10 +36,10 @@ impl ForceTable {
         py: Python<'py>,
         pressure: PyReadonlyArray1<'py, f64>,
         contraction: PyReadonlyArray1<'py, f64>,
-    ) -> Bound<'py, PyArray1<f64>> {
-        let (p, e) = (values(&pressure), values(&contraction));
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (p, e) = (values(&pressure)?, values(&contraction)?);
         let force = p.iter().zip(&e).map(|(p, e)| self.inner.force(*p, *e));
-        array(py, force.collect())
+        Ok(array(py, force.collect()))
     }
 }
 
@@ -59,7 +59,7 @@ impl Muscle {
         contraction: &PyReadonlyArray1<'py, f64>,
         f: impl Fn(&CoreMuscle, f64) -> Result<f64> + Send + Sync,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let e = values(contraction);
+        let e = values(contraction)?;
         let inner = &self.inner;
         let result: Result<Vec<f64>> = py.detach(|| e.iter().map(|e| f(inner, *e)).collect());
         result.map(|v| array(py, v)).map_err(|e| error(py, &e))
@@ -74,7 +74,8 @@ impl Muscle {
         direction: Option<&PyReadonlyArray1<'py, f64>>,
         f: impl Fn(f64, f64, Option<f64>) -> Result<f64> + Send + Sync,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (p, e, d) = (values(pressure), values(contraction), direction.map(values));
+        let (p, e, d) =
+            (values(pressure)?, values(contraction)?, direction.map(values).transpose()?);
         let at = |list: &[f64], k: usize| list.get(k).copied().unwrap_or(f64::NAN);
         let result: Result<Vec<f64>> = py.detach(|| {
             (0..e.len()).map(|k| f(at(&p, k), e[k], d.as_ref().map(|d| at(d, k)))).collect()
@@ -160,7 +161,7 @@ impl Muscle {
         py: Python<'py>,
         contraction: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let e = values(&contraction);
+        let e = values(&contraction)?;
         let (inner, shape) = (&self.inner, [e.len(), self.inner.order()]);
         let rows: Result<Vec<Vec<f64>>> =
             py.detach(|| e.iter().map(|e| inner.elastic_basis(*e)).collect());
@@ -190,8 +191,8 @@ impl Muscle {
         &self,
         py: Python<'py>,
         force: PyReadonlyArray1<'py, f64>,
-    ) -> Bound<'py, PyArray1<f64>> {
-        array(py, values(&force).iter().map(|f| self.inner.buckled(*f)).collect())
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(array(py, values(&force)?.iter().map(|f| self.inner.buckled(*f)).collect()))
     }
 
     /// Force [N] of one muscle from the compiled table; otherwise as `force`.

@@ -42,8 +42,8 @@ type Matrices<'py> =
 type Owned = Vec<(String, Vec<f64>)>;
 
 /// Signals by name as the core takes them.
-pub fn owned(signals: &Signals<'_>) -> Owned {
-    signals.iter().map(|(name, signal)| (name.clone(), values(signal))).collect()
+pub fn owned(signals: &Signals<'_>) -> PyResult<Owned> {
+    signals.iter().map(|(name, signal)| Ok((name.clone(), values(signal)?))).collect()
 }
 
 /// Borrowed view of [`owned`].
@@ -67,11 +67,11 @@ impl Rig {
         anchors: &[usize],
         work: impl FnOnce(Block, &Measured<'_>, Timing) -> pam_core::Result<T> + Send,
     ) -> PyResult<T> {
-        let commands = owned(commands);
-        let signals: Vec<_> = measured
+        let commands = owned(commands)?;
+        let signals = measured
             .iter()
-            .map(|(name, (value, slope))| (name, values(value), values(slope)))
-            .collect();
+            .map(|(name, (value, slope))| Ok((name, values(value)?, values(slope)?)))
+            .collect::<PyResult<Vec<_>>>()?;
         let inner = &*self.inner;
         let found = py.detach(|| {
             let signals: Vec<_> = (signals.iter())
@@ -83,7 +83,7 @@ impl Rig {
                 .anchored(anchors)?;
             let block = Block::from_name(inner, block)?;
             let longest = block.longest_step(inner, &measured)?;
-            let timing = Timing::new(sample_time, step)?.at_most(longest);
+            let timing = Timing::new(sample_time, step)?.at_most(longest)?;
             work(block, &measured, timing)
         });
         found.map_err(|e| error(py, &e))
@@ -108,7 +108,7 @@ impl Rig {
     /// The same rig with other values of its parameters, in the order of their names; nothing is
     /// wired again.
     fn with_values(&self, py: Python<'_>, values: PyReadonlyArray1<'_, f64>) -> PyResult<Self> {
-        let values = crate::convert::values(&values);
+        let values = crate::convert::values(&values)?;
         let made = py.detach(|| self.inner.with_values(&values));
         Ok(Self { inner: Arc::new(made.map_err(|e| error(py, &e))?) })
     }
@@ -187,9 +187,9 @@ impl Rig {
         stepwise: bool,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
         let rig = &*self.inner;
-        let signals = owned(&signals);
+        let signals = owned(&signals)?;
         let begun = Timing::new(sample_time, step).and_then(|timing| {
-            let timing = timing.stable(rig);
+            let timing = timing.stable(rig)?;
             let numbers =
                 |names: &Vec<String>| names.iter().map(|n| rig.names().channel(n)).collect();
             let wanted: Option<Vec<usize>> = record.as_ref().map(numbers).transpose()?;

@@ -192,7 +192,7 @@ impl Simulator {
     ) -> PyResult<Self> {
         let rig = rig.shared();
         let made = Timing::new(sample_time, step)
-            .and_then(|t| Ok((t.stable(&rig), Progress::start(&rig, &initial(&rig, &start)?)?)));
+            .and_then(|t| Ok((t.stable(&rig)?, Progress::start(&rig, &initial(&rig, &start)?)?)));
         let (timing, progress) = made.map_err(|e| error(py, &e))?;
         let names: Vec<Py<PyString>> = (rig.names().channels.iter())
             .map(|(name, _)| PyString::intern(py, name).unbind())
@@ -221,7 +221,7 @@ impl Simulator {
         samples: usize,
         signals: Signals<'py>,
     ) -> PyResult<(Bound<'py, PyDict>, Vec<EventRow>)> {
-        let signals = owned(&signals);
+        let signals = owned(&signals)?;
         let drive =
             Drive::new(&self.rig, samples, &borrowed(&signals)).map_err(|e| error(py, &e))?;
         let mut out = Trajectory::new(&self.rig, samples);
@@ -316,7 +316,7 @@ impl Simulator {
 
     /// Go back, or on, to a state.
     fn restore(&self, py: Python<'_>, state: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        let restored = self.progress().restored(&values(&state)).map_err(|e| error(py, &e))?;
+        let restored = self.progress().restored(&values(&state)?).map_err(|e| error(py, &e))?;
         *self.progress() = restored;
         Ok(())
     }

@@ -12,12 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import as_numbers
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import initial_values, inputs_of, keywords
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
+    MOST_STATE,
     check_run,
     chosen_step,
     core_rig,
@@ -254,15 +256,22 @@ class Batch:
             )
         try:
             samples = int(state["samples"])
+            if not len(state["rows"]) == len(state["status"]) == len(self):
+                raise ParameterError(
+                    f"state is of {len(state['rows'])} rows and {len(state['status'])} status; "
+                    f"{len(self)} are needed"
+                )
             rows = [
-                np.ascontiguousarray(np.asarray(row, dtype=np.float64).reshape(-1))
+                np.ascontiguousarray(as_numbers("a row of state", row, MOST_STATE).reshape(-1))
                 for row in state["rows"]
             ]
             status = [
-                None if ended is None else (float(ended[0]), str(ended[1]))
+                None if ended is None else (float(ended[0]), str.__str__(ended[1]))
                 for ended in state["status"]
             ]
-        except (TypeError, ValueError, IndexError, OverflowError):
+        except ParameterError:
+            raise
+        except (TypeError, ValueError, LookupError, OverflowError):
             raise ParameterError(
                 "state is not one of a batch: its rows are arrays of numbers, its status None or "
                 "(time, message)"

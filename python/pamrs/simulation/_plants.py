@@ -8,12 +8,14 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import as_numbers, as_said
 from pamrs.errors import ParameterError
 
 __all__ = ["plants_of", "rowwise", "thread_count"]
 
 Array = NDArray[np.float64]
 _MOST_THREADS = 256
+_MOST_PLANTS = 10_000_000
 
 
 def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -> int:
@@ -22,7 +24,7 @@ def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -
     if n is not None:
         if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
             raise ParameterError(
-                f"n = {n!r} is not allowed: a whole number of plants, 1 at least, is needed"
+                f"n = {as_said(n)} is not allowed: a whole number of plants, 1 at least, is needed"
             )
         sizes = {"n": int(n), **sizes}
     if rigs is not None:
@@ -32,6 +34,11 @@ def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -
             "n is missing: the number of plants (or an array with a value for each of them)"
         )
     first, count = next(iter(sizes.items()))
+    if count > _MOST_PLANTS:
+        raise ParameterError(
+            f"{first} is for {as_said(count)} plants, which is not allowed: at most {_MOST_PLANTS} "
+            "at a time (pamrs.sweep runs more, chunk by chunk)"
+        )
     for name, size in sizes.items():
         if size != count or size < 1:
             raise ParameterError(
@@ -43,10 +50,7 @@ def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -
 
 def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Array:
     """A number for each plant; whether it is finite is only looked at where that is asked for."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} = {values!r} is not allowed: numbers are needed") from None
+    array = as_numbers(name, values, _MOST_PLANTS)
     if array.ndim == 0:
         array = np.full(n, float(array))
     if array.shape != (n,):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import check_column
+from pamrs._checks import as_numbers, check_column
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
@@ -21,6 +21,7 @@ from pamrs.simulation._simulation import (
     chosen_step,
     core_rig,
     names_of,
+    rows_of,
 )
 
 __all__ = ["REDUCTIONS", "simulate_batch"]
@@ -172,10 +173,7 @@ def _parameters(rig: Rig, given: Mapping[str, ArrayLike], count: int) -> dict[st
 
 
 def _numbers(name: str, values: ArrayLike) -> Array:
-    try:
-        array = np.asarray(values, dtype=np.float64, order="C")
-    except (TypeError, ValueError):
-        raise ParameterError(f"{name} is not allowed: numbers are needed") from None
+    array = as_numbers(name, values, MOST_NUMBERS)
     if array.ndim > 2 or array.size == 0:
         raise ParameterError(
             f"{name} has the shape {array.shape}; (rows,) or (n, rows) is needed, of one value at "
@@ -197,7 +195,7 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
             raise ParameterError(
                 f"duration = {duration} is not allowed: a finite time >= 0 s is needed"
             )
-        return round(duration / sample_time) + 1
+        return rows_of(duration, sample_time)
     if not sizes:
         raise ParameterError(
             "duration is missing: a finite time >= 0 s is needed (or give valve_command an array)"

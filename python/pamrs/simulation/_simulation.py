@@ -781,7 +781,18 @@ def _rows(sample_time: float, duration: float | None, *given: Signals | None) ->
         raise ParameterError(
             f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)"
         )
-    return round(duration / sample_time) + 1
+    return rows_of(duration, sample_time)
+
+
+def rows_of(duration: float, sample_time: float) -> int:
+    """Rows of a finite duration [s], as many as a run may keep at most."""
+    rows = float(duration) / float(sample_time)
+    if rows > MOST_NUMBERS:
+        raise ParameterError(
+            f"duration = {duration:g} s is not allowed: {rows:.3g} rows of sample_time = "
+            f"{sample_time:g} s, and at most {MOST_NUMBERS} are"
+        )
+    return round(rows) + 1
 
 
 def chosen_step(sample_time: float, step: float | None) -> float:
@@ -800,6 +811,8 @@ def default_step(sample_time: float, longest: float = 1e-3) -> float:
 
 #: Numbers that one run may keep: 2 GB.
 MOST_NUMBERS = 250_000_000
+#: Numbers of one simulation's state: those of some seconds of late commands are in it.
+MOST_STATE = 10_000_000
 _TELLING_TORQUE = 1.0  # N m
 _TELLING_PUSH = 1.0  # N, of one muscle
 _TELLING_DEGREES = 1.0

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import as_numbers
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, inputs_of, keywords, signals_of
 from pamrs.simulation._simulation import (
+    MOST_STATE,
     Event,
     Simulation,
     check_rows,
@@ -107,8 +109,9 @@ class Simulator:
         ParameterError
             If it has another length or a number that is not finite.
         """
+        numbers = as_numbers("state", state, MOST_STATE)
+        self._core.restore(np.ascontiguousarray(numbers.reshape(-1)))
         self.events = []
-        self._core.restore(np.ascontiguousarray(np.asarray(state, dtype=np.float64)))
 
     def reset(self, initial: Mapping[str, float] | None = None) -> dict[str, float]:
         """Begin again.

@@ -7,6 +7,7 @@ use super::window::Cut;
 use crate::dual::{Dual, LANES, WIDE_LANES};
 use crate::effects::Number;
 use crate::plant::{ParameterId, Place, Plant, Rig};
+use crate::room::room;
 use crate::scalar::constant;
 use crate::simulate::Timing;
 use crate::{Error, Result};
@@ -42,7 +43,8 @@ pub fn predict(
     let n = measured.samples;
     check(rig, block, measured, starts)?;
     let initial = block.initial_count(rig, measured);
-    let mut out = Prediction { value: vec![0.0; n], jacobian: Vec::new(), columns: 0 };
+    let value = room("samples", &[n], 0.0)?;
+    let mut out = Prediction { value, jacobian: Vec::new(), columns: 0 };
     if parameters.is_empty() {
         let plant = Plant::new(rig, rig.parameters().lift(), false)?;
         let bumps = vec![0.0; initial];
@@ -51,7 +53,7 @@ pub fn predict(
         return Ok(out);
     }
     out.columns = parameters.len() + initial;
-    out.jacobian = vec![0.0; n * out.columns];
+    out.jacobian = room("sensitivities", &[n, out.columns], 0.0)?;
     let columns: Vec<usize> = (0..out.columns).collect();
     let mut left = columns.as_slice();
     while !left.is_empty() {

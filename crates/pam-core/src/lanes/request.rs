@@ -3,6 +3,7 @@
 use super::group::Spent;
 use super::reduce::Reduce;
 use crate::plant::{ParameterId, Rig};
+use crate::room::counted;
 use crate::simulate::drive::{check_value, command_missing, input_range};
 use crate::simulate::{of_row, Failure, Initial, Timing};
 use crate::{Error, Result};
@@ -80,6 +81,7 @@ impl<'a, 'r> Checked<'a, 'r> {
     /// is not possible; they name the row.
     pub fn new(rig: &'a Rig, request: &'a Request<'r>) -> Result<Self> {
         let Request { plants, rows, .. } = *request;
+        let numbers = counted::<f64>("signals", &[plants, rows]);
         let given = request.parameters.iter().chain(&request.initial);
         for (name, values) in given {
             check_length(name, values.len(), plants, "one for each row")?;
@@ -88,7 +90,7 @@ impl<'a, 'r> Checked<'a, 'r> {
             match signal {
                 Signal::Common(values) => check_length(name, values.len(), rows, "one per sample")?,
                 Signal::Each(values) => {
-                    check_length(name, values.len(), plants * rows, "one per row and sample")?;
+                    check_length(name, values.len(), numbers.clone()?, "one per row and sample")?;
                 }
             }
         }

@@ -2,10 +2,11 @@
 
 use super::group::{grouped, Group, Rigs, Row, Spent};
 use super::reads::needs_sums;
-use super::reduce::Reduction;
+use super::reduce::{Reduce, Reduction};
 use super::request::{Checked, Outcome, Request, Signal};
 use super::steps::Steps;
 use crate::plant::{Plant, Rig};
+use crate::room::{counted, room};
 use crate::simulate::drive::Drive;
 use crate::simulate::run::Run;
 use crate::simulate::team::Team;
@@ -30,11 +31,16 @@ pub fn simulate(
     look: &mut dyn FnMut() -> Result<()>,
 ) -> Result<Outcome> {
     let checked = Checked::new(rig, request)?;
-    let steps = Steps::new(&checked)?;
     let (plants, kept) = (request.plants, request.rows.div_ceil(request.every.max(1)));
-    let mut recorded = vec![vec![0.0; plants * kept]; request.record.len()];
-    let mut reduced = vec![vec![0.0; plants]; request.reduce.len()];
-    let mut failures = vec![None; plants];
+    counted::<Option<Failure>>("plants", &[plants])?;
+    counted::<f64>("recorded numbers", &[plants, kept, request.record.len()])?;
+    counted::<f64>("reduced numbers", &[plants, request.reduce.len()])?;
+    let steps = Steps::new(&checked)?;
+    let channel = |_: &usize| room("recorded numbers", &[plants, kept], 0.0);
+    let mut recorded = request.record.iter().map(channel).collect::<Result<Vec<_>>>()?;
+    let number = |_: &Reduce| room("reduced numbers", &[plants], 0.0);
+    let mut reduced = request.reduce.iter().map(number).collect::<Result<Vec<_>>>()?;
+    let mut failures = room("plants", &[plants], None)?;
     let mut blocks = Block::all(&mut recorded, &mut reduced, &mut failures, kept);
     let work = Work::new(&checked, &steps);
     let mut team = Team::new(request.threads);

@@ -29,7 +29,8 @@ impl Steps {
         }
         let each = |plant: usize| {
             let rig = checked.rig.with_values(&checked.values(plant));
-            Ok(request.timing.stable(&rig.map_err(|e| of_row(plant, e))?).substeps)
+            let steps = rig.and_then(|rig| request.timing.stable(&rig));
+            Ok(steps.map_err(|e| of_row(plant, e))?.substeps)
         };
         Ok(Self::Each((0..request.plants).map(each).collect::<Result<_>>()?))
     }
@@ -70,7 +71,7 @@ fn corners(checked: &Checked<'_, '_>) -> Option<Vec<usize>> {
             values[*place] = if bits >> k & 1 == 0 { *low } else { *high };
         }
         let rig = checked.rig.with_values(&values).ok()?;
-        Some(request.timing.stable(&rig).substeps)
+        Some(request.timing.stable(&rig).ok()?.substeps)
     };
     (0..1 << spans.len()).map(corner).collect()
 }

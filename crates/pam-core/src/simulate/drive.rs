@@ -5,6 +5,7 @@ use std::ops::Range;
 
 use crate::description::dotted;
 use crate::plant::Rig;
+use crate::room::room;
 use crate::{Error, Result};
 
 /// What drives a simulation: one command per sample and input, and what is prescribed for the end
@@ -42,7 +43,7 @@ impl<'a> Drive<'a> {
                 None if k < spec.valves.len() => {
                     return Err(command_missing(name));
                 }
-                None => Cow::Owned(vec![set_pressure(rig, k); samples]),
+                None => Cow::Owned(room("samples", &[samples], set_pressure(rig, k))?),
             });
         }
         let mut prescribed = Vec::new();

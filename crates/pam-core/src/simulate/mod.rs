@@ -48,7 +48,7 @@ impl Timing {
         let divides = (1.0..=1e7).contains(&rounded) && (ratio - rounded).abs() <= 1e-6 * rounded;
         if !(step.is_finite() && step > 0.0 && divides) {
             let allowed = format!(
-                "a time > 0 s that divides sample_time = {sample_time} s into 1 to 1e7 steps"
+                "a time > 0 s that divides sample_time = {sample_time:?} s into 1 to 1e7 steps"
             );
             return Err(Error::parameter("step", step, allowed));
         }
@@ -56,16 +56,24 @@ impl Timing {
     }
 
     /// The same with each step divided until it is at most as long as a rig allows.
-    #[must_use]
-    pub fn stable(self, rig: &Rig) -> Self {
+    ///
+    /// # Errors
+    /// As [`Self::at_most`].
+    pub fn stable(self, rig: &Rig) -> Result<Self> {
         self.at_most(rig.stable_step())
     }
 
     /// The same with each step divided until it is at most so long [s].
-    #[must_use]
-    pub fn at_most(self, longest: f64) -> Self {
+    ///
+    /// # Errors
+    /// [`Error::Parameter`] for a sample time that would take more steps than anybody waits for.
+    pub fn at_most(self, longest: f64) -> Result<Self> {
         let parts = (self.step() / longest - 1e-9).ceil().max(1.0);
-        Self { substeps: self.substeps.saturating_mul(parts as usize), ..self }
+        if parts * self.substeps as f64 <= MOST_STEPS {
+            return Ok(Self { substeps: self.substeps * parts as usize, ..self });
+        }
+        let allowed = format!("at most {MOST_STEPS:e} steps of {longest:.3e} s, as the rig needs");
+        Err(Error::parameter("sample_time", self.sample_time, allowed))
     }
 
     /// Step [s].
@@ -74,6 +82,8 @@ impl Timing {
     }
 }
 
+/// Steps of one sample: some ten seconds of a small rig.
+const MOST_STEPS: f64 = 1e8;
 /// Steps between two looks outside: some ten milliseconds of a large rig.
 pub(crate) const STEPS_UNSEEN: usize = 8_000;
 /// Rows that room is made for at once.

@@ -28,6 +28,7 @@ pub fn of_row(row: usize, error: Error) -> Error {
         Error::Integration { time, name, value, allowed } => {
             Error::Integration { time, name: named(name), value, allowed }
         }
+        Error::Room { name, count, allowed } => Error::Room { name: named(name), count, allowed },
         Error::Model(message) => Error::Model(named(message)),
     }
 }

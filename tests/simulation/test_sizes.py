@@ -1,0 +1,104 @@
+"""Sizes that no memory holds and times that nobody waits for are errors before the work."""
+
+import numpy as np
+import pytest
+
+import pamrs
+from pamrs.errors import ParameterError
+
+SHOULDER = pamrs.rigs.shoulder()
+COMMAND = np.full(401, 6.0)
+END = {"e": ("final", "joint_angle")}
+
+
+@pytest.mark.parametrize("n", [10**8, 2**62, 10**400, 10**5000], ids=["8", "62", "400", "5000"])
+def test_plants_that_no_memory_holds_are_refused(n):
+    with pytest.raises(ParameterError, match="plants.* is not allowed: at most 10000000"):
+        pamrs.simulate_batch(SHOULDER, COMMAND, sample_time=0.005, n=n, reduce=END)
+    with pytest.raises(ParameterError, match="plants.* is not allowed: at most 10000000"):
+        pamrs.Batch(SHOULDER, n=n, sample_time=0.005)
+
+
+def test_the_core_refuses_them_by_itself():
+    core = pamrs.simulation.core_rig(SHOULDER)
+    for count in (2**40, 2**62):
+        with pytest.raises(ParameterError, match=r"is not allowed: at most \d+ \(2 GB\)"):
+            pamrs._core.side_by_side(
+                core, count, 3, {"valve_command": COMMAND[:3]}, 0.005, 0.001, {}, {},
+                ["joint_angle"], 1, [], 1,
+            )  # fmt: skip
+    with pytest.raises(ValueError, match=r"an array of \d+ numbers is not allowed: at most"):
+        core.with_values(np.broadcast_to(1.0, 10**12))
+
+
+def test_kept_channels_are_counted_together():
+    with pytest.raises(ParameterError, match="at most 250000000 numbers"):
+        pamrs.simulate_batch(
+            SHOULDER, COMMAND, sample_time=0.005, n=10**6, record=["joint_angle", "muscle_pressure"]
+        )
+
+
+@pytest.mark.parametrize("values", [np.broadcast_to(5.0, 10**12), {"a": 1}, [10**400], "many"])
+def test_what_is_no_array_of_numbers_is_refused(values):
+    with pytest.raises(ParameterError):
+        pamrs.simulate_batch(SHOULDER, values, sample_time=0.005, n=2, reduce=END)
+    with pytest.raises(ParameterError):
+        pamrs.simulate_batch(
+            SHOULDER, COMMAND, sample_time=0.005, n=2, parameters={"arm.payload": values}
+        )
+
+
+@pytest.mark.parametrize("time", [1e300, 1e9])
+def test_a_step_that_never_ends_is_refused(time):
+    for options in ({}, {"step": time}):
+        with pytest.raises(ParameterError, match=r"steps") as caught:
+            pamrs.simulate(SHOULDER, COMMAND[:3], sample_time=time, **options)
+        assert len(str(caught.value)) < 200
+        with pytest.raises(ParameterError, match=r"steps"):
+            pamrs.Simulator(SHOULDER, sample_time=time, **options)
+        with pytest.raises(ParameterError, match=r"steps"):
+            pamrs.Batch(SHOULDER, n=2, sample_time=time, **options)
+
+
+@pytest.mark.parametrize(("duration", "sample_time"), [(1e300, 1e-3), (1e300, 1e-300), (1e9, 1e-9)])
+def test_a_run_of_too_many_rows_is_refused(duration, sample_time):
+    for run in (
+        lambda: pamrs.simulate(SHOULDER, 5.0, duration=duration, sample_time=sample_time),
+        lambda: pamrs.simulate_batch(
+            SHOULDER, 5.0, n=2, duration=duration, sample_time=sample_time, reduce=END
+        ),
+    ):
+        with pytest.raises(ParameterError, match="rows") as caught:
+            run()
+        assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        np.broadcast_to(1.0, 10**9),
+        {"samples": 1},
+        "x",
+        None,
+        [10**400],
+        [float("nan")] * 5,
+        [[1.0], [2.0, 3.0]],
+    ],
+)
+def test_a_state_that_is_none_is_refused(state):
+    one = pamrs.Simulator(SHOULDER, sample_time=0.005)
+    many = pamrs.Batch(SHOULDER, n=2, sample_time=0.005)
+    before = many.state
+    with pytest.raises(ParameterError):
+        one.restore(state)
+    for wrong in (
+        {**before, "rows": state},
+        {**before, "rows": [state, state]},
+        {**before, "status": state},
+        {**before, "status": [state, state] if state is not None else [1, 2]},
+        {**before, "samples": state},
+        {**before, "rows": {0: 1.0, 1: 2.0}},
+    ):
+        with pytest.raises(ParameterError):
+            many.restore(wrong)
+    assert many.step(5.0)["joint_angle"].shape == (2,)
