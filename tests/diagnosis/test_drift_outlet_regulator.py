@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 import pamrs
+from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis.prepare import prepare
 from pamrs.recordings import Recording, load_case
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy
@@ -92,6 +94,13 @@ def test_a_load_cell_that_drifts_is_no_modulus_that_does() -> None:
     found = pamrs.diagnose(load_case(FAULTS / "06_load_cell_drift"))
     best = max(found.probabilities, key=lambda key: found.probabilities[key])
     assert "load_cell_drift" in best.split("+"), found
+
+
+def test_even_strokes_are_no_steps_of_a_converter() -> None:
+    case = load_case(FAULTS / "06_load_cell_drift")
+    for recording in case.recordings:
+        # written to 0.1 um, 0.4 mm from sample to sample
+        assert prepare(recording, case.rig, DiagnosisSettings()).noise["length"] < 1e-5
 
 
 def stroked(role: str, seed: int, drift: float, gauge: float) -> Recording:

@@ -217,7 +217,8 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
     ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
     if ok.sum() < 8:
         return 0.0
-    lattice = _lattice(values[mask])
+    rounded = _stays(values, mask, settings)
+    lattice = _lattice(values[mask]) if rounded else 0.0
     # the median of differences of whole steps moves by whole steps: as much noise as the lattice
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
@@ -225,7 +226,7 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
     quiet = _quietest_band(values, mask, settings)
     if quiet < settings.quiet_share * variance:
         # what jumps from sample to sample shows no small step in time, and a finer lattice
-        finer = _lattice(np.unique(values[mask]))
+        finer = _lattice(np.unique(values[mask])) if rounded else 0.0
         return float(np.sqrt(max(quiet, finer**2 / 12.0)))
     return float(np.sqrt(max(variance - lattice**2 / 12.0, lattice**2 / 12.0)))
 
@@ -235,6 +236,15 @@ def _lattice(values: Array) -> float:
     steps = np.abs(np.diff(values))
     steps = steps[steps > 1e-12 * max(1e-12, float(np.abs(values).max()))]
     return float(steps.min()) if steps.size else 0.0
+
+
+def _stays(values: Array, mask: Mask, settings: PrepareSettings) -> bool:
+    """Whether a channel stays on a number from sample to sample, as one that a converter rounds
+    does: an even stroke that is sampled evenly has numbers as evenly apart, and rounds nothing.
+    """
+    both = mask[1:] & mask[:-1]
+    equal = np.diff(values)[both] == 0.0
+    return bool(equal.size) and float(np.mean(equal)) > settings.rounded_still
 
 
 def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> float:
@@ -459,7 +469,8 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
         noise[name] = _noise_of(recording, name, settings)
-        step = _lattice(_as_logged(recording, name))
+        rounded = _stays(recording.channels[name], mask, own)
+        step = _lattice(_as_logged(recording, name)) if rounded else 0.0
         if noise[name] < own.rounded_share * step:
             steps[name] = step
         if noise[name] <= 0:
