@@ -60,7 +60,11 @@ PRESSED = {
     "antagonistic_joint": {"muscle_pressure.extensor": 2e5},
     "recruitment": {"muscle_pressure.pair_2": 1e5, "muscle_pressure.pair_3": 0.8e5},
 }
-SMOOTH = ["", *(name for name, info in EFFECTS.items() if info.kink is None)]
+#: Of what the rigs of POINTS may have: none of them has a line without a tube.
+SMOOTH = [
+    "",
+    *(name for name, info in EFFECTS.items() if info.kink is None and info.at != "line"),
+]
 
 
 def settled(name):

@@ -22,6 +22,8 @@ ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 CONSTANTS = {
     "prepare/_ambient.py": {"_SAME"},  # of temperatures that are told as one
+    # of a filter, a flip of a converter, a least squares and a quotient
+    "prepare/_deviations.py": {"_TAPS", "_SOON", "_ROWS", "_TINY"},
     "prepare/_signals.py": {"_TERMS"},  # of a cubic
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists

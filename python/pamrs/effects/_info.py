@@ -347,6 +347,8 @@ class EffectInfo:
             return (("load", "mass"), ("joint", ""))
         if self.frees_mass:
             return (("chamber", "coefficients"),)
+        if self.at == "line":
+            return (("line", "orifice"),)
         return tuple(("supply", kind) for kind in self.supplies)
 
     @property

@@ -366,7 +366,7 @@ def _known(models: _Models, settings: DiagnosisSettings) -> Known:
         parts.append(axes * np.sqrt(np.maximum(size, 0.0)))
         names += own
         values += [found.values[n] for n in own]
-    rest = [n for n in of_file if n not in names]
+    rest = [n for n in of_file if n not in names and math.isfinite(of_file[n].tol)]
     parts.append(np.diag([of_file[n].tol for n in rest]))
     values += [of_file[n].value for n in rest]
     return Known((*names, *rest), np.array(values), block_diag(*parts))

@@ -68,6 +68,7 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
         moved, offsets = _moved_alike(whole, near)
         if moved:
             moved |= _moved_each(whole, near, list(moved))
+            moved = _that_pay(whole, near, moved)
     except SimulationError:
         return list(problems), []  # the fit says what cannot be predicted
     said = [
@@ -75,12 +76,38 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
         f"of the log {'later' if offset > 0 else 'earlier'} than it has them, as if two clocks "
         "wrote it; they were moved so far"
         for k, offset in offsets.items()
+        if k in moved
     ]
     there = {recordings[k].recording.name: p for k, p in moved.items()}
     return [
         replace(q, recordings=[there.get(p.recording.name, p) for p in q.recordings])
         for q in problems
     ], said
+
+
+def _that_pay(problem: Problem, near: Rig, moved: dict[int, Prepared]) -> dict[int, Prepared]:
+    """Those of the moved recordings that a fit to all of them misses by less than one without: what
+    is linear near a fit may promise more than it keeps.
+    """
+    recordings = [moved.get(k, p) for k, p in enumerate(problem.recordings)]
+    tried = replace(problem, recordings=recordings)
+    after = fit(tried, near, (), {}, {b.name: 1.0 for b in problem.blocks}).rig
+    missed, left = _missed(problem, near), _missed(tried, after)
+    least = problem.settings.fit.offset_stds**2
+    return {k: p for k, p in moved.items() if left[k] < missed[k] - least}
+
+
+def _missed(problem: Problem, rig: Rig) -> list[float]:
+    """Sum of squares of what each recording misses, in noise levels."""
+    found = residuals(problem, rig, [])
+    return [
+        sum(
+            float(np.sum((own.value[own.rows] / own.noise) ** 2))
+            for block in problem.blocks
+            for own in [found[block.name, prepared.recording.name]]
+        )
+        for prepared in problem.recordings
+    ]
 
 
 def _commanded(block: Block) -> bool:

@@ -454,6 +454,8 @@ def _fraction(a: _Channel, b: _Channel, dt: float, settings: OverlapSettings) ->
     index = np.arange(size, dtype=float)
     smooth, curve = uniform_filter1d(b.values[:size], _SOON), CubicSpline(index, b.values[:size])
     inner = (index > 2.0) & (index < size - 3.0) & a.known[:size] & b.known[:size]
+    if inner.sum() < settings.least_samples:
+        return None
     slope, lag, left = np.gradient(smooth), 0.0, np.zeros(size)
     for _ in range(8):
         left = a.values[:size] - curve(np.clip(index + lag, 0.0, size - 1.0))
