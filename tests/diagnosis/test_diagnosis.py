@@ -57,8 +57,8 @@ def sealed_case(
 
 def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
     for effect in EFFECTS.values():
-        other = {"line": "blow_down_tank", "supply": "regulated_joint"}.get(effect.at, "shoulder")
-        rig = pamrs.rigs.named(other if effect.needs else "shoulder")
+        name = "regulated_joint" if "regulator" in effect.supplies else "shoulder"
+        rig = pamrs.rigs.named("blow_down_tank" if effect.at == "line" else name)
         names = core_rig(rig.with_effect(effect.id)).parameter_names
         assert set(effect.dotted()) <= set(names)
 

@@ -402,7 +402,7 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
     with pytest.raises(pamrs.ParameterError, match="2 GB"):
         batch.control(lambda sample: 5.0, 1e5)
     for state, message in (
-        ({**before, "rows": before["rows"][:2]}, "state has 2 values"),
+        ({**before, "rows": before["rows"][:2]}, "state is of 2 rows and 3 status; 3 are"),
         ({**before, "rows": [*before["rows"][:2], before["rows"][2][:-1]]}, "row 2: state"),
         (
             {

@@ -64,11 +64,11 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     whole = replace(first, blocks=blocks, recordings=recordings)
     try:
         # offsets are small and linear, parameters inside wide tolerances are not
-        near = fit(whole, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
+        near = _near(first, blocks, nominal)
         moved, offsets = _moved_alike(whole, near)
         if moved:
             moved |= _moved_each(whole, near, list(moved))
-            moved = _that_pay(whole, near, moved)
+            moved = _that_pay(first, whole, near, moved)
     except SimulationError:
         return list(problems), []  # the fit says what cannot be predicted
     said = [
@@ -85,15 +85,24 @@ def with_offsets(problems: Sequence[Problem], nominal: Rig) -> tuple[list[Proble
     ], said
 
 
-def _that_pay(problem: Problem, near: Rig, moved: dict[int, Prepared]) -> dict[int, Prepared]:
-    """Those of the moved recordings that a fit to all of them misses by less than one without: what
-    is linear near a fit may promise more than it keeps.
+def _near(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
+    """The model with its parameters fitted to some blocks."""
+    own = replace(problem, blocks=list(blocks))
+    return fit(own, nominal, (), {}, {b.name: 1.0 for b in blocks}).rig
+
+
+def _that_pay(
+    first: Problem, whole: Problem, near: Rig, moved: dict[int, Prepared]
+) -> dict[int, Prepared]:
+    """Those of the moved recordings that a fit with them misses by less than one without: what is
+    linear near a fit may promise more than it keeps.
     """
-    recordings = [moved.get(k, p) for k, p in enumerate(problem.recordings)]
-    tried = replace(problem, recordings=recordings)
-    after = fit(tried, near, (), {}, {b.name: 1.0 for b in problem.blocks}).rig
-    missed, left = _missed(problem, near), _missed(tried, after)
-    least = problem.settings.fit.offset_stds**2
+    there = {whole.recordings[k].recording.name: p for k, p in moved.items()}
+    fitted = [there.get(p.recording.name, p) for p in first.recordings]
+    after = _near(replace(first, recordings=fitted), whole.blocks, near)
+    recordings = [moved.get(k, p) for k, p in enumerate(whole.recordings)]
+    missed, left = _missed(whole, near), _missed(replace(whole, recordings=recordings), after)
+    least = whole.settings.fit.offset_stds**2
     return {k: p for k, p in moved.items() if left[k] < missed[k] - least}
 
 
