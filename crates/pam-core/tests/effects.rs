@@ -12,7 +12,7 @@ use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use rigs::{
     antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints,
-    Typical, FORMS, TYPICAL,
+    with_struts, Typical, FORMS, TYPICAL,
 };
 
 const DT: f64 = 0.01;
@@ -135,7 +135,7 @@ fn rigs_of_several_blocks_take_it_everywhere_or_at_one_of_them() {
         for (spec, names) in
             [(antagonists(), ["flexor", "extensor"]), (two_joints(), ["elbow", "wrist"])]
         {
-            let spec = fitting(typical.id, spec);
+            let spec = fitting(typical.id, with_struts(spec));
             let two = match info.at {
                 "joint" => spec.joints.len() == 2,
                 at => ["valve", "chamber", "muscle"].contains(&at),

@@ -75,7 +75,8 @@ fn a_frame_gives_the_static_force_at_its_length() {
         let e = 1.0 - length / 0.276;
         assert!((out.get("contraction_ratio")[k + 1] - e).abs() < 1e-14);
         let force = muscle.force(out.get("muscle_pressure")[k + 1], e).unwrap();
-        assert!((out.get("muscle_force")[k + 1] - force).abs() < 1e-6 * force.abs().max(1.0));
+        let held = muscle.buckled(force); // at the shortest lengths it is slack
+        assert!((out.get("muscle_force")[k + 1] - held).abs() < 1e-6 * held.abs().max(1.0));
     }
     assert!(
         out.get("muscle_pressure").last().unwrap() < &3e5,

@@ -8,7 +8,7 @@ use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
 mod rigs;
-use rigs::{antagonists, shoulder, two_joints};
+use rigs::{antagonists, shoulder, two_joints, with_struts};
 
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;
@@ -181,10 +181,7 @@ fn antagonists_at_one_pressure_stay_in_the_middle_and_move_with_a_difference() {
 fn what_the_muscles_give_the_arm_takes() {
     // No gravity, no friction, no stop touched: kinetic energy is the work of the muscles. They push
     // like struts: without air slack ones do nothing yet.
-    let mut spec = antagonists();
-    for group in &mut spec.muscles {
-        group.muscle.buckling_load = pam_core::muscle::STRUT;
-    }
+    let mut spec = with_struts(antagonists());
     let arm = spec.arm.as_mut().unwrap();
     (arm.viscous, arm.coulomb) = (0.0, 0.0);
     let inertia = arm.inertia + arm.payload * arm.length * arm.length;
@@ -443,8 +440,8 @@ fn small_volumes_are_stable_at_a_millisecond_and_accurate() {
 
 #[test]
 fn two_joints_converge_with_order_four() {
-    let mut spec = two_joints();
-    // smooth: no Coulomb friction, no stop within reach
+    // smooth: no Coulomb friction, no stop within reach, no muscle that goes slack
+    let mut spec = with_struts(two_joints());
     for (joint, link) in spec.joints.iter_mut().zip(&mut spec.arm.as_mut().unwrap().links) {
         (joint.stop_stiffness, joint.stop_damping, link.coulomb) = (0.0, 0.0, 0.0);
     }

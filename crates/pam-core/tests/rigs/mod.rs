@@ -21,6 +21,14 @@ pub fn warm(mut spec: RigSpec) -> RigSpec {
     spec
 }
 
+/// The same with muscles that push like struts, so that without air they act too.
+pub fn with_struts(mut spec: RigSpec) -> RigSpec {
+    for group in &mut spec.muscles {
+        group.muscle.buckling_load = pam_core::muscle::STRUT;
+    }
+    spec
+}
+
 /// Flexor and extensor on one pulley, a valve each.
 pub fn antagonists() -> RigSpec {
     let mut spec = shoulder();
