@@ -14,10 +14,13 @@ from scipy.interpolate import CubicSpline
 import pamrs
 from tests.property.strategies import commands, rig_overrides
 from tests.reference import Plant, shoulder, with_overrides
+from tests.runs import STRUT
 
 AMBIENT = 101325.0
 ROWS = 61
 SAMPLE_TIME = 0.005
+#: The muscles of this reference push like struts; slack ones are held against that of networks.
+STRUTS = pamrs.rigs.shoulder().with_parameters({"muscle.buckling_load": STRUT})
 MUSCLE = pamrs.Muscle.from_model(pamrs.rigs.shoulder().model["muscle"])
 CHANNELS = {"muscle_pressure": 1e5, "supply_pressure": 1e5, "joint_angle": 1.0, "joint_rate": 1.0}
 START = {"muscle_pressure": 1.5e5, "supply_pressure": 13.8e5, "joint_angle": 0.9, "joint_rate": 0.0}
@@ -55,7 +58,7 @@ def test_matches_reference(
         "joint_angle": angle,
         "joint_rate": rate,
     }
-    rig = pamrs.rigs.shoulder().with_parameters(overrides)
+    rig = STRUTS.with_parameters(overrides)
     got = pamrs.simulate(
         rig, valve_command=command, sample_time=SAMPLE_TIME, step=1e-4, initial=initial
     )
@@ -96,7 +99,7 @@ def test_corners_match_reference(
     initial = {**START, **changes}
     commanded = [command] * rows
     got = pamrs.simulate(
-        pamrs.rigs.shoulder(),
+        STRUTS,
         valve_command=commanded,
         sample_time=SAMPLE_TIME,
         step=1e-5,
@@ -195,7 +198,7 @@ def test_muscle_work_becomes_arm_energy(pressure: float, angle: float) -> None:
     energy.
     """
     free = {"arm.viscous": 0.0, "arm.coulomb": 0.0}
-    rig = pamrs.rigs.shoulder().with_parameters(free)
+    rig = STRUTS.with_parameters(free)
     start = {**START, "muscle_pressure": pressure, "joint_angle": angle}
     run = pamrs.simulate(rig, valve_command=[5.0] * 151, sample_time=1e-3, step=1e-4, initial=start)
     plant = shoulder()
