@@ -415,8 +415,8 @@ pub(crate) fn check_state<S: Scalar>(plant: &Plant<'_, S>, state: &[S], time: f6
         if !value.is_finite() {
             return failure(name, value, "a finite value (a smaller step may help)");
         }
-        if *place < layout.mass(0) && value < 0.0 {
-            return failure(name, value, "an absolute pressure >= 0 Pa (a smaller step may help)");
+        if *place < layout.mass(0) && value <= 0.0 {
+            return failure(name, value, "an absolute pressure > 0 Pa (a smaller step may help)");
         }
     }
     for k in 0..layout.gases {

@@ -188,7 +188,7 @@ pub const TYPICAL: &[Typical] = &[
     ),
     typical(
         "line_flow_law",
-        &[("laminar_part", 1.0), ("laminar_flow", 2.0)],
+        &[("laminar_part", 0.9), ("laminar_flow", 2.0)],
         &[("laminar_part", 0.0)],
     ),
     typical("gauge_drift", &[("change", 2e4)], &[("change", 0.0)]),

@@ -94,29 +94,32 @@ def _near(problem: Problem, blocks: Sequence[Block], nominal: Rig) -> Rig:
 def _that_pay(
     first: Problem, whole: Problem, near: Rig, moved: dict[int, Prepared]
 ) -> dict[int, Prepared]:
-    """Those of the moved recordings that a fit with them misses by less than one without: what is
-    linear near a fit may promise more than it keeps.
+    """Those of the moved recordings of which a fit with them leaves less than one without, and
+    little but noise: where something else is missing, an offset takes a part of that.
     """
     there = {whole.recordings[k].recording.name: p for k, p in moved.items()}
     fitted = [there.get(p.recording.name, p) for p in first.recordings]
     after = _near(replace(first, recordings=fitted), whole.blocks, near)
     recordings = [moved.get(k, p) for k, p in enumerate(whole.recordings)]
-    missed, left = _missed(whole, near), _missed(replace(whole, recordings=recordings), after)
-    least = whole.settings.fit.offset_stds**2
-    return {k: p for k, p in moved.items() if left[k] < missed[k] - least}
+    tried = replace(whole, recordings=recordings)
+    missed, left = _missed(whole, near), _missed(tried, after)
+    own = whole.settings.fit
+    return {
+        k: p
+        for k, p in moved.items()
+        if left[k][0] < missed[k][0] - own.offset_stds**2
+        and left[k][0] < own.offset_left * left[k][1]
+    }
 
 
-def _missed(problem: Problem, rig: Rig) -> list[float]:
-    """Sum of squares of what each recording misses, in noise levels."""
-    found = residuals(problem, rig, [])
-    return [
-        sum(
-            float(np.sum((own.value[own.rows] / own.noise) ** 2))
-            for block in problem.blocks
-            for own in [found[block.name, prepared.recording.name]]
-        )
-        for prepared in problem.recordings
-    ]
+def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
+    """Of each recording the sum of squares of what it misses, in noise levels, and their number."""
+    found, sums = residuals(problem, rig, []), []
+    for prepared in problem.recordings:
+        own = [found[block.name, prepared.recording.name] for block in problem.blocks]
+        missed = [r.value[r.rows] / r.noise for r in own]
+        sums.append((sum(float(v @ v) for v in missed), sum(v.size for v in missed)))
+    return sums
 
 
 def _commanded(block: Block) -> bool:

@@ -49,6 +49,14 @@ class FitSettings(SettingsGroup):
         "be before they are moved by it",
         origin="judgement: each of a few recordings is asked",
     )
+    offset_left: float = setting(
+        1.45,
+        unit="variances of the noise",
+        above=0.0,
+        reason="mean square that a recording may miss with its commands moved: where more is "
+        "missing, an offset takes a part of that, and names are worse for it",
+        origin="docs/decisions/0014: 1.45 times the variance of the noise",
+    )
     offset_parts: int = setting(
         64,
         unit="count",
