@@ -30,7 +30,7 @@ class Shoulder:
     """The packaged shoulder with commands of so many samples."""
 
     def __init__(self, samples: int = SAMPLES) -> None:
-        self.rig = pamrs.rigs.shoulder()
+        self.rig = peers.packaged()
         self.command = peers.wave(samples)
         self.given = (*peers.shoulder(self.rig), peers.opening(self.rig, self.command))
         self.payload = float(self.rig.model["arm"]["payload"])

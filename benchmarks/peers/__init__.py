@@ -68,6 +68,11 @@ class Shoulder(NamedTuple):
     table_per_unit: float
 
 
+def packaged() -> pamrs.Rig:
+    """The packaged shoulder with muscles that push: the peers have no slack ones."""
+    return pamrs.rigs.shoulder().with_parameters({"muscle.buckling_load": 1e9})
+
+
 def shoulder(rig: pamrs.Rig) -> tuple[Shoulder, Array, Array]:
     """Everything that a peer needs.
 

@@ -17,7 +17,7 @@ def test_one_run_is_the_same(name):
     module = peers.installed(name)
     if isinstance(module, str):
         pytest.skip(module)
-    rig, command = pamrs.rigs.shoulder(), peers.wave(SAMPLES)
+    rig, command = peers.packaged(), peers.wave(SAMPLES)
     ours = pamrs.simulate(rig, command, sample_time=peers.SAMPLE_TIME, step=1e-3)
     payload = rig.model["arm"]["payload"]
     theirs = module.single(*peers.shoulder(rig), peers.opening(rig, command), payload)
@@ -42,7 +42,7 @@ def test_a_batch_is_the_same(module, name):
         pytest.skip(found)
     if name == "batch_diffrax":
         pytest.importorskip("diffrax")
-    rig, command, payloads = pamrs.rigs.shoulder(), peers.wave(SAMPLES), np.array([0.0, 7.0, 20.0])
+    rig, command, payloads = peers.packaged(), peers.wave(SAMPLES), np.array([0.0, 7.0, 20.0])
     theirs = getattr(found, name)(*peers.shoulder(rig), peers.opening(rig, command), payloads)
     for payload, end in zip(payloads, theirs, strict=True):
         run = pamrs.simulate(

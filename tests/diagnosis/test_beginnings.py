@@ -32,12 +32,14 @@ DT = 0.005
 FILLING = 3e5 + 2e5 * np.sin(2.0 * np.arange(0.0, 6.0, DT))
 
 
-def made(rig: Rig, command: np.ndarray, outlet: float, chamber: float) -> tuple[Block, Prepared]:
+def made(
+    rig: Rig, command: np.ndarray, outlet: float, chamber: float, seed: int = 3
+) -> tuple[Block, Prepared]:
     """The chamber of a log that begins with these pressures, the outlet having no gauge."""
     start = {"supply_pressure": outlet, "muscle_pressure": chamber}
     run = pamrs.simulate(rig, supply_command=command, sample_time=DT, initial=start)
     channels = {"supply_command": command, "muscle_pressure": run["muscle_pressure"]}
-    one = noisy("lift", "fit", DT, channels, {"muscle_pressure": 400.0}, [3])
+    one = noisy("lift", "fit", DT, channels, {"muscle_pressure": 400.0}, [seed])
     (block,) = available_blocks(rig, tuple(channels), SETTINGS.prepare)
     return block, prepare(one, rig, SETTINGS)
 
@@ -90,7 +92,7 @@ def test_a_diagnosis_says_what_it_did_not_judge() -> None:
     recordings = []
     for seed, role in enumerate(("fit", "fit", "held_out")):
         command = FILLING + 1e5 * np.sin(3.1 * seed + 7.0 * np.arange(0.0, 6.0, DT))
-        _, prepared = made(RIG, command, float(command[0]), 0.0)
+        _, prepared = made(RIG, command, float(command[0]), 0.0, seed)
         recordings.append(replace(prepared.recording, name=f"r{seed}", role=role))
     found = pamrs.diagnose(pamrs.Case("lifts", RIG, recordings, Path()))
     assert found.verdict == "none"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -66,8 +67,21 @@ def test_a_right_model_of_an_isometric_bench_is_told_nothing(seed: int, drift: f
 
 def test_a_force_that_is_missing_all_the_time_is_said() -> None:
     rig = pamrs.load_rig(LAYOUT)
-    plant = rig.with_effect("activation_pressure", {"threshold": 8e3})
-    found = pamrs.diagnose(bench(plant, rig, 1, 0.0))
+    case = bench(rig, rig, 1, 0.0)
+    off = [
+        replace(r, channels=r.channels | {"force": r.channels["force"] + 45.0})
+        for r in case.recordings
+    ]
+    found = pamrs.diagnose(replace(case, recordings=off))
     (warning,) = (w for w in found.warnings if "is fitted to each recording" in w)
     assert warning.startswith("muscle_force of the whole rig is ")
     assert found.verdict == "none"  # a force that never changes may be the cell's zero
+
+
+def test_a_threshold_of_an_isometric_bench_is_named() -> None:
+    rig = pamrs.load_rig(LAYOUT)
+    plant = rig.with_effect("activation_pressure", {"threshold": 8e3})
+    found = pamrs.diagnose(bench(plant, rig, 1, 0.0))
+    assert found.effects[0]["id"] == "activation_pressure"
+    value = found.effects[0]["parameters"]["threshold"]
+    assert abs(value["value"] - 8e3) < 2.0 * value["std"]

@@ -50,12 +50,12 @@ class FitSettings(SettingsGroup):
         origin="judgement: each of a few recordings is asked",
     )
     offset_left: float = setting(
-        1.45,
+        1.1,
         unit="variances of the noise",
         above=0.0,
         reason="mean square that a recording may miss with its commands moved: where more is "
         "missing, an offset takes a part of that, and names are worse for it",
-        origin="docs/decisions/0014: 1.45 times the variance of the noise",
+        origin="healthy rigs leave 0.95 to 1.02; a wall of three times the heat is lost at 1.45",
     )
     offset_parts: int = setting(
         64,
