@@ -22,7 +22,7 @@ def stand() -> pamrs.Rig:
     """The bench that is behind the logs: a muscle with a threshold, which pulls
     wherever the logs are, and friction of its braid."""
     muscle = pamrs.Muscle.from_law(
-        lambda p, e: 14.0 * np.logaddexp(0.0, (p - 5e4) / 2e4) * (1 - 2.6 * e) ** 2 - 60 * e,
+        lambda p, e: 14.0 * np.logaddexp(0.0, (p - 5e4) / 2e4) * (1 - 2.6 * e) ** 2 - 100 * e,
         max_pressure=7e5,
         contraction=(-0.02, 0.27),
         rest_length=0.3,
