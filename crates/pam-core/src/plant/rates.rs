@@ -276,6 +276,18 @@ fn supply<S: Scalar>(unit: &SupplyUnit, values: &Values<S>) -> Supply<S> {
     }
 }
 
+/// A valve: one area for both ways, or sonic conductances and critical ratios of ISO 6358.
+fn valve<S: Scalar>(unit: &ValveUnit, values: &Values<S>, temperature: f64) -> Valve<S> {
+    let paths = match unit.passes {
+        Passes::Area(area) => [Opening::Area(values[area]); 2],
+        Passes::Conductances(paths) => paths.map(|[conductance, ratio]| {
+            let (c, b) = (values[conductance], values[ratio]);
+            Opening::Conductance(Tube::of_conductance(c, b, temperature))
+        }),
+    };
+    Valve { paths, null: values[unit.null] }
+}
+
 /// The coefficients of a gas.
 fn polytropic<S: Scalar>(law: GasLaw, values: &Values<S>, gamma: f64) -> Polytropic<S> {
     let alike = |alpha: S| Polytropic { inflow: alpha, outflow: alpha, volume: alpha };
@@ -316,13 +328,6 @@ impl<'a, S: Number> Plant<'a, S> {
             let [length, diameter, alpha] = [unit.length, unit.diameter, unit.alpha];
             Wave::new(values[length], values[diameter], values[alpha], unit.segments, &rig.gas)
         };
-        let paths = |valve: &ValveUnit| match valve.passes {
-            Passes::Area(area) => [Opening::Area(values[area]); 2],
-            Passes::Conductances(paths) => paths.map(|[conductance, ratio]| {
-                let (c, b) = (values[conductance], values[ratio]);
-                Opening::Conductance(Tube::of_conductance(c, b, rig.gas.temperature))
-            }),
-        };
         let effects: Vec<Box<dyn Effect<S>>> = (wiring.ports.effects.iter())
             .map(|effect| {
                 let own: Vec<S> = effect.parameters.iter().map(|id| values[*id]).collect();
@@ -355,7 +360,7 @@ impl<'a, S: Number> Plant<'a, S> {
                 })
                 .collect(),
             valves: (wiring.valves.iter())
-                .map(|valve| Valve { paths: paths(valve), null: values[valve.null] })
+                .map(|unit| valve(unit, &values, rig.gas.temperature))
                 .collect(),
             lines,
             waves: wiring.waves.iter().map(wave).collect(),
