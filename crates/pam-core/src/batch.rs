@@ -220,13 +220,13 @@ impl Batch {
         let mut restored = Vec::with_capacity(n);
         for (k, (group, seat)) in self.each().enumerate() {
             let (at, row) = (|e| of_row(k, e), &group.rows()[seat]);
-            let progress = row.progress.restored(&states[k]).map_err(at)?;
+            let rig = &self.rigs[self.rig_of[k]];
+            let progress = row.progress.restored(rig, &states[k]).map_err(at)?;
             let stands = progress.samples();
             if stands > samples || (failures[k].is_none() && stands != samples) {
                 let allowed = format!("{samples}, as of the batch (less where the row has ended)");
                 return Err(at(Error::parameter("state.samples", stands as f64, allowed)));
             }
-            let rig = &self.rigs[self.rig_of[k]];
             progress.observe(rig, row.timing, &mut Trajectory::new(rig, 1)).map_err(at)?;
             restored.push(progress);
         }

@@ -202,7 +202,7 @@ fn restarts(rig: &Rig) {
     let mut parts = Trajectory::new(rig, ROWS);
     for range in [0..33, 33..34, 34..ROWS] {
         let fresh = Progress::start(rig, &initial(rig)).unwrap();
-        first = fresh.restored(&first.to_vec()).unwrap();
+        first = fresh.restored(rig, &first.to_vec()).unwrap();
         first.advance(rig, TIMING, &drive.part(range), &mut parts).unwrap();
     }
     assert_eq!(whole, first);
@@ -211,7 +211,7 @@ fn restarts(rig: &Rig) {
     short.pop();
     short.pop();
     short.truncate(10);
-    assert!(whole.restored(&short).is_err());
+    assert!(whole.restored(rig, &short).is_err());
 }
 
 /// Values and slopes of a channel by central differences.

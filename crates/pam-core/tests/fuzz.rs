@@ -114,7 +114,7 @@ proptest! {
         if !whole {
             state.truncate(cut.index(state.len()));
         }
-        let Ok(restored) = progress.restored(&state) else { return Ok(()) };
+        let Ok(restored) = progress.restored(&rig, &state) else { return Ok(()) };
         progress = restored;
         let commands = [5.5; 4];
         let drive = pam_core::simulate::drive::Drive::new(

@@ -507,10 +507,10 @@ fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
     let mut parts = Trajectory::new(&rig, 120);
     first.advance(&rig, timing, &drive.part(0..50), &mut parts).unwrap();
     let fresh = Progress::start(&rig, &Initial::rest(&rig)).unwrap();
-    let mut again = fresh.restored(&first.to_vec()).unwrap();
+    let mut again = fresh.restored(&rig, &first.to_vec()).unwrap();
     again.advance(&rig, timing, &drive.part(50..120), &mut parts).unwrap();
     assert_eq!(parts, out);
-    assert!(fresh.restored(&[1.0]).unwrap_err().to_string().contains("state"));
+    assert!(fresh.restored(&rig, &[1.0]).unwrap_err().to_string().contains("state"));
 }
 
 #[test]

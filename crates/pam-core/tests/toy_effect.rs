@@ -192,7 +192,8 @@ fn a_restart_is_bit_for_bit() {
         let (mut out, mut parts) = (Trajectory::new(&rig, ROWS), Trajectory::new(&rig, ROWS));
         whole.advance(&rig, TIMING, &drive, &mut out).unwrap();
         for range in [0..33, 33..34, 34..ROWS] {
-            part = Progress::start(&rig, &initial(&rig)).unwrap().restored(&part.to_vec()).unwrap();
+            let fresh = Progress::start(&rig, &initial(&rig)).unwrap();
+            part = fresh.restored(&rig, &part.to_vec()).unwrap();
             part.advance(&rig, TIMING, &drive.part(range), &mut parts).unwrap();
         }
         assert_eq!((whole, out), (part, parts), "{form}");

@@ -261,7 +261,7 @@ fn a_run_goes_on_from_its_numbers_bit_for_bit() {
     let (mut out, mut parts) = (Trajectory::new(&rig, 120), Trajectory::new(&rig, 120));
     whole.advance(&rig, timing, &drive.part(0..120), &mut out).unwrap();
     first.advance(&rig, timing, &drive.part(0..47), &mut parts).unwrap();
-    let mut again = fresh().restored(&first.to_vec()).unwrap();
+    let mut again = fresh().restored(&rig, &first.to_vec()).unwrap();
     again.advance(&rig, timing, &drive.part(47..120), &mut parts).unwrap();
     assert_eq!((parts, again.to_vec()), (out, whole.to_vec()));
     let map = rig.state_map();

@@ -316,7 +316,8 @@ impl Simulator {
 
     /// Go back, or on, to a state.
     fn restore(&self, py: Python<'_>, state: PyReadonlyArray1<'_, f64>) -> PyResult<()> {
-        let restored = self.progress().restored(&values(&state)?).map_err(|e| error(py, &e))?;
+        let restored = self.progress().restored(&self.rig, &values(&state)?);
+        let restored = restored.map_err(|e| error(py, &e))?;
         *self.progress() = restored;
         Ok(())
     }

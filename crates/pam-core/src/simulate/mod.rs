@@ -605,8 +605,8 @@ impl Progress {
     ///
     /// # Errors
     /// [`Error::Length`] for another number of them, [`Error::Parameter`] for one that is not
-    /// finite.
-    pub fn restored(&self, numbers: &[f64]) -> Result<Self> {
+    /// finite, [`Error::Integration`] for a state outside the model's range.
+    pub fn restored(&self, rig: &Rig, numbers: &[f64]) -> Result<Self> {
         let parts =
             [self.state.len(), self.memory.len() * Memory::<f64>::NUMBERS, self.flags.len(), 1];
         let expected: usize = parts.iter().sum();
@@ -629,14 +629,16 @@ impl Progress {
         let (memory, rest) = rest.split_at(parts[1]);
         let (flags, rest) = rest.split_at(parts[2]);
         let (samples, past) = rest.split_at(1);
-        Ok(Self {
+        let restored = Self {
             past: past.to_vec(),
             kept: self.kept,
             state: state.to_vec(),
             memory: memory.chunks(Memory::<f64>::NUMBERS).map(Memory::from_slice).collect(),
             flags: flags.iter().map(|f| *f > 0.5).collect(),
             samples: samples.first().map_or(0, |n| n.max(0.0) as u64),
-        })
+        };
+        check_state(&Plant::new(rig, rig.parameters().lift::<f64>(), true)?, &restored.state, 0.0)?;
+        Ok(restored)
     }
 
     /// The linear model of a rig about this sample, with its valves at their null.
