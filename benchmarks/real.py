@@ -301,7 +301,7 @@ CHAMBER_AFTER = """
   pressure to a power between 1.0 and 1.3, not the laminar law. Until this page was made the answer
   for Ultimaker_020 was the laminar law with 6.6 ± 0.5 s, which left 8.5 kPa: the fit of form
   `power` began at a conductance 20 times too small and did not move. It begins at the size
-  that takes most now (docs/decisions/0049). What is left
+  that takes most now (docs/decisions/0013). What is left
   of 020 is still three times what the form can reach (0.42 kPa at an exponent of 1.10).
 - The volumes are unknown, so that conductances are not determined; an exponent does not depend on
   the volume. Its interval for Ultimaker_015 is that of a model that still misses 2.5 noises, and

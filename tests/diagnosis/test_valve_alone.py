@@ -161,6 +161,6 @@ def test_a_plan_takes_each_block_as_its_channels_drive_it(planned) -> None:
     assert chamber["drives"] == ["line_pressure"]
     assert few.sight("valve_dead_zone").verdict == "not seen"
     assert few.sight("valve_dead_zone").left == 0.0
-    # what is lost makes a pressure drop along the hose, and does not add up (decision 0093)
+    # what is lost makes a pressure drop along the hose, and does not add up (decision 0003)
     lost = few.sight("leak_muscle").left
     assert 0.0 < lost < 0.5 * planned(*CHANNELS).sight("leak_muscle").left

@@ -190,6 +190,63 @@ def test_pages_that_are_read_whole_stay_short(name):
     assert len((ROOT / name).read_text(encoding="utf-8").split()) <= PAGES[name]
 
 
+DECISIONS = {page.name[:4]: page for page in (ROOT / "docs/decisions").glob("[0-9]*.md")}
+MOST_DECISIONS = 35
+
+
+@pytest.mark.parametrize("number", DECISIONS)
+def test_a_decision_has_a_status_and_all_its_parts(number):
+    heading, _, status, *rest = DECISIONS[number].read_text(encoding="utf-8").splitlines()
+    assert heading.startswith(f"# {number} ")
+    found = re.match(r"Status: (in force \(\d{4}-\d\d-\d\d\)|replaced by (\d{4}))\.", status)
+    assert found, f"{number}: {status}"
+    assert found[2] is None or found[2] in DECISIONS
+    text = "\n".join(rest)
+    missing = [
+        part
+        for part in ("Decided", "Reason", "Price", "Alternatives")
+        if f"\n**{part}.** " not in text
+    ]
+    assert found[2] or not missing
+
+
+def test_the_index_lists_every_decision_and_there_are_few():
+    assert 0 < len(DECISIONS) <= MOST_DECISIONS
+    index = (ROOT / "docs/decisions/README.md").read_text(encoding="utf-8")
+    listed = re.findall(r"^- \[(\d{4})\]\((\S+)\) \S", index, re.MULTILINE)
+    assert sorted(listed) == sorted((number, page.name) for number, page in DECISIONS.items())
+
+
+def referenced_decisions(path):
+    """Numbers of decisions that a file names: `docs/decisions/NNNN and NNNN`, `decision NNNN`, and
+    within the decisions `(NNNN)` too, but for what a page takes in.
+    """
+    text = re.sub(r"^Status: .*$", "", path.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    more = r"(?:(?:, then |, | and )\d{4})*"
+    for found in re.findall(rf"\bdecisions?[/ ](\d{{4}}{more})", text):
+        yield from re.findall(r"\d{4}", found)
+    if path.parent == ROOT / "docs/decisions":
+        yield from re.findall(r"\((0\d{3})\)", text)
+
+
+def test_decisions_that_are_referred_to_exist():
+    folders = ("python", "crates", "tests", "trial", "benchmarks", "fingerprints", "cases", "docs")
+    files = [
+        *ROOT.glob("*.md"),
+        *(
+            path
+            for folder in folders
+            for path in (ROOT / folder).rglob("*")
+            if path.suffix in (".py", ".rs", ".md", ".toml")
+        ),
+    ]
+    named = {(path, number) for path in files for number in referenced_decisions(path)}
+    assert len(named) > 50
+    assert not {
+        f"{path.relative_to(ROOT)}: {number}" for path, number in named if number not in DECISIONS
+    }
+
+
 def test_links_between_pages_lead_somewhere():
     folders = ("docs", "cases", "trial", "benchmarks", "tests")
     pages = [

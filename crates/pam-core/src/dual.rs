@@ -1,7 +1,7 @@
 //! Dual numbers: a value with its derivatives with respect to some variables at once.
 //!
 //! All derivatives are there all the time, in one array: sums over it need no branches, and a
-//! compiler puts them into vectors (`docs/decisions/0097`). The price: what is divided by zero, or
+//! compiler puts them into vectors (`docs/decisions/0001`). The price: what is divided by zero, or
 //! multiplied with what is infinite, has no derivative any more, varying or not.
 
 // derivatives of products and quotients are sums

@@ -221,7 +221,7 @@ def significant(found: Excess, ratio: float = 1.0) -> bool:
 
 def doubted(inside: dict[str, Excess], after: dict[str, Excess], *, same: bool) -> bool:
     """Whether a fit leaves noise in its own recordings and more in held-out ones, which parameters
-    may bring that its own recordings do not tell (docs/decisions/0061).
+    may bring that its own recordings do not tell (docs/decisions/0111).
     """
     quiet = not any(significant(e) for e in inside.values())
     return not same and quiet and any(significant(e) for e in after.values())

@@ -130,7 +130,7 @@ def weigh(
 ) -> dict[str, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
-    The mean of two kinds of evidence (docs/decisions/0114): by what each set leaves, and by how
+    The mean of two kinds of evidence (docs/decisions/0014): by what each set leaves, and by how
     probable it makes the recordings, stretch by stretch of time; both pay the same prices.
 
     Between sets, by what they leave: the logarithm of what each leaves of the mismatch, fitted and
@@ -148,9 +148,9 @@ def weigh(
     to the part of it that is trusted most, as far as that leads by itself: an event that may be
     anything takes nothing from the effect beside it. What a wrong value leaves is no form's error,
     since the equation stays the same: where a value explains more than the effects of a set do,
-    they are judged by what it leaves (docs/decisions/0105). The constants are those under which the
+    they are judged by what it leaves (docs/decisions/0025). The constants are those under which the
     stated probabilities came true in a trial with other seeds than the published one
-    (docs/decisions/0014, 0032).
+    (docs/decisions/0014).
 
     ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are

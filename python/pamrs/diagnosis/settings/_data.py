@@ -43,7 +43,7 @@ class PrepareSettings(SettingsGroup):
         most=0.5,
         reason="chance by which noise alone makes that filter shorter at a sample: a cubic has to "
         "miss more than that to be a corner",
-        origin="docs/decisions/0056",
+        origin="docs/decisions/0022",
     )
     spectrum_samples: int = setting(
         64,
@@ -51,7 +51,7 @@ class PrepareSettings(SettingsGroup):
         least=32,
         reason="samples of each spectrum in which a band that is quieter than the noise is looked "
         "for",
-        origin="docs/decisions/0099",
+        origin="docs/decisions/0022",
     )
     least_new_share: float = setting(
         0.5,
@@ -60,14 +60,14 @@ class PrepareSettings(SettingsGroup):
         most=1.0,
         reason="share of a thermometer's samples that neither repeat nor lie on a line between "
         "others, from which it is as fast as the log",
-        origin="judgement; docs/decisions/0116",
+        origin="judgement; docs/decisions/0003",
     )
     least_spectra: int = setting(
         16,
         unit="count",
         least=1,
         reason="spectra without a sample that was left out, from which bands are compared",
-        origin="docs/decisions/0099",
+        origin="docs/decisions/0022",
     )
     quiet_share: float = setting(
         0.25,
@@ -77,7 +77,7 @@ class PrepareSettings(SettingsGroup):
         reason="share of the variance of third differences below which the quietest band is the "
         "noise",
         origin="half the level; the quietest of seven bands of 600 samples of white noise had 0.38 "
-        "of its variance or more in a thousand draws (docs/decisions/0099)",
+        "of its variance or more in a thousand draws (docs/decisions/0022)",
     )
     start_reaches: tuple[float, ...] = setting(
         (0.04, 0.08, 0.16),
@@ -134,7 +134,7 @@ class PrepareSettings(SettingsGroup):
         reason="error of the temperature at which a thermometer says that a gas begins: windows of "
         "the pressure in which so much would be seen are freed of it; and how far from that of the "
         "room one without a thermometer has to begin before it is taken not to have been at rest",
-        origin="judgement: a thermocouple is off by two kelvins, and late (docs/decisions/0116)",
+        origin="judgement: a thermocouple is off by two kelvins, and late (docs/decisions/0003)",
     )
     begun_steps: int = setting(
         6,
@@ -188,7 +188,7 @@ class PrepareSettings(SettingsGroup):
         unit="count",
         least=32,
         reason="samples of a case, averaged where they can be, that are diagnosed at all",
-        origin="docs/decisions/0039: some five minutes",
+        origin="docs/decisions/0057: some five minutes",
     )
     needed_sample_time: float = setting(
         0.01,

@@ -20,7 +20,7 @@ class EvidenceSettings(SettingsGroup):
         unit="log odds",
         reason="odds of explained to unexplained variance at which a set of effects is as probable "
         "as unlisted: even where half is left, since a name has to carry half",
-        origin="the definition of the verdict; docs/decisions/0032",
+        origin="the definition of the verdict; docs/decisions/0014",
     )
     log_odds_explained_pliable: float = setting(
         2.6,
@@ -48,7 +48,7 @@ class EvidenceSettings(SettingsGroup):
         above=0.0,
         most=1.0,
         reason="share that may be left of a mismatch that hardly is one, for a set to explain it",
-        origin="docs/decisions/0021: what explains it has to take 30 % of it",
+        origin="docs/decisions/0020: what explains it has to take 30 % of it",
     )
     emptier_share: float = setting(
         0.05,
@@ -80,7 +80,7 @@ class EvidenceSettings(SettingsGroup):
         least=0.0,
         reason="further looks, of what is left whatever a form is granted: of two equations that "
         "leave less than forms do, the one that leaves less is the more probable",
-        origin="docs/decisions/0114: seeds 11301 and 11501",
+        origin="docs/decisions/0014: seeds 11301 and 11501",
     )
     predictive_share: float = setting(
         0.5,
@@ -89,21 +89,21 @@ class EvidenceSettings(SettingsGroup):
         most=1.0,
         reason="share of the probability of names that goes by the density of recordings under "
         "each hypothesis, stretch by stretch; the rest goes by how much each leaves",
-        origin="docs/decisions/0114: the mean of the two is better than either",
+        origin="docs/decisions/0014: the mean of the two is better than either",
     )
     predictive_order: int = setting(
         4,
         unit="1",
         least=1,
         reason="order of the autoregression of what a hypothesis leaves",
-        origin="docs/decisions/0114: 1, 2, 4 and 8 do alike",
+        origin="docs/decisions/0014: 1, 2, 4 and 8 do alike",
     )
     predictive_stretch: float = setting(
         3.0,
         unit="s",
         above=0.0,
         reason="length of the stretches that are drawn: longer than what a start of a joint does",
-        origin="docs/decisions/0114: 3 and 6 s do alike",
+        origin="docs/decisions/0014: 3 and 6 s do alike",
     )
     predictive_draws: int = setting(
         1000,
@@ -172,7 +172,7 @@ class EvidenceSettings(SettingsGroup):
         unit="1",
         least=0.0,
         reason="the same where sets of as many effects are compared",
-        origin="docs/decisions/0021",
+        origin="docs/decisions/0020",
     )
     form_error: float = setting(
         0.15,
@@ -323,14 +323,14 @@ class VerdictSettings(SettingsGroup):
         most=1.0,
         reason="share of the logarithm of the odds between two hypotheses of a mismatch that "
         "counts: with all of it names stated at 0.98 were right in 77 % of groups of blocks",
-        origin="docs/decisions/0054: calibrated on seeds 9201 and 9401 of the second plan",
+        origin="docs/decisions/0014: calibrated on seeds 9201 and 9401 of the second plan",
     )
     shared_odds: float = setting(
         6.0,
         unit="1",
         above=0.0,
         reason="odds of one effect that acts in two groups of blocks to two effects",
-        origin="docs/decisions/0024",
+        origin="docs/decisions/0004",
     )
     alike_stds: float = setting(
         3.0,
@@ -353,7 +353,7 @@ class VerdictSettings(SettingsGroup):
         above=0.0,
         most=1.0,
         reason="probability from which an answer is settled",
-        origin="docs/decisions/0054: odds of nine to one before they are calibrated",
+        origin="docs/decisions/0014: odds of nine to one before they are calibrated",
     )
     in_set: float = setting(
         0.05,
@@ -370,7 +370,7 @@ class VerdictSettings(SettingsGroup):
         most=1.0,
         reason="probability above which a name is given even where unlisted is more probable than "
         "each set of names that has it",
-        origin="docs/decisions/0024",
+        origin="docs/decisions/0004",
     )
     listed: float = setting(
         1e-4,
@@ -397,7 +397,7 @@ class VerdictSettings(SettingsGroup):
         most=1.0,
         reason="probability of parameters in a group that keeps only noise after its parameters "
         "moved, of none where they did not have to",
-        origin="the rest; docs/decisions/0004, 0100",
+        origin="the rest; docs/decisions/0004",
     )
     quiet_other: float = setting(
         0.03,
@@ -413,7 +413,7 @@ class VerdictSettings(SettingsGroup):
         least=0.0,
         most=1.0,
         reason="probability of unlisted in such a group: of what is there and too small to be seen",
-        origin="docs/decisions/0100: 24 of 171 such groups of six seeds that were read",
+        origin="docs/decisions/0004: 24 of 171 such groups of six seeds that were read",
     )
     strained_parameters: float = setting(
         0.75,
@@ -447,7 +447,7 @@ class VerdictSettings(SettingsGroup):
         least=1.0,
         reason="factor of the standard deviations of what no prior holds, beyond what pieces of "
         "the recordings tell: for equations that are not quite the rig's",
-        origin="docs/decisions/0107: 78 intervals of 95 % of six read seeds of the second plan "
+        origin="docs/decisions/0041: 78 intervals of 95 % of six read seeds of the second plan "
         "held in 78 %, twice as wide in 95 %",
     )
     budget_draws: int = setting(

@@ -145,7 +145,7 @@ class FitSettings(SettingsGroup):
         least=1,
         reason="evaluations that together gain less than one step must, and the fit ends: as many "
         "as it takes from the first damping to steps of a tenth",
-        origin="docs/decisions/0097",
+        origin="docs/decisions/0057",
     )
     evaluations: int = setting(
         12, unit="count", least=1, reason="evaluations of a fit at the most", origin="judgement"
@@ -183,7 +183,7 @@ class FitSettings(SettingsGroup):
         least=1,
         reason="how often a set is fitted on, weighted by what it leaves, as long as that falls by "
         "noise.correlated_variance",
-        origin="docs/decisions/0119-forms-in-their-sets.md",
+        origin="docs/decisions/0103",
     )
     predicted_gain_evaluations: int = setting(
         50,
@@ -244,7 +244,7 @@ class FitSettings(SettingsGroup):
         unit="count",
         least=2,
         reason="pieces of a single recording, each predicted by the others",
-        origin="docs/decisions/0062",
+        origin="docs/decisions/0111",
     )
 
 
@@ -401,7 +401,7 @@ class ScreenSettings(SettingsGroup):
         unit="typical sizes",
         above=0.0,
         reason="sizes at which each start is looked at beside a strong mismatch",
-        origin="docs/decisions/0049",
+        origin="docs/decisions/0013",
     )
     invisible: float = setting(
         1e-6,

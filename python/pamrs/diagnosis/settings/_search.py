@@ -122,14 +122,14 @@ class SearchSettings(SettingsGroup):
         above=0.0,
         reason="multiple of noise's largest excess up to which a mismatch that no effect explains "
         "may be a noise level that was estimated too low",
-        origin="docs/decisions/0021, then 0022",
+        origin="docs/decisions/0020, then 0022",
     )
     marginal_excess: float = setting(
         0.3,
         unit="1",
         above=0.0,
         reason="excess variance over that of the noise up to which it may",
-        origin="docs/decisions/0021, then 0022",
+        origin="docs/decisions/0020, then 0022",
     )
     marginal_probability: float = setting(
         0.6,
@@ -137,7 +137,7 @@ class SearchSettings(SettingsGroup):
         least=0.0,
         most=1.0,
         reason="probability that it is",
-        origin="docs/decisions/0021: odds 3 to 2",
+        origin="docs/decisions/0020: odds 3 to 2",
     )
     split_from: float = setting(
         0.5,
@@ -146,7 +146,7 @@ class SearchSettings(SettingsGroup):
         most=1.0,
         reason="probability of unlisted above which a group of blocks is split where a name "
         "explains one of them: no name is then more probable than its absence",
-        origin="docs/decisions/0024",
+        origin="docs/decisions/0004",
     )
     strong_ratio: float = setting(
         100.0,
@@ -154,7 +154,7 @@ class SearchSettings(SettingsGroup):
         above=1.0,
         reason="variance over that of the noise from which a mismatch is strong: linear signatures "
         "then say little of an effect's size",
-        origin="ten times the noise; docs/decisions/0049",
+        origin="ten times the noise; docs/decisions/0013",
     )
     least_gain: float = setting(
         12.0,
@@ -183,7 +183,7 @@ class SearchSettings(SettingsGroup):
         unit="count",
         least=2,
         reason="evaluations of such a fit",
-        origin="docs/decisions/0058",
+        origin="docs/decisions/0013",
     )
     near_start: float = setting(
         0.6,
@@ -213,7 +213,7 @@ class SearchSettings(SettingsGroup):
         reason="share of an effect's best gain from which another place of it is fitted too, where "
         "a rig has several blocks of a kind: of an effect at one of two alike blocks half shows at "
         "both",
-        origin="docs/decisions/0101",
+        origin="docs/decisions/0103",
     )
     most_starts: int = setting(
         2,
@@ -272,7 +272,7 @@ class SearchSettings(SettingsGroup):
         most=1.0,
         reason="share of a mismatch that a hypothesis may leave by itself to be fitted together "
         "with the effects that leave least",
-        origin="docs/decisions/0053: it takes a fifth, as a further effect has to",
+        origin="docs/decisions/0103: it takes a fifth, as a further effect has to",
     )
     transient_beside: float = setting(
         0.08,
@@ -327,7 +327,7 @@ class BelowNoiseSettings(SettingsGroup):
         most=1.0,
         reason="share of what lies inside the stated error of the model that a signature has by "
         "chance, besides; smooth errors of 24 kinds gave most effects less in four of five draws",
-        origin="docs/decisions/0062, alternatives",
+        origin="docs/decisions/0111, alternatives",
     )
     rival_share: float = setting(
         0.3,
@@ -375,7 +375,7 @@ class BelowNoiseSettings(SettingsGroup):
         above=0.0,
         reason="movement of a parameter from which effects that do the same are tested for whether "
         "it could go back; no parameter of 91 healthy cases moved its zero by more than 1.2",
-        origin="docs/decisions/0021",
+        origin="docs/decisions/0020",
     )
     same_cosine: float = setting(
         0.8,
@@ -383,27 +383,27 @@ class BelowNoiseSettings(SettingsGroup):
         least=0.0,
         most=1.0,
         reason="cosine of two signatures from which an effect does the same as a parameter",
-        origin="docs/decisions/0021",
+        origin="docs/decisions/0020",
     )
     relief: float = setting(
         3.0,
         unit="chi-square",
         least=0.0,
         reason="fall of the priors' sum of squares that an effect has to bring",
-        origin="docs/decisions/0021",
+        origin="docs/decisions/0020",
     )
     parameters_log_odds: float = setting(
         1.5,
         unit="log odds",
         reason="of parameters that are off to all effects that do the same",
-        origin="docs/decisions/0021: 4.5 to 1",
+        origin="docs/decisions/0020: 4.5 to 1",
     )
     gone_back_share: float = setting(
         0.5,
         unit="1",
         least=0.0,
         reason="share of its movement to which the parameter has to go back",
-        origin="docs/decisions/0021",
+        origin="docs/decisions/0020",
     )
 
 
@@ -443,14 +443,14 @@ class WrongParameterSettings(SettingsGroup):
         least=2,
         reason="evaluations of the first fit of a freed parameter, which says whether it is worth "
         "a whole one",
-        origin="judgement; docs/decisions/0031",
+        origin="judgement; docs/decisions/0025",
     )
     most_finished: int = setting(
         3,
         unit="count",
         least=1,
         reason="freed parameters, and pairs of them, that are fitted to their end",
-        origin="judgement; docs/decisions/0031",
+        origin="judgement; docs/decisions/0025",
     )
     near_misfit: float = setting(
         2.0,
