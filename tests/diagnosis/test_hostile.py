@@ -217,7 +217,16 @@ REFUSED = {
         "only 0 of",
     ),
     "no time": (put("time", lambda t: np.full_like(t, np.nan)), {}, "'time' has no value at all"),
-    "time backwards": (put("time", lambda t: t[::-1].copy()), {}, "'time' runs backwards"),
+    "time backwards": (
+        put("time", lambda t: t[::-1].copy()),
+        {},
+        "goes against valve_command",
+    ),
+    "time back and forth": (
+        put("time", lambda t: t[::-1] + 0.2 * (np.arange(t.size) % 5 == 0)),
+        {},
+        "'time' runs backwards",
+    ),
     "time standing still": (put("time", np.zeros_like), {}, "at different times"),
     "ms under s": (put("time", lambda t: 1e3 * t), {}, "a sample every 5 s is too slow"),
     "s under ms": (lambda t: t, {"time": "ms"}, "joint_angle turns with .* units of 'time'"),

@@ -95,6 +95,10 @@ def swap(lines: list[str]) -> None:
         lines[a], lines[b] = lines[b], lines[a]
 
 
+def newest_first(lines: list[str]) -> None:
+    lines[1:] = lines[:0:-1]
+
+
 def thin(places: dict[int, int]) -> str:
     """A log in which the cell at a place is filled in every so many rows only."""
 
@@ -284,6 +288,17 @@ CELLS = {
         lost=1,
     ),
     "swapped rows": Case(changed(swap), ("rows that stand after later ones",)),
+    "newest first": Case(changed(newest_first), ("the newest row stands first",)),
+    "newest first, swapped rows": Case(
+        changed(all_of(newest_first, swap)),
+        ("the newest row stands first", "rows that stand after later ones"),
+    ),
+    "newest first, whole seconds of a date": Case(
+        "\n".join(
+            (lines := table("when", date("%d.%m.%Y %H:%M:%S")).splitlines())[:1] + lines[:0:-1]
+        ),
+        ("the newest row stands first", "200 rows have 5 different times"),
+    ),
     "rows twice": Case(
         changed(lambda lines: lines.__setitem__(slice(30, 35), [*lines[30:35], *lines[34:35]])),
         ("rows that stand there twice: 1",),

@@ -95,6 +95,7 @@ _LONG: Final = 20.0  # usual steps; a shorter period has to show several times t
 _OFTEN: Final = 3
 _LATE: Final = 20  # rows that may come late, one after the other
 _MANY: Final = 50  # stamps between pauses from which on a line through their rows is known
+_NEWEST_FIRST: Final = 0.02  # steps forward for each one back, of logs with the newest row first
 _CROWDED: Final = 1.5  # usual density of rows; what is denser are two recordings, not one
 _SAME: Final = 3.0  # how far beyond the largest step of an angle one over a full turn may be
 
@@ -117,7 +118,7 @@ def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
         The unit, and what is to be said of it; empty where the log says it.
     """
     good = values[np.isfinite(values)]
-    steps = np.diff(good)
+    steps = np.abs(np.diff(good))
     steps = steps[steps > 0.0]
     usual = float(np.median(steps)) if len(steps) else 0.0
     size = float(np.max(np.abs(good))) if len(good) else 0.0
@@ -193,13 +194,18 @@ def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
     Returns
     -------
     Ticks
-        Counters of 16 and 32 bits go on where they overflow, rows that came late are put where
-        they belong, rows that were written twice are left out.
+        Of a log whose newest row stands first the order is reversed. Counters of 16 and 32 bits go
+        on where they overflow, rows that came late are put where they belong, rows that were
+        written twice are left out.
     """
     remarks: list[str] = []
     rows: Rows = np.flatnonzero(np.isfinite(stamps))
     if len(rows) < len(stamps):
         remarks.append(f"rows without a time: {len(stamps) - len(rows)} of {len(stamps)}, left out")
+    steps = np.diff(stamps[rows])
+    if np.sum(steps > 0.0) < _NEWEST_FIRST * np.sum(steps < 0.0):
+        rows = rows[::-1].copy()
+        remarks.append("the newest row stands first: read from the end")
     order, late = _in_order(stamps[rows])
     if late:
         remarks.append(f"rows that stand after later ones: {late}, sorted by their times")
