@@ -18,6 +18,7 @@ __all__ = [
     "MOST_DEPTH",
     "MOST_NAME",
     "MOST_PARTS",
+    "MOST_PIECE",
     "MOST_ROWS",
     "MOST_SIZE",
     "MOST_TOML_BYTES",
@@ -39,6 +40,8 @@ MOST_DEPTH: Final = 32
 """Tables and lists inside each other in TOML, groups in HDF5."""
 MOST_PARTS: Final = 100_000
 """Groups and data sets of one HDF5 file."""
+MOST_PIECE: Final = 128 << 20
+"""Bytes that one packed part of a bag may have unpacked: they are written in parts of some MB."""
 MOST_ROWS: Final = 5_000_000
 """Samples of a channel: some hours at 1 kHz."""
 MOST_CELLS: Final = 20_000_000

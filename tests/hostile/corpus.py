@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import io
 import os
+import re
 import struct
 import zipfile
 import zlib
@@ -146,6 +147,121 @@ def _arrow(ending: str) -> Writer:
     return write
 
 
+def _packed(kind: str, megabytes: int) -> bytes:
+    """Nothing but zeros, packed piece by piece."""
+    import bz2
+
+    import lz4.frame
+    import zstandard
+
+    if kind == "lz4":
+        frames = lz4.frame.LZ4FrameCompressor()
+        return b"".join(
+            [
+                frames.begin(),
+                *(frames.compress(bytes(1 << 20)) for _ in range(megabytes)),
+                frames.flush(),
+            ]
+        )
+    packer = bz2.BZ2Compressor(1) if kind == "bz2" else zstandard.ZstdCompressor().compressobj()
+    return b"".join([*(packer.compress(bytes(1 << 20)) for _ in range(megabytes)), packer.flush()])
+
+
+def _mcap_bomb(kind: str, said: int) -> Writer:
+    """One part, whose heading says how much it unpacks to."""
+
+    def write(home: Path) -> list[str]:
+        from mcap.data_stream import RecordBuilder
+        from mcap.records import Chunk, DataEnd, Footer, Header
+
+        made = RecordBuilder()
+        made.write(b"\x89MCAP0\r\n")
+        for record in (
+            Header("", "x"),
+            Chunk(kind, _packed(kind, 300), 0, 0, 0, said),
+            DataEnd(0),
+            Footer(0, 0, 0),
+        ):
+            record.write(made)
+        (home / "run.mcap").write_bytes(made.end() + b"\x89MCAP0\r\n")
+        return ["import", str(home / "run.mcap")]
+
+    return write
+
+
+def _bag_bomb(kind: str) -> Writer:
+    """A bag of ROS 1 with one message, in a part that unpacks to more than it says."""
+
+    def record(data: bytes, **fields: Any) -> bytes:
+        head = b""
+        for name, value in fields.items():
+            line = name.encode() + b"=" + value
+            head += struct.pack("<I", len(line)) + line
+        return struct.pack("<I", len(head)) + head + struct.pack("<I", len(data)) + data
+
+    def number(value: int, form: str = "I") -> bytes:
+        return struct.pack(f"<{form}", value)
+
+    def write(home: Path) -> list[str]:
+        packed = _packed(kind, 300)
+        chunk = record(packed, op=b"\x05", compression=kind.encode(), size=number(100))
+        index = record(bytes(12), op=b"\x04", ver=number(1), conn=number(0), count=number(1))
+        about = {
+            "topic": b"/p",
+            "type": b"std_msgs/Float64",
+            "md5sum": b"fdb28210bfa9d7c91146260178d9a584",
+        }
+        told = b"".join(
+            struct.pack("<I", len(k) + 1 + len(v)) + k.encode() + b"=" + v
+            for k, v in {**about, "message_definition": b"float64 data"}.items()
+        )
+        ends = record(told, op=b"\x07", conn=number(0), topic=b"/p")
+
+        def head(at: int) -> bytes:
+            return b"#ROSBAG V2.0\n" + record(
+                b"",
+                op=b"\x03",
+                index_pos=number(at, "Q"),
+                conn_count=number(1),
+                chunk_count=number(1),
+            )
+
+        first = len(head(0))
+        ends += record(
+            bytes(4) + number(1), op=b"\x06", ver=number(1), chunk_pos=number(first, "Q"),
+            start_time=bytes(8), end_time=bytes(8), count=number(1),
+        )  # fmt: skip
+        (home / "run.bag").write_bytes(head(first + len(chunk + index)) + chunk + index + ends)
+        return ["import", str(home / "run.bag")]
+
+    return write
+
+
+def _bag2_bomb(mode: str) -> Writer:
+    """A bag of ROS 2 whose message, or whose file, unpacks to more than is read."""
+
+    def write(home: Path) -> list[str]:
+        from rosbags.rosbag2 import Writer as BagWriter
+        from rosbags.typesys import Stores, get_typestore
+
+        store = get_typestore(Stores.ROS2_HUMBLE)
+        kind = store.types["std_msgs/msg/Float64"].__msgtype__
+        with BagWriter(home / "run", version=9) as bag:
+            topic = bag.add_connection("/p", kind, typestore=store)
+            bag.write(topic, 1, _packed("zstd", 300) if mode == "message" else bytes(12))
+        about = home / "run" / "metadata.yaml"
+        text = about.read_text(encoding="utf-8")
+        text = re.sub("compression_format:.*", "compression_format: zstd", text)
+        text = re.sub("compression_mode:.*", f"compression_mode: {mode}", text)
+        if mode == "file":
+            text = text.replace("run.db3", "run.db3.zstd")
+            (home / "run" / "run.db3.zstd").write_bytes(_packed("zstd", 600))
+        about.write_text(text, encoding="utf-8")
+        return ["import", str(home / "run")]
+
+    return write
+
+
 def _linked(home: Path) -> list[str]:
     (home / "case.toml").symlink_to("other.toml")
     (home / "other.toml").symlink_to("case.toml")
@@ -184,6 +300,14 @@ def entries() -> Iterator[Entry]:
     yield Entry("MATLAB bomb", _log("run.mat", _mat()), "cells")
     yield Entry("Parquet of too many rows", _arrow("parquet"), "rows")
     yield Entry("Feather of one packed batch", _arrow("feather"), "rows")
+    for kind in ("zstd", "lz4"):
+        for said in (300 << 20, 100):
+            what = f"MCAP bomb, {kind}" + " that says 100 bytes" * (said == 100)
+            yield Entry(what, _mcap_bomb(kind, said), "unpacks to more than")
+    for kind in ("bz2", "lz4"):
+        yield Entry(f"ROS 1 bag bomb, {kind}", _bag_bomb(kind), "unpacks to more than")
+    for mode in ("message", "file"):
+        yield Entry(f"ROS 2 bag bomb in a {mode}", _bag2_bomb(mode), "unpacks to more than")
     yield Entry("text of 100,000 columns", _log("run.csv", _columns(100_000).encode()), "columns")
     long = f'time [s],p\n0,"{"x" * 200_000}"\n1,2\n2,3\n3,4\n'
     yield Entry("a cell of 200 kB", _log("run.csv", long.encode()))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import bz2
+import io
 import math
 import struct
 import zipfile
@@ -12,10 +14,10 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs._files import MOST_CELLS, MOST_COLUMNS, MOST_ROWS
+from pamrs._files import MOST_BYTES, MOST_CELLS, MOST_COLUMNS, MOST_PIECE, MOST_ROWS
 from pamrs.errors import RecordingError
 
-__all__ = ["Gate", "admit_arrow", "admit_matlab", "admit_numpy", "check_size"]
+__all__ = ["Gate", "Unpacking", "admit_arrow", "admit_matlab", "admit_numpy", "check_size"]
 
 _NUMBER: Final = 8
 """Bytes of a number as it is kept."""
@@ -214,3 +216,70 @@ def _rows_of(message: bytes, *, nested: bool) -> int:
     if nested:
         batch = inside(field(batch, 1))
     return number("q", field(batch, 0))
+
+
+class Unpacking:
+    """Unpacks the parts of a bag (zstd, lz4, bzip2), and refuses what no memory holds whatever
+    their headings say.
+
+    Parameters
+    ----------
+    path : Path
+        The bag, for messages.
+    size : int
+        Its bytes: all parts together may unpack to a hundred times as many, or half a gigabyte.
+    """
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._path, self._left = path, MOST_BYTES + _DENSEST * size
+
+    def __call__(self, data: bytes, most: int = MOST_PIECE) -> bytes:
+        """Unpack a part.
+
+        Parameters
+        ----------
+        data : bytes
+            As it is in the bag; what is not packed stays as it is.
+        most : int
+            Bytes that it may have unpacked.
+
+        Returns
+        -------
+        bytes
+
+        Raises
+        ------
+        RecordingError
+            If it has more, alone or together with those before it.
+        """
+        opened = _unpacked(data)
+        if opened is None:
+            return data
+        most = min(most, self._left)
+        content = bytes(opened.read(most + 1))
+        if len(content) > most:
+            raise RecordingError(
+                f"{self._path}: a part of {len(data)} bytes unpacks to more than {most >> 20} MB, "
+                "and at most that is read; write it again in smaller parts, or only the topics "
+                "that are needed"
+            )
+        self._left -= len(content)
+        return content
+
+
+def _unpacked(data: bytes) -> Any:
+    """What reads packed bytes, known by their first ones; None where they are not packed."""
+    if data.startswith(b"\x28\xb5\x2f\xfd"):
+        import zstandard
+
+        unpacker = zstandard.ZstdDecompressor(max_window_size=MOST_PIECE)
+        return unpacker.stream_reader(io.BytesIO(data), read_across_frames=True)
+    if data.startswith(b"\x04\x22\x4d\x18"):
+        import lz4.frame
+
+        return lz4.frame.open(io.BytesIO(data))
+    return bz2.open(io.BytesIO(data)) if data.startswith(b"BZh") else None
+
+
+_DENSEST: Final = 100
+"""How many times smaller numbers become when they are packed, at most."""

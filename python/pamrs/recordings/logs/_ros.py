@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._files import MOST_BYTES, check_regular, read_file
 from pamrs.errors import RecordingError
+from pamrs.recordings._gate import Unpacking, check_size
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 
 __all__ = ["read_bag", "read_mcap"]
@@ -51,24 +55,52 @@ def read_bag(path: Path, form: TextFormat) -> Log:
         read another file, or if no message has numbers.
     """
     _check_names(path)
+    files = sorted(path.iterdir()) if path.is_dir() else [path]
+    unpacked = Unpacking(path, sum(file.stat().st_size for file in files))
+    unread: dict[str, str] = {}
+    if any(".mcap" in file.suffixes for file in files):
+        return _collected(path, _of_files(files, unpacked, unread), unread)
+    for file in files:  # before rosbags unpacks it into a folder of its own
+        if file.suffix == ".zstd":
+            unpacked(read_file(file), MOST_BYTES)
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    unread: dict[str, str] = {}
-
-    def messages(reader: Any) -> _Messages:
-        known = set(reader.typestore.fielddefs)
-        for connection in reader.connections:
-            if connection.msgtype not in known:
-                unread[connection.topic] = (
-                    f"its type {connection.msgtype} is not defined in the bag"
-                )
-        usable = [item for item in reader.connections if item.msgtype in known]
-        for connection, stamp, raw in reader.messages(connections=usable) if usable else ():
-            yield connection.topic, stamp, reader.deserialize(raw, connection.msgtype)
-
     with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
-        return _collected(path, messages(reader), unread)
+        return _collected(path, _bag_messages(reader, unpacked, unread), unread)
+
+
+def _of_files(files: Iterable[Path], unpacked: Unpacking, unread: dict[str, str]) -> _Messages:
+    """Messages of the MCAP files of a bag, of which each may be packed as a whole."""
+    for file in files:
+        if ".mcap" in file.suffixes:
+            check_regular(file)
+            packed = file.suffix == ".zstd"
+            stream = (
+                io.BytesIO(unpacked(read_file(file), MOST_BYTES)) if packed else file.open("rb")
+            )
+            with stream:
+                yield from _mcap_messages(stream, unpacked, unread)
+
+
+def _bag_messages(reader: Any, unpacked: Unpacking, unread: dict[str, str]) -> _Messages:
+    """Messages that rosbags reads, with what is packed unpacked here."""
+    known = set(reader.typestore.fielddefs)
+    for connection in reader.connections:
+        if connection.msgtype not in known:
+            unread[connection.topic] = f"its type {connection.msgtype} is not defined in the bag"
+    usable = [item for item in reader.connections if item.msgtype in known]
+    single = False
+    for one in reader.readers:
+        chunks = getattr(one, "chunks", {})  # of ROS 1
+        for at, chunk in chunks.items():
+            chunks[at] = chunk._replace(decompressor=unpacked)
+        storage = getattr(one, "storage", None)  # of ROS 2
+        if storage is not None and storage.metadata.compression_mode == "message":
+            storage.metadata, single = storage.metadata._replace(compression_mode=None), True
+    for connection, stamp, raw in reader.messages(connections=usable) if usable else ():
+        data = unpacked(bytes(raw)) if single else raw
+        yield connection.topic, stamp, reader.deserialize(data, connection.msgtype)
 
 
 def _check_names(path: Path) -> None:
@@ -102,29 +134,45 @@ def read_mcap(path: Path, form: TextFormat) -> Log:
         of a topic have one, else those at which they were logged, from the first one on; what
         their delay is is said, and ``/topic/arrival`` has the times of arrival.
     """
-    from mcap.reader import make_reader
-
     unread: dict[str, str] = {}
+    unpacked = Unpacking(path, path.stat().st_size)
+    with path.open("rb") as stream:
+        return _collected(path, _mcap_messages(stream, unpacked, unread), unread)
 
-    def messages(stream: Any) -> _Messages:
-        factories: dict[str, Any] = {}
-        for schema, channel, message in make_reader(stream).iter_messages():
-            if channel.message_encoding == "json":
-                yield channel.topic, message.log_time, json.loads(message.data)
+
+def _mcap_messages(stream: Any, unpacked: Unpacking, unread: dict[str, str]) -> _Messages:
+    """Messages of an MCAP file in the order in which they stand there."""
+    from mcap.records import Channel, Chunk, Message, Schema
+    from mcap.stream_reader import StreamReader, breakup_chunk
+
+    schemas: dict[int, Any] = {}
+    channels: dict[int, Any] = {}
+    factories: dict[str, Any] = {}
+    for record in StreamReader(stream, emit_chunks=True).records:
+        inside = [record]
+        if isinstance(record, Chunk):
+            data = unpacked(record.data) if record.compression else record.data
+            inside = breakup_chunk(replace(record, compression="", data=data))
+        for part in inside:
+            if isinstance(part, Schema):
+                schemas[part.id] = part
+            elif isinstance(part, Channel):
+                channels[part.id] = part
+            if not isinstance(part, Message):
                 continue
+            channel = channels[part.channel_id]
             kind = channel.message_encoding
+            if kind == "json":
+                yield channel.topic, part.log_time, json.loads(part.data)
+                continue
             if kind not in factories:
                 factories[kind] = _decoders(kind)
+            schema = schemas.get(channel.schema_id)
             decode = factories[kind] and factories[kind].decoder_for(kind, schema)
             if decode is None:
-                unread[channel.topic] = (
-                    f"messages encoded as {channel.message_encoding!r} are not read"
-                )
+                unread[channel.topic] = f"messages encoded as {kind!r} are not read"
             else:
-                yield channel.topic, message.log_time, decode(message.data)
-
-    with path.open("rb") as stream:
-        return _collected(path, messages(stream), unread)
+                yield channel.topic, part.log_time, decode(part.data)
 
 
 def _decoders(encoding: str) -> Any:
@@ -149,13 +197,30 @@ class _Topic:
         self.rows: dict[str, list[int]] = {}
         self.values: dict[str, list[float]] = {}
 
-    def take(self, name: str, arrived: int, message: Any) -> None:
-        """Take the numbers of one message."""
+    def take(self, name: str, arrived: int, message: Any) -> int:
+        """Take the numbers of one message; how many there are."""
+        count = 0
         for inner, value in _numbers(name, message, 0):
             self.rows.setdefault(inner, []).append(len(self.arrived))
             self.values.setdefault(inner, []).append(value)
+            count += 1
         self.arrived.append(arrived)
         self.stamps.append(_stamp(message))
+        return count
+
+    def sort(self) -> None:
+        """Put the messages in the order in which they arrived."""
+        order = np.argsort(self.arrived, kind="stable")
+        if np.all(np.diff(order) > 0):
+            return
+        self.arrived = [self.arrived[row] for row in order]
+        self.stamps = [self.stamps[row] for row in order]
+        place = np.argsort(order)
+        for name, rows in self.rows.items():
+            now = place[rows]
+            inner = np.argsort(now)
+            self.rows[name] = now[inner].tolist()
+            self.values[name] = [self.values[name][row] for row in inner]
 
     def times(self, name: str) -> tuple[Times, str]:
         """Nanoseconds of the messages: their stamps, else their arrival; and what is to be said."""
@@ -179,8 +244,13 @@ class _Topic:
 
 def _collected(path: Path, messages: _Messages, unread: dict[str, str]) -> Log:
     topics: dict[str, _Topic] = {}
+    cells = 0
     for name, arrived, message in messages:
-        topics.setdefault(name, _Topic()).take(name, arrived, message)
+        topic = topics.setdefault(name, _Topic())
+        cells += topic.take(name, arrived, message)
+        check_size(len(topic.arrived), cells, str(path))
+    for topic in topics.values():
+        topic.sort()
     topics = {name: topic for name, topic in topics.items() if topic.values}
     if not topics:
         why = "; ".join(f"{topic}: {text}" for topic, text in unread.items())
