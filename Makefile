@@ -47,7 +47,7 @@ export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
-        test-python-all snapshots hostile fuzz deny format bench convergence recruitment effects golden lock clean
+        test-python-all snapshots hostile logs fuzz deny format bench convergence recruitment effects golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -135,6 +135,9 @@ snapshots: build  ## write the files of the work done anew, where it has changed
 
 hostile: build  ## the table of hostile inputs that were tried, and what each came to
 	$(BIN)/python -m tests.hostile
+
+logs: build  ## the table of 60 small logs (dialects, clocks, units, names), each right or told
+	$(BIN)/python -m tests.recordings
 
 # Seconds of it are in `make test`.
 EXAMPLES ?= 20000
