@@ -66,7 +66,7 @@ def test_what_cannot_be_fitted_together_is_said() -> None:
     asked = ["payload_change+external_torque", "payload_change+arm.payload"]
     found = pamrs.diagnose(given, consider=asked)
     assert [own.left for own in found.considered] == [None, None]
-    assert "it happens beside another event or a wrong value" in found.summary()
+    assert "it happens with another event or a wrong value" in found.summary()
 
 
 def test_it_is_told_in_text_and_json(asked: pamrs.Diagnosis) -> None:
@@ -95,7 +95,7 @@ def test_without_a_mismatch_there_is_nothing_to_explain() -> None:
         ("supply_regulator_deadband", "neither an effect that this rig can have"),
         ("base_flexibility", "holds it already"),
         ("", "neither an effect"),
-        ("leak_muscle+leak_muscle", "a name stands in it twice"),
+        ("leak_muscle+leak_muscle", "it has a name twice"),
         ("leak_muscle@nowhere", "nowhere"),
     ],
 )

@@ -26,7 +26,7 @@ LOGS = {
     DATES / "wrap_ms16.csv": ["overflows of a clock of 16 bits: 1"],
     DATES / "wrap_us32.csv": ["overflows of a clock of 32 bits: 1"],
     DATES / "enc360.csv": ["leaps by a full turn: 4"],
-    CELLS / "disorder.csv": ["'OL'", "'#N/A'", "rows that stand after later ones"],
+    CELLS / "disorder.csv": ["'OL'", "'#N/A'", "rows that come after later ones"],
     CELLS / "garbled.csv": ["rows with fewer than 4 cells: 2", "'1.5.56'", "without a time: 1"],
     CELLS / "restart.csv": ["rows that repeat the headings, where a recording starts again: 1"],
 }

@@ -192,7 +192,7 @@ def test_measured_rows_become_a_monotone_table_with_their_scatter() -> None:
     fit = fit_map(rows(noise=4.0, half_width=6.0))
     assert fit.scatter == pytest.approx(4.0, rel=0.1)
     assert fit.half_width == pytest.approx(6.0, rel=0.15)
-    assert "N rms beside it: hysteresis" in fit.fit_report()
+    assert "N rms: hysteresis" in fit.fit_report()
     whole = rows(noise=4.0, half_width=6.0)
     order = np.random.default_rng(9).permutation(len(whole.force))
     mixed = ForceMap.from_arrays(

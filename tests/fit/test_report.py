@@ -424,7 +424,7 @@ def test_loops_without_friction_get_none(capsys, muscle, tmp_path):
     )
     code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2)
     assert code == 0
-    assert "friction: none, no pressure's c_F stands above 0.01" in out
+    assert "friction: none, no pressure's c_F is above 0.01" in out
 
 
 def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):

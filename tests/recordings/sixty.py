@@ -48,7 +48,7 @@ CLOCKS = (
         "16 bits of ms", "ms", lambda i: f"{(64_536 + 20 * i) % 65_536}", "a clock of 16 bits: 1"
     ),
     Clock("dates", "", date("%Y-%m-%d %H:%M:%S.%f")),
-    Clock("newest first", "s", lambda i: f"{DT * i:.2f}", "newest row stands first", True),
+    Clock("newest first", "s", lambda i: f"{DT * i:.2f}", "newest row comes first", True),
 )
 
 

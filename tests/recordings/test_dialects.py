@@ -287,21 +287,21 @@ CELLS = {
         ("rows with more than 4 cells: 1",),
         lost=1,
     ),
-    "swapped rows": Case(changed(swap), ("rows that stand after later ones",)),
-    "newest first": Case(changed(newest_first), ("the newest row stands first",)),
+    "swapped rows": Case(changed(swap), ("rows that come after later ones",)),
+    "newest first": Case(changed(newest_first), ("the newest row comes first",)),
     "newest first, swapped rows": Case(
         changed(all_of(newest_first, swap)),
-        ("the newest row stands first", "rows that stand after later ones"),
+        ("the newest row comes first", "rows that come after later ones"),
     ),
     "newest first, whole seconds of a date": Case(
         "\n".join(
             (lines := table("when", date("%d.%m.%Y %H:%M:%S")).splitlines())[:1] + lines[:0:-1]
         ),
-        ("the newest row stands first", "200 rows have 5 different times"),
+        ("the newest row comes first", "200 rows have 5 different times"),
     ),
     "rows twice": Case(
         changed(lambda lines: lines.__setitem__(slice(30, 35), [*lines[30:35], *lines[34:35]])),
-        ("rows that stand there twice: 1",),
+        ("rows that are there twice: 1",),
     ),
     "slow pressure": Case(thin({2: 5}), ("40 of 200 rows have a value of it",), near=0.2),
     "slow command": Case(thin({1: 5}), ("held until the next one",)),

@@ -436,7 +436,7 @@ def test_every_row_twice(tmp_path: Path) -> None:
     assert len(recording) == N
     assert recording.valid().all()
     (issue,) = recording.issues
-    assert issue.text == f"rows that stand there twice: {N}, left out once"
+    assert issue.text == f"rows that are there twice: {N}, left out once"
 
 
 def test_jitter_is_interpolated_between_neighbours(tmp_path: Path) -> None:

@@ -68,7 +68,7 @@ def test_the_headline_names_what_the_model_holds_already() -> None:
     term = BudgetTerm("chamber", "held", "leak_muscle", "", 0.9, [0.8, 1.0], None, 1.0, 300.0, "Pa")
     found = replace(synthetic.nothing(), budget=[term])
     assert found.headline.startswith(
-        "Nothing is missing beside the muscle leak that the model holds: the model explains"
+        "Nothing is missing in addition to the muscle leak that the model holds: the model explains"
     )
 
 

@@ -350,7 +350,7 @@ def test_wrong_values_and_wrong_ports_are_found_at_once() -> None:
 FORM = [
     (
         "[chamber]\ndead_volume = { value = 1, unit = 'l' }\n[chamber.b]\n",
-        ["[chamber] has dead_volume beside [chamber.b]: either one [chamber]"],
+        ["[chamber] has dead_volume and [chamber.b]: either one [chamber]"],
     ),
     (
         "[chamber]\ndead_volum = { value = 1, unit = 'l' }\n",

@@ -228,7 +228,7 @@ def test_chunks_part_the_runs(shape, chunk):
             r"arm.payload\[1\] = -2 kg is not allowed: from 0",
         ),
         ({"over": {"arm.payload": [np.nan]}}, r"arm.payload\[0\] = nan"),
-        ({"over": {"arm.payload": [1.0, 1.0]}}, "one stands twice"),
+        ({"over": {"arm.payload": [1.0, 1.0]}}, "one is given twice"),
         ({"over": {"arm.payload": [[1.0]]}}, r"arm.payload have the shape \(1, 1\)"),
         ({"over": {"arm.payload": ["heavy"]}}, "arm.payload are not allowed: numbers"),
         ({"over": {"initial.angle": [0.5]}}, "unknown entry 'angle'"),

@@ -40,8 +40,8 @@ def diagnose_command(
         Path | None,
         typer.Option(
             help=(
-                "A rig file in the place of the case's own: effects that it has are held, and what "
-                "is missing beside them is looked for."
+                "A rig file used instead of the case's own: its effects are held, and further ones "
+                "are looked for."
             )
         ),
     ] = None,
@@ -63,7 +63,7 @@ def diagnose_command(
         list[str] | None,
         typer.Option(
             help=(
-                "A suspicion to be judged beside what is found: the id of an effect or the dotted "
+                "A suspicion to be judged with what is found: the id of an effect or the dotted "
                 "name of a parameter that may be wrong, several joined by +. May be given again."
             )
         ),

@@ -357,7 +357,7 @@ def _rubbing(
             raise
         return muscle, None, f"friction: not fitted, {error}"
     if choice is None and not found.ndata:
-        return muscle, None, f"friction: none, no pressure's c_F stands above {found.floor:g}"
+        return muscle, None, f"friction: none, no pressure's c_F is above {found.floor:g}"
     if choice is None and not found.told:
         return (
             muscle,

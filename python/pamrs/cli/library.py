@@ -20,7 +20,7 @@ def library_command(
         Path | None, typer.Option(help="Write a rig file: a bench with this muscle.")
     ] = None,
     facts: Annotated[
-        bool, typer.Option("--facts", help="Every published fact beside ours.")
+        bool, typer.Option("--facts", help="Compare every published fact with ours.")
     ] = False,
 ) -> None:
     """List the muscles of the 2014 dissertation, or print one with the origin of each number."""
@@ -47,7 +47,7 @@ def library_command(
 
 
 def _facts() -> str:
-    """Every published fact of the library, and the comparison of 3.2.3, beside ours."""
+    """Every published fact of the library, and the comparison of 3.2.3, each with ours."""
     from pamrs.design.elbow_muscles import compare_design, six_against_two
     from pamrs.library import text
 

@@ -1,4 +1,4 @@
-"""``pamrs replay``: the recordings of a case beside the whole rig simulated from its inputs."""
+"""``pamrs replay``: the recordings of a case and the whole rig simulated from its inputs."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def replay_command(
     ],
     rig: Annotated[
         Path | None,
-        typer.Option(help="Model beside the case's own: a file, or a rig of the package."),
+        typer.Option(help="A second model to compare: a file, or a rig of the package."),
     ] = None,
     recording: Annotated[
         str, typer.Option(help="Replay this recording alone; by default all.")
@@ -52,7 +52,7 @@ def replay_command(
 ) -> None:
     """Simulate the whole rig from what went into it in each recording of a case (commands, and
     pressures or lengths where nothing drives them), and compare: free-running, from the first
-    sample on. With a diagnosed model its errors stand beside those of the case's own rig.
+    sample on. With a diagnosed model its errors are printed with those of the case's own rig.
     """
     check_writable(plot)
     check_packages("plot", *(["matplotlib"] if plot else []))

@@ -72,7 +72,7 @@ def simulate_command(
     ] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(help="Write a picture of the channels, beside the recorded ones (PNG)."),
+        typer.Option(help="Write a picture of the channels, with the recorded ones (PNG)."),
     ] = None,
     animation: Annotated[Path | None, typer.Option(help="Write the arm as it moves (GIF).")] = None,
     speed: Annotated[

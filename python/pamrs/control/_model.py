@@ -224,7 +224,7 @@ class ArmModel(JointModel):
         names = joints_of(rig)
         if rig.tables("load"):
             raise ParameterError(
-                f"rig {rig.name!r} has a [load] in the place of [joint] and [arm]: it has a "
+                f"rig {rig.name!r} has a [load] instead of [joint] and [arm]: it has a "
                 "LoadModel, and a RigModel takes either"
             )
         arm = next(iter(rig.tables("arm").values()))

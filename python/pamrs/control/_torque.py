@@ -98,7 +98,7 @@ def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Any, dict[str, 
     if rig.tables("load"):
         if muscle is None:
             raise ParameterError(
-                f"rig {rig.name!r} has a [load] in the place of [joint] and [arm], which this "
+                f"rig {rig.name!r} has a [load] instead of [joint] and [arm], which this "
                 "model of a joint needs; RigModel and LoadModel take a load"
             )
         rest, load = rest_length_of(rig), next(iter(rig.tables("load").values()))

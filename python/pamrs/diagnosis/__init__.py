@@ -393,7 +393,7 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     sets = [tuple(name.strip() for name in text.split("+")) for text in consider]
     for text, names in zip(consider, sets, strict=True):
         if len(set(names)) < len(names):
-            raise ValueError(f"consider: {text!r} is not allowed: a name stands in it twice")
+            raise ValueError(f"consider: {text!r} is not allowed: it has a name twice")
     for name in (name for names in sets for name in names):
         if is_effect(name) and id_of(name) in held:
             raise ValueError(

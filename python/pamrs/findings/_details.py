@@ -320,7 +320,7 @@ class Considered(Entry):
         Probability that this is what is missing there.
     left : float or None
         Share of the mismatch that it leaves; None where nothing is missing, where a parameter of it
-        stays inside its tolerances, where it would happen beside another event or a wrong value,
+        stays inside its tolerances, where it would happen with another event or a wrong value,
         or where the model cannot be run with it.
     """
 
@@ -332,7 +332,7 @@ class Considered(Entry):
     left: float | None = field(
         metadata=told(
             "share of the mismatch that it leaves; null where nothing is missing, where a "
-            "parameter of it stays inside its tolerances, where it would happen beside another "
+            "parameter of it stays inside its tolerances, where it would happen with another "
             "event or a wrong value, or where the model cannot be run with it"
         )
     )

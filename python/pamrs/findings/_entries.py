@@ -74,7 +74,7 @@ class Where(Entry):
     intervals : list of (start, stop)
         When [s].
     conditions : list of Condition
-        Under which conditions, the most telling first.
+        Under which conditions, the most significant first.
     text : str
         In words.
     recording : str or None
@@ -302,7 +302,7 @@ class Unexplained(Entry):
     interval : list of two floats or None
         95 % interval of the share.
     conditions : list of Condition
-        Under which it is largest, the most telling first.
+        Under which it is largest, the most significant first.
     form : str
         What it is a function of, in words, where such a form carries over to other recordings.
     role : str
@@ -322,7 +322,7 @@ class Unexplained(Entry):
         default=None, metadata=told("95 % interval of the share", kind="pair_or_null")
     )
     conditions: list[Condition] = field(
-        default_factory=list, metadata=told("under which it is largest, the most telling first")
+        default_factory=list, metadata=told("under which it is largest, the most significant first")
     )
     form: str = field(
         default="",

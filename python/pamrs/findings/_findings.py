@@ -187,7 +187,7 @@ class Findings:
     )
     considered: list[Considered] = field(
         default_factory=list,
-        metadata=told("what the caller asked to be judged beside the rest", required=False),
+        metadata=told("what the caller asked to be judged in addition", required=False),
     )
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0

@@ -247,7 +247,7 @@ def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
     )
     if len(way) and not rubs and np.all(way == way[0]) and way[0] != 0:
         word = "contracting" if way[0] < 0 else "lengthening"
-        return [f"all rows are {word}: friction cannot be told and is in the moduli"]
+        return [f"all rows are {word}: friction cannot be determined and is in the moduli"]
     if rubs or problem.blank.model == "elbow_linear" or not (np.any(way < 0) and np.any(way > 0)):
         return []
     side, residual = way * np.abs(force), found.residual / problem.weight[rows]

@@ -118,7 +118,7 @@ def decimal_of(columns: Iterable[Sequence[str]], source: str) -> str:
     whole = [cell for cell in cells if re.fullmatch(r"[+-]?\d+", cell)]
     if marked and whole and all(_GROUPED.fullmatch(cell) for cell in marked):
         raise RecordingError(
-            f"{source}: {marked[0]!r} beside {whole[0]!r}: does the comma mark decimals or "
+            f"{source}: {marked[0]!r} and {whole[0]!r}: does the comma mark decimals or "
             f"thousands? For decimals give decimal = ',' {_GIVE}; thousands must be written "
             "without a mark"
         )

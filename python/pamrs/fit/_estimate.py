@@ -521,7 +521,7 @@ def _check_identified(problem: Problem, result: Estimate) -> None:
     _, _, s, _ = decompose(stacked, names, hint)
     if loose and s[-1] < 1e-7 * s[0]:  # differences carry no more digits
         raise FitError(
-            f"the fitted points do not determine {', '.join(loose)} beside the other unknowns{hint}"
+            f"the fitted points do not determine {', '.join(loose)} with the other unknowns{hint}"
         )
 
 

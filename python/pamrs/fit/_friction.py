@@ -491,7 +491,7 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
     found: list[str] = []
     if above.sum() == 1:
         found.append(
-            f"one pressure only stands above the floor of {floor:g}: the slope c1 is hardly "
+            f"only one pressure is above the floor of {floor:g}: the slope c1 is hardly "
             "determined by it and its neighbour"
         )
     pooled, spread = _pooled(levels)
@@ -502,7 +502,7 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
         )
     if not above.any():
         found.append(
-            f"no coefficient stands above the floor of {floor:g}: the law is its floor at every "
+            f"no coefficient is above the floor of {floor:g}: the law is its floor at every "
             "pressure"
         )
     return found

@@ -180,7 +180,7 @@ class MapFit:
             *(
                 []
                 if math.isnan(self.half_width)
-                else [f"  both branches lie {self.half_width:.3g} N rms beside it: hysteresis"]
+                else [f"  each branch differs from it by {self.half_width:.3g} N rms: hysteresis"]
             ),
             f"  model error: {100.0 * self.share:.2g} % of the force",
         ]

@@ -194,7 +194,7 @@ def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
     Returns
     -------
     Ticks
-        Of a log whose newest row stands first the order is reversed. Counters of 16 and 32 bits go
+        Of a log whose newest row comes first the order is reversed. Counters of 16 and 32 bits go
         on where they overflow, rows that came late are put where they belong, rows that were
         written twice are left out.
     """
@@ -205,16 +205,16 @@ def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
     steps = np.diff(stamps[rows])
     if np.sum(steps > 0.0) < _NEWEST_FIRST * np.sum(steps < 0.0):
         rows = rows[::-1].copy()
-        remarks.append("the newest row stands first: read from the end")
+        remarks.append("the newest row comes first: read from the end")
     order, late = _in_order(stamps[rows])
     if late:
-        remarks.append(f"rows that stand after later ones: {late}, sorted by their times")
+        remarks.append(f"rows that come after later ones: {late}, sorted by their times")
     rows = rows[order]
     time, said = _counted_on(stamps[rows])
     remarks += said
     again = np.flatnonzero(np.diff(time) == 0.0) + 1
     if len(again) and others and all(_same(values, rows, again) for values in others):
-        remarks.append(f"rows that stand there twice: {len(again)}, left out once")
+        remarks.append(f"rows that are there twice: {len(again)}, left out once")
         keep = np.ones(len(rows), dtype=bool)
         keep[again] = False
         rows, time = rows[keep], time[keep]

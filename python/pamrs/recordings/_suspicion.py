@@ -214,7 +214,7 @@ def _pressure(
                 name,
                 unit,
                 likely,
-                f"{name} is said to be in {unit}, so it would reach {_bar(top)}, beside "
+                f"{name} is said to be in {unit}, so it would reach {_bar(top)}, against "
                 f"{_bar(reference)} of {what}; read as {likely} it reaches {_bar(turned)}",
             )
             return

@@ -66,8 +66,8 @@ def read_calibration(problems: list[str], label: str, entry: Mapping[str, Any]) 
         "from" in entry and {"scale", "offset"} & set(entry)
     ):
         problems.append(
-            f"{label}: from and to belong together, like from = [0, 4095], to = [0, 10], and stand "
-            "instead of scale and offset"
+            f"{label}: from and to belong together, like from = [0, 4095], to = [0, 10], and "
+            "replace scale and offset"
         )
         return Calibration()
     if "from" in entry:

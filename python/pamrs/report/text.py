@@ -297,7 +297,7 @@ def considered_sentence(own: Considered) -> str:
     if own.left is None:
         return (
             f"{names}: it was not judged in the {blocks}: a parameter of it stays "
-            "inside its tolerances, it happens beside another event or a wrong value, or the model "
+            "inside its tolerances, it happens with another event or a wrong value, or the model "
             "cannot be run with it"
         )
     return (
@@ -790,11 +790,11 @@ def judged_place(diagnosis: Findings) -> str:
 
 
 def _beside_held(diagnosis: Findings) -> str:
-    """The effects that the model had before: `` beside the muscle leak that the model holds``."""
+    """The effects that the model had before: `` in addition to the leak that the model holds``."""
     ids = [term.id for term in diagnosis.budget if term.kind == "held"]
     ids += [name.partition(".")[0] for name in diagnosis.parameters]
     held = [f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS]
-    return f" beside {' and '.join(held)} that the model holds" if held else ""
+    return f" in addition to {' and '.join(held)} that the model holds" if held else ""
 
 
 def _outside(diagnosis: Findings, place: str) -> str:

@@ -178,7 +178,7 @@ class Reader:
                 self.problem(f"{named} is not allowed: a rig has one [{block}], without a name")
             else:
                 self.problem(
-                    f"[{block}] has {', '.join(others)} beside {named}: either one [{block}] or "
+                    f"[{block}] has {', '.join(others)} and {named}: either one [{block}] or "
                     "only named ones are needed"
                 )
             return None
@@ -293,7 +293,7 @@ class Reader:
                 needs = (
                     'a [load] with kind = "mass" is needed'
                     if not moves
-                    else "it stands in [sensors], without a name"
+                    else "it belongs in [sensors], without a name"
                 )
                 self.problem(f"{label}.length_zero is not allowed: {needs}")
             table.pop("length_zero", None)
@@ -429,7 +429,7 @@ class Reader:
         """The tables ``[[effects]]``."""
         if not isinstance(raw, list) or not all(isinstance(entry, Mapping) for entry in raw):
             self.problem(
-                "effects is not allowed as it stands: one table [[effects]] for each is needed"
+                "effects is not allowed as it is: one table [[effects]] for each is needed"
             )
             return []
         if not raw:

@@ -460,7 +460,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             0.0,
             1e9,
             0.0,
-            note="of a spring across the joint, beside the muscles; 0: none",
+            note="of a spring across the joint, in addition to the muscles; 0: none",
         ),
         Key("spring_angle", "rad", -_TURN, _TURN, 0.0, note="where that spring is at rest"),
     ),

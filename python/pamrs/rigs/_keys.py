@@ -16,8 +16,8 @@ deviation of what you know) it may move in a diagnosis or a fit, with unknown = 
 Pressures are gauge.
 A block that is left out is not there: only [gas] and [chamber] are needed.
 
-A block that stands once needs no name. Several of a kind have one each, of letters, digits, _ and \
--: [valve.flexor] and
+A block that is the only one of its kind needs no name. Several have one each, of letters, digits, \
+_ and -: [valve.flexor] and
 [valve.extensor], whose parameters are called valve.flexor.half_range and so on. A port is the \
 name of another block, in full as
 "chamber.flexor" or "supply", or only "flexor" where that is clear. [transmission.flexor] is that \

@@ -246,7 +246,7 @@ class Grid(Axes):
         values = _columns(self.axes, "the grid")
         for name, column in values.items():
             if np.unique(column).size != column.size:
-                raise ParameterError(f"the values of {name} are not allowed: one stands twice")
+                raise ParameterError(f"the values of {name} are not allowed: one is given twice")
         object.__setattr__(self, "_values", values)
 
     @property

@@ -94,8 +94,8 @@ def _told(reading: Reading) -> str:
     else:
         what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}: read so,"
     return (
-        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise in "
-        f"the place of {reading.before:.2g} times, and a free "
+        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise "
+        f"instead of {reading.before:.2g} times, and a free "
         f"{'offset' if reading.offset else 'factor'} would be the same"
     )
 
@@ -110,8 +110,8 @@ def _advice(reading: Reading) -> str:
         else f"write {reading.likely}"
     )
     return (
-        f"No physics was judged, since what the log says cannot be told from it: {how} for "
-        f"{_names(reading)} (in the heading, or in case.toml), or see to the sensor where the log "
+        f"No physics was judged, since a wrong unit looks like missing physics: {how} for "
+        f"{_names(reading)} (in the heading, or in case.toml), or check the sensor where the log "
         "is right, and diagnose again."
     )
 

@@ -371,7 +371,7 @@ def _of_whole(asked: _Question, channel: str) -> NextExperiment:
     block = next((b for b in asked.blocks if b.channel == channel), None)
     if block is None:
         return NextExperiment(
-            f"{begin}: record the channels that stand between it and the commands as well, so that "
+            f"{begin}: record the channels between it and the commands as well, so that "
             "the blocks that were not judged can be."
         )
     what, shows, experiment = asked.experiment(block)

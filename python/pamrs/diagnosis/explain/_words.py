@@ -206,7 +206,7 @@ def _of_blocks(
     )
     text = f"{_opening(diagnosis, 'the model leaves out')}: {names}."
     if any(diagnosis.where.block in b.blocks for b in missing):  # it leads with the larger mismatch
-        text = f"{place} No listed effect explains it. Beside it: {text}"
+        text = f"{place} No listed effect explains it. In addition: {text}"
     else:
         text += f" {place}"
     it = "it" if len(diagnosis.effects) == 1 else "them"
@@ -347,7 +347,7 @@ def warnings(
                 )
     for name, value in sorted(symptoms.items(), key=lambda kv: -abs(kv[1])):
         what = (
-            "a symptom of a wrong value beside it or of missing physics"
+            "a symptom of another wrong value or of missing physics"
             if mistaken
             else "a symptom of missing physics"
         )
@@ -448,8 +448,8 @@ def reservations(
                 continue
             what = "the effect" if j.named else "the other value"
             times = error.after / error.noise
-            why = "its equation is not the whole truth" if j.named else "something acts beside it"
-            name = "" if j.ambiguity else "the name stands, "
+            why = "its equation is not the whole truth" if j.named else "something else acts"
+            name = "" if j.ambiguity else "the name remains, "
             out.append(
                 f"with {what} the model still misses {spoken_name(channel)} by {times:.2g} "
                 f"times the noise level: {name}{why}, and standard deviations hold only as far as "

@@ -258,6 +258,6 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             )
             said.append(
                 f"block {block.name}: recordings begin in a transient; the temperature of the gas "
-                f"there is fitted, and is about {told} beside the room's"
+                f"there is fitted, and differs from the room's by about {told}"
             )
     return said

@@ -106,6 +106,6 @@ def _told(
         value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
     told = ", ".join(f"{count} in {name}" for name, count in counts.items())
     return (
-        f"{channel} is clipped: its sensor's range ends at {value}; samples there, and those "
-        f"beside them, were masked in all recordings ({told})"
+        f"{channel} is clipped: its sensor's range ends at {value}; samples there, and "
+        f"their neighbours, were masked in all recordings ({told})"
     )

@@ -94,7 +94,7 @@ def several(
     sets = [s for root in roots[:most] for s in growing.widened(root)]
     happening = []
     for effect, beside in _beside(trial, screened, start, singles, transient, weight):
-        tell(f"looking for {effect} beside {beside.effects[0]}")
+        tell(f"looking for {effect} with {beside.effects[0]}")
         found = trial.transient(effect, beside)
         happening += [] if found is None else [found]
     return [*sets, *happening, *growing.grown(sets)]
@@ -106,7 +106,7 @@ def beside_wrong(trial: Attempts, single: Candidate, tell: Say) -> list[Candidat
     begun = [trial.start_of(single.fit, effect)]
     found = []
     for name in strained_parameters(trial, single.fit):
-        tell(f"trying {effect} beside another {name}")
+        tell(f"trying {effect} with another {name}")
         beside = trial.together(begun, single.fit, (name,))
         found += [] if beside is None else [beside]
     return found

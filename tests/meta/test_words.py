@@ -1,0 +1,134 @@
+"""Words that a user should not have to learn: pages, messages and words of effects are plain."""
+
+import ast
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+#: Private words of the diagnosis, and what says the same plainly.
+PRIVATE = {
+    r"beside": "with, next to, in addition to, compared with",
+    r"told(?! (?:apart|from))": "reported, distinguished",
+    r"stands?(?!(?:-ins?| still| for| upright| up)\b)": "is, is written, rests; bench",
+    r"looks(?! (?:for|like|alike|at|the same)\b)": "comparisons",
+    r"grant(?:s|ed)?": "allow",
+    r"hollows?": "local minimum",
+    r"(?:takes?|took|taken) up(?! to)": "absorb",
+    r"in (?:the|its|their) place of": "instead of",
+    r"pliable": "able to fit anything",
+    r"the other one(?: of)?": "name it",
+    r"quiet (?:group|block)s?": "group that leaves only noise",
+    r"strained": "far outside its tolerance",
+}
+FOUND = re.compile(rf"\b(?:{'|'.join(PRIVATE)})\b", re.IGNORECASE)
+
+#: Pages that a program writes from results that are kept, and packages that wait for their turn.
+WRITTEN = ("docs/reproduction/", "docs/benchmarks.md", "docs/recruitment.md")
+LATER = ("reproduce/", "comparison.py", "diagnosis/settings/")
+
+
+def private_words(text):
+    """Each private word of a text, with what is around it."""
+    plain = " ".join(text.split())
+    return [plain[max(0, m.start() - 40) : m.end() + 30] for m in FOUND.finditer(plain)]
+
+
+def pages():
+    """Pages for users and readers."""
+    for path in [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]:
+        name = path.relative_to(ROOT).as_posix()
+        if name not in ("CHANGELOG.md", "CONTRIBUTING.md") and not name.startswith(WRITTEN):
+            yield name
+
+
+def messages(path):
+    """Line and text of the strings of a module that have several words: what it prints, raises or
+    writes. Docstrings and strings that document a name are none, but those of commands are.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    aside = {
+        id(node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    }
+    pieces = {
+        id(piece)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.JoinedStr)
+        for piece in node.values
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            text = "".join(
+                str(piece.value) if isinstance(piece, ast.Constant) else "{}"
+                for piece in node.values
+            )
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            if id(node) in pieces or id(node) in aside:
+                continue
+            text = node.value
+        else:
+            continue
+        if len(text.split()) > 2:
+            yield node.lineno, text
+    if "cli" in path.parts:
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef) and node.decorator_list:
+                yield node.lineno, ast.get_docstring(node) or ""
+
+
+@pytest.mark.parametrize("name", list(pages()))
+def test_pages_have_no_private_words(name):
+    assert not private_words((ROOT / name).read_text(encoding="utf-8"))
+
+
+def test_messages_have_no_private_words():
+    package = ROOT / "python/pamrs"
+    said = [
+        (path.relative_to(package).as_posix(), line, text)
+        for path in sorted(package.rglob("*.py"))
+        if not path.relative_to(package).as_posix().startswith(LATER)
+        for line, text in messages(path)
+    ]
+    assert len(said) > 1500
+    found = {f"{name}:{line}": words for name, line, text in said if (words := private_words(text))}
+    assert not found
+
+
+def test_words_of_effects_are_not_private():
+    files = sorted((ROOT / "python/pamrs/effects/words").glob("*.toml"))
+    assert len(files) > 30
+
+    def texts(entry):
+        if isinstance(entry, dict):
+            return [text for value in entry.values() for text in texts(value)]
+        return (
+            [text for value in entry for text in texts(value)]
+            if isinstance(entry, list)
+            else [str(entry)]
+        )
+
+    found = {
+        path.name: words
+        for path in files
+        for text in texts(tomllib.loads(path.read_text(encoding="utf-8")))
+        if (words := private_words(text))
+    }
+    assert not found
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        ("what is missing beside it is told, and stands in the warnings", 3),
+        ("one more look is paid for by looks", 1),
+        ("instead of the two, which stand for zero, none is told apart or told from noise", 0),
+        ("the joint stands still and looks like a stand-in", 0),
+    ],
+)
+def test_private_words_are_found_where_they_are(text, count):
+    assert len(private_words(text)) == count
