@@ -1,11 +1,14 @@
 """Words that a user should not have to learn: pages, messages and words of effects are plain."""
 
 import ast
+import inspect
 import re
 import tomllib
 from pathlib import Path
 
 import pytest
+
+import pamrs
 
 ROOT = Path(__file__).parents[2]
 
@@ -97,6 +100,24 @@ def test_messages_have_no_private_words():
     assert len(said) > 1500
     found = {f"{name}:{line}": words for name, line, text in said if (words := private_words(text))}
     assert not found
+
+
+def public_docstrings():
+    """Docstrings of what `import pamrs` offers, methods and properties included."""
+    for name in pamrs.__all__:
+        thing = getattr(pamrs, name)
+        if not (inspect.isclass(thing) or inspect.isfunction(thing)):
+            continue
+        yield name, inspect.getdoc(thing) or ""
+        for own, value in vars(thing).items() if inspect.isclass(thing) else ():
+            if not own.startswith("_"):
+                yield f"{name}.{own}", inspect.getdoc(value) or ""
+
+
+def test_public_docstrings_have_no_private_words():
+    documented = dict(public_docstrings())
+    assert len(documented) > 100
+    assert not {name: words for name, text in documented.items() if (words := private_words(text))}
 
 
 def test_words_of_effects_are_not_private():

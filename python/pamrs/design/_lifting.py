@@ -227,8 +227,8 @@ def lift(
 ) -> Lift:
     """What a one-link rig lifts and holds at a pressure.
 
-    At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` stands against
-    gravity's ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference;
+    At each angle the torque of the muscles ``n F(P, d(theta)/L0) dd/dtheta`` is compared
+    with gravity's ``(m lc + mp l) g sin(theta)`` (sections 4 and 5 of the physics reference;
     dissertation (3.24)). A payload that is too much is a result, not an error.
 
     Parameters

@@ -170,14 +170,14 @@ def diagnose(
         case. Effects that the rig holds already are part of the nominal model: their parameters are
         refitted with the others, and they are not named again.
     rig : Rig or path-like, optional
-        A model to begin from in the place of the case's own, for example one with the effects that
+        A model to begin from instead of the case's own, for example one with the effects that
         an earlier diagnosis found.
     allow_outside : bool
         Whether rig file and recordings of a case folder may lie outside of it.
     settings : DiagnosisSettings, optional
         The numbers that the verdict rests on; those of the published trials by default.
     consider : sequence of str, optional
-        Suspicions to be judged beside what the search finds by itself: each the id of an effect or
+        Suspicions to be judged with what the search finds by itself: each the id of an effect or
         the dotted name of a parameter that may be wrong, or several joined by ``+``
         (``"base_flexibility+muscle.modulus_scale"``). What of each acts where a mismatch is gets
         fitted from every start that the search knows, and competes with what it finds by itself;

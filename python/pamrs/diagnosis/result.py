@@ -77,7 +77,7 @@ class Diagnosis(Findings):
         ``tried`` and ``tested`` an effect at one of several blocks has the block's name behind an
         ``@``: ``leak_muscle@flexor``.
     probabilities : dict
-        Probability of what the case may be told to have: names of all its blocks joined by ``+``,
+        Probability of each possible answer for the case: names of all its blocks joined by ``+``,
         ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something is
         missing and nothing has a name). Those of each block are in ``blocks``.
     parameters : dict of str to ParameterFound
@@ -122,7 +122,7 @@ class Diagnosis(Findings):
     free_run : list of FreeRun or None
         The whole rig simulated from its commands alone, for each held-out recording (each fitted
         one where none was held out): ``recording``, ``role``, ``seconds``, ``channels`` {channel:
-        {unit, before, after, cut_before, cut_after}}, root mean square errors beside those of the
+        {unit, before, after, cut_before, cut_after}}, root mean square errors with those of the
         cut chain, SI, and a ``note``. None where no recording has the commands;
         ``free_run_note`` says why.
     wrong_parameters : list of WrongParameter
@@ -188,7 +188,7 @@ class Diagnosis(Findings):
         Parameters
         ----------
         path : path, optional
-            File to write too; written beside and renamed, so that it is never half there.
+            File to write too; written under another name and renamed, so it is never half there.
 
         Returns
         -------

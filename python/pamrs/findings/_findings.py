@@ -69,7 +69,7 @@ class Findings:
         Sets of names (effects, wrong parameters by dotted name, ``unlisted``, ``parameters``) that
         the data cannot separate; empty when settled.
     probabilities : dict
-        Probability of what the case may be told to have: names of all its blocks joined by ``+``,
+        Probability of each possible answer for the case: names of all its blocks joined by ``+``,
         ``none``, ``parameters`` (that moved inside their tolerances), or ``unlisted`` (something
         is missing and nothing has a name). Those of each block are in ``blocks``.
     blocks : list of BlockVerdict
@@ -114,7 +114,7 @@ class Findings:
     tried : list of Tried
         Every set of effects that was fitted.
     considered : list of Considered
-        What the caller asked to be judged beside the rest.
+        What the caller asked to be judged in addition.
     tested : list of Tested
         Every persistent effect that acts where the mismatch is.
 

@@ -66,7 +66,7 @@ def channels_png(
     result : Simulation
         What :func:`pamrs.simulate` returns.
     measured : mapping of str to (time, value), optional
-        Recorded channels to draw beside them [s, SI].
+        Recorded channels to draw with them [s, SI].
     nominal : Simulation, optional
         The same run of the rig file, where ``result`` is that of a model that was made of it.
 

@@ -142,7 +142,7 @@ class Reader:
         return Content(name, model, self.tolerances, self.effect_std)
 
     def limits(self, raw: Any) -> dict[str, Any]:
-        """What the stand allows, under ``limits``; nothing where the file says nothing."""
+        """What the bench allows, under ``limits``; nothing where the file says nothing."""
         if raw is None:
             return {}
         if not isinstance(raw, Mapping):

@@ -1,4 +1,4 @@
-"""Rigs: the nominal model of a test stand, read from TOML with units and tolerances.
+"""Rigs: the nominal model of a test bench, read from TOML with units and tolerances.
 
 A rig is blocks around a gas: supplies, valves, lines and chambers that the air goes through,
 muscles, joints and an arm or a load that the force goes through, sensors. Only ``gas`` and
@@ -70,7 +70,7 @@ class Parameter:
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """The model of a test stand; made by :func:`load_rig`, changed only by making another.
+    """The model of a test bench; made by :func:`load_rig`, changed only by making another.
 
     Attributes
     ----------
@@ -206,7 +206,7 @@ class Rig:
 
     @property
     def limits(self) -> dict[str, Any]:
-        """What the stand allows, where the file says it (a copy): ``max_pressure`` [Pa, gauge] and
+        """What the bench allows, where the file says it (a copy): ``max_pressure`` [Pa, gauge] and
         ``payloads`` [kg], for experiments that are proposed.
         """
         return copy.deepcopy(self._model.get("limits", {}))
@@ -441,7 +441,7 @@ class Rig:
 
         Several of one id can be there, each at a block of its own and with its own parameters. One
         at the same block is replaced; one that acts everywhere replaces all of its id, and is
-        replaced by one at a block. The new one stands in the place of what it replaces.
+        replaced by one at a block. The new one takes its place in the order.
 
         Parameters
         ----------

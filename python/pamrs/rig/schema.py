@@ -153,7 +153,7 @@ _GEOMETRY: Final = (
     Key("rest_angle", "rad", -_TURN, _TURN, note="where the muscle is at rest length"),
 )
 
-#: What the stand allows, for experiments that are proposed: the core knows nothing of it.
+#: What the bench allows, for experiments that are proposed: the core knows nothing of it.
 LIMITS: Final = (
     Key("max_pressure", "Pa", 0.0, 1e8, note="gauge, of muscle and chamber"),
     Key("payloads", "kg", 0.0, 1e5, kind="vector", note="masses that can be hung"),

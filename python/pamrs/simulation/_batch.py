@@ -103,7 +103,7 @@ class Batch:
     Plants whose rig has no effects and an arm of one link or a hanging mass run side by side in the
     vector lanes of the processor (:attr:`side_by_side`); their channels agree with those of
     :class:`pamrs.Simulator` to about 1e-9 of their size. Every other plant gives bit for bit what
-    the simulator gives. What stands beside a plant, the number of threads, and how a run is cut
+    the simulator gives. Which other plants run, the number of threads, and how a run is cut
     into calls change no bit of it. A plant whose state leaves the range in which the model holds is
     kept: its channels stay at its last good sample, :attr:`status` says why, and the others go on.
     A batch can be pickled and copied; it belongs to one thread at a time.

@@ -504,9 +504,9 @@ class Simulation(Mapping[str, Array]):
         path : path-like
             The file.
         recorded : mapping of str to (time, value), optional
-            Recorded channels to draw beside them [s, SI].
+            Recorded channels to draw with them [s, SI].
         nominal : Simulation, optional
-            The same run of another rig to draw beside it: that of the rig file, where this one is
+            The same run of another rig to draw with it: that of the rig file, where this one is
             of a diagnosed model.
 
         Returns

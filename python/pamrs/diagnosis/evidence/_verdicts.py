@@ -259,7 +259,7 @@ def case_verdict(judged: Sequence[Judged]) -> str:
 
 
 def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> dict[str, float]:
-    """Probabilities of what a case may be told to have: the names of all its blocks together.
+    """Probabilities of the possible answers for a case: the names of all its blocks together.
 
     ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a
     name takes nothing from a name in another.

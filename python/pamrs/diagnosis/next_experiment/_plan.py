@@ -126,7 +126,7 @@ class Plan:
         Returns
         -------
         Sight
-            What is left of it beside the baseline's freedom.
+            What is left of it after what the baseline can do.
 
         Raises
         ------
@@ -149,7 +149,7 @@ class Plan:
         ----------
         first, second : str
             Their ids, with places where the plan has them; one id with two places asks whether the
-            place is told.
+            places can be told apart.
 
         Returns
         -------
