@@ -55,8 +55,8 @@ def simulate_batch(
 
     Each plant runs as with :func:`pamrs.simulate`. Rigs without effects whose arm is one link or a
     hanging mass run side by side in the vector lanes of the processor; their channels agree with
-    :func:`pamrs.simulate` to about 1e-9 of their size. All others run one by one. What stands
-    beside a plant, and the number of threads, change no bit of it.
+    :func:`pamrs.simulate` to about 1e-9 of their size. All others run one by one. Other
+    plants of the batch, and the number of threads, change no bit of it.
 
     Parameters
     ----------
