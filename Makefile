@@ -19,7 +19,7 @@ RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
 CARGO := env -u MAKEFLAGS -u MFLAGS cargo
 # One by one, since cargo fmt does not see modules that a macro declares.
 RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
-PYTHON_SOURCES := python tests trial demo benchmarks fingerprints
+PYTHON_SOURCES := python tests trial demo benchmarks fingerprints reproduction
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
@@ -47,7 +47,7 @@ export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
-        test-python-all snapshots hostile logs fuzz deny format bench convergence recruitment effects golden lock clean
+        test-python-all snapshots hostile logs fuzz deny format bench convergence recruitment effects reproduce golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -116,7 +116,7 @@ lint-rust: $(VENV)/.created
 lint-python: build
 	$(BIN)/ruff check --quiet $(PYTHON_SOURCES)
 	$(BIN)/ruff format --quiet --check $(PYTHON_SOURCES)
-	$(BIN)/mypy --no-error-summary python/pamrs trial
+	$(BIN)/mypy --no-error-summary python/pamrs trial reproduction
 	$(BIN)/python -m mypy.stubtest pamrs._core
 
 test-rust:  ## the core's tests, documentation examples included
@@ -168,6 +168,9 @@ recruitment: build  ## recruitment in real time against fixed recruitment, and b
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator
 	$(BIN)/python -m fingerprints docs/effects
 
+reproduce: build  ## the dissertation beside pamrs, to docs/reproduction; finished chapters are kept (CHAPTER=ch3 for one)
+	$(BIN)/python -m reproduction docs/reproduction $(if $(CHAPTER),--only $(CHAPTER))
+
 golden: build  ## the published golden values against this build
 	$(BIN)/python -m pytest -q tests/golden
 
@@ -185,5 +188,5 @@ lock:  ## pin the newest versions that pyproject.toml allows
 
 clean:  ## remove everything that was built
 	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis
-	find python trial tests benchmarks demo fingerprints -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+	find python trial tests benchmarks demo fingerprints reproduction -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 	rm -f python/pamrs/_core*.so

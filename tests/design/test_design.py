@@ -26,7 +26,7 @@ from pamrs.design import (
 )
 from pamrs.design._genetic import child, decode, redraw_one
 from pamrs.design._problem import _areas
-from pamrs.reproduce.joints import CASES, facts_of_geometry
+from reproduction.joints import CASES, facts_of_geometry
 
 INCH = 0.0254
 GOOD = [0.0145, 0.0204, 0.0282, -0.0085]

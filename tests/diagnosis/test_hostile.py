@@ -16,8 +16,8 @@ import pamrs
 from pamrs.control import trajectories
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import implausible, suspected_units
-from pamrs.reproduce import _lift as lift
-from pamrs.reproduce._lift_diagnosis import recorded
+from reproduction import lift
+from reproduction.lift_diagnosis import recorded
 
 SETTINGS = DiagnosisSettings()
 

@@ -105,8 +105,8 @@ def test_public_names_exist():
 MOST_LINES = 70
 #: Functions that may be longer, as file and name: lists of pictures, one entry after the other.
 LONGER = {
-    ("python/pamrs/reproduce/_chapter3_figures.py", "_pictures"),
-    ("python/pamrs/reproduce/_chapter5_figures.py", "_pictures"),
+    ("reproduction/chapter3_figures.py", "_pictures"),
+    ("reproduction/chapter5_figures.py", "_pictures"),
 }
 
 
@@ -129,7 +129,7 @@ def functions(path):
 
 def test_functions_can_be_read_in_one_sitting():
     found = []
-    for folder in ("python/pamrs", "trial", "benchmarks"):
+    for folder in ("python/pamrs", "trial", "benchmarks", "reproduction"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             name = path.relative_to(ROOT).as_posix()
             found += [((name, function), count) for function, count in functions(path)]

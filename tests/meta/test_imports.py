@@ -37,7 +37,6 @@ LAYERS = (
     ("control", "design"),
     ("sweeps",),
     ("diagnosis",),
-    ("reproduce",),
     ("cli",),
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
@@ -132,18 +131,6 @@ def test_nothing_imports_an_entry_point():
             assert not graph().find_modules_that_directly_import(module)
 
 
-def test_only_its_command_imports_the_reproduction_and_only_when_it_runs():
-    outside = {a for a, b in edges() if part(b) == "reproduce" and part(a) != "reproduce"}
-    assert outside == {"pamrs.cli.reproduce"}
-    tree = ast.parse((ROOT / "python/pamrs/cli/reproduce.py").read_text(encoding="utf-8"))
-    assert not [
-        name
-        for statement in tree.body
-        for name in imported(statement)
-        if name.startswith("pamrs.reproduce")
-    ]
-
-
 def imported(node: ast.AST) -> list[str]:
     """Modules, and names as if they were, that a statement at its own level imports."""
     if isinstance(node, ast.Import):
@@ -171,7 +158,9 @@ def test_private_modules_are_imported_in_their_package_alone():
     assert not strange
 
 
-@pytest.mark.parametrize("folder", ["benchmarks", "cases", "demo", "docs", "fingerprints"])
+@pytest.mark.parametrize(
+    "folder", ["benchmarks", "cases", "demo", "docs", "fingerprints", "reproduction"]
+)
 def test_scripts_import_no_private_part_of_a_package(folder):
     """The private modules directly in pamrs are for all parts of this project."""
     for path in sorted((ROOT / folder).rglob("*.py")):

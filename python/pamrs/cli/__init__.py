@@ -27,7 +27,6 @@ from pamrs.cli.library import library_command
 from pamrs.cli.lift import lift_command
 from pamrs.cli.prove import prove_command
 from pamrs.cli.replay import replay_command
-from pamrs.cli.reproduce import reproduce_command
 from pamrs.cli.rig import rig_app
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
@@ -65,7 +64,6 @@ app.command("library")(library_command)
 app.command("lift")(lift_command)
 app.command("prove")(prove_command)
 app.command("replay")(replay_command)
-app.command("reproduce")(reproduce_command)
 app.command("size")(size_command)
 app.command("diagnose")(diagnose_command)
 

@@ -1,0 +1,352 @@
+"""The pictures of chapter 2: shape and forces of the captions' muscle and of a stand-in beside the
+fits (the source's figures are not digitised).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from pamrs.fit import MuscleFit
+from pamrs.library import ch2_075in
+from pamrs.report.figures import COLOURS
+from reproduction import drawing
+from reproduction.chapter2 import GROUPS, ends, sample
+from reproduction.page import Picture
+from reproduction.stand_in import EXTENSION, LEVELS, ORDERS, PSI, THREE, Fits, stand_in
+
+__all__ = ["pictures"]
+
+Array = NDArray[np.float64]
+
+_KEPT: Final = 64
+_MM: Final = 1e3
+_SHOWN: Final = 0  # the stand-in of the pictures
+_ORDER_COLOUR: Final = ("#9ca3af", "#56b4e9", "#0072b2", "#1f1f1f")
+_DOTS: Final[dict[str, Any]] = {"ls": "", "marker": ".", "ms": 2.5, "color": "#9ca3af"}
+
+
+def pictures() -> list[Picture]:
+    """Every picture of the chapter, in the order of its figures.
+
+    Returns
+    -------
+    list of Picture
+    """
+    one = "one stand-in, 10 to 120 psi; grey: its forces"
+    drawn: list[tuple[str, str, Callable[[], Figure], str]] = [
+        (
+            "shape",
+            "shape",
+            _shape,
+            "Fig. 2.8: radius and wall of the cylinder, of the elliptic ends and of (2.27) and "
+            "(2.28) as printed, which does not neck.",
+        ),
+        ("ends", "shape", _ends, "Fig. 2.9: axis ratio (2.35), and the braid on one end."),
+        (
+            "blocked",
+            "blocked",
+            _blocked,
+            "Fig. 2.5: blocked force with constant (2.8) and non-constant (2.16) thickness, for "
+            "two braid angles.",
+        ),
+        (
+            "free",
+            "free",
+            _free,
+            f"Figs. 2.3 and 2.10: {one}; lines: order 4 with moduli free at each pressure, "
+            "constant thickness and elliptic ends.",
+        ),
+        (
+            "moduli",
+            "free",
+            _moduli,
+            "Figs. 2.4 and 2.14: moduli of one stand-in, free at each pressure (dots) and linear "
+            "in it (lines).",
+        ),
+        ("orders", "linear", _orders, f"Fig. 2.12: {one}; lines: moduli linear in pressure."),
+        (
+            "errors",
+            "linear",
+            _errors,
+            "Fig. 2.13: error (2.37) by order, median and range of all stand-ins.",
+        ),
+        (
+            "stress",
+            "linear",
+            _stress,
+            "Fig. 2.15: stress of one stand-in (grey) and of its fit of order 4, 10 to 120 psi; "
+            "beyond the strains that were measured the fit is not drawn.",
+        ),
+        (
+            "three",
+            "three",
+            _three,
+            "Fig. 2.16: one stand-in; black: the three pressures of the fit, red: those predicted.",
+        ),
+        (
+            "three_errors",
+            "three",
+            _three_errors,
+            "Fig. 2.17: error (2.37) with three and with eight pressures, median and range of all "
+            "stand-ins.",
+        ),
+        (
+            "loops",
+            "loops",
+            _loops,
+            "Fig. 2.11: loops of one stand-in (grey) and the fit of order 4 with the friction of "
+            "(2.36).",
+        ),
+    ]
+    return [
+        Picture(f"ch2_{name}", GROUPS[group], caption, drawing.png(draw, _KEPT))
+        for name, group, draw, caption in drawn
+    ]
+
+
+def _axes(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, list[Axes]]:
+    figure, cells = drawing.figure(rows, columns, height, squeeze=False, **more)
+    return figure, list(cells.ravel())
+
+
+def _shape() -> Figure:
+    figure, (left, right) = _axes(1, 2, 3.3)
+    muscle = ch2_075in()
+    e = np.linspace(EXTENSION, 0.25, 400)
+    for name, label, colour, style in (
+        ("cylinder", "cylinder", COLOURS["before"], "-"),
+        ("elliptic", "elliptic ends", COLOURS["after"], "-"),
+        ("elliptic_published", "elliptic ends as printed", "#9ca3af", "--"),
+    ):
+        one = muscle.replace(geometry=name)
+        left.plot(100.0 * e, _MM * one.radius(e), style, color=colour, label=label)
+        right.plot(100.0 * e, _MM * one.thickness(e), style, color=colour)
+    left.axhline(7.62, color="#1f1f1f", lw=0.8, ls=":", label="0.3 in")
+    left.set_ylabel("radius [mm]")
+    right.set_ylabel("wall [mm]")
+    for cell in (left, right):
+        cell.set_xlabel("contraction [%]")
+    left.legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _ends() -> Figure:
+    figure, (left, right) = _axes(1, 2, 3.0)
+    muscle = ch2_075in()
+    e = np.linspace(-0.0065, 0.38, 600)
+    k, _, braid = ends(muscle, e)
+    left.plot(100.0 * e, k, color=COLOURS["after"])
+    left.axhline(1.0, color="#9ca3af", lw=0.8, ls=":")
+    left.set_xlabel("contraction [%]")
+    left.set_ylabel("axis ratio k [1]")
+    rest = 0.5 * float(muscle.parameters["rest_diameter"])
+    near = e < 0.2
+    right.plot(_MM * muscle.radius(e[near]), _MM * braid[near], color=COLOURS["after"])
+    right.axvline(_MM * rest, color="#9ca3af", lw=0.8, ls=":")
+    right.set_xlabel("radius [mm]")
+    right.set_ylabel("braid on one end [mm]")
+    return figure
+
+
+def _blocked() -> Figure:
+    figure, cells = _axes(1, 2, 3.0, sharey=True)
+    pressure = np.linspace(0.0, 120.0, 25) * PSI
+    own = ch2_075in().replace(friction_coefficient=0.0, friction_pressure_slope=0.0)
+    measured = own.replace(model="kothera").force(pressure, 0.0)
+    for cell, degrees in zip(cells, (76.5, 74.0), strict=True):
+        for model, label, colour in (
+            ("ferraresi", "constant thickness (2.8)", COLOURS["before"]),
+            ("kothera", "non-constant thickness (2.16)", COLOURS["after"]),
+        ):
+            muscle = own.replace(model=model, braid_angle=np.radians(degrees))
+            cell.plot(pressure / 1e6, muscle.force(pressure, 0.0) / 1e3, color=colour, label=label)
+        cell.plot(
+            pressure / 1e6,
+            measured / 1e3,
+            color="#1f1f1f",
+            ls=":",
+            label="(2.16) at 76.5 deg",
+        )
+        cell.set_title(f"braid of {degrees:g} deg")
+        cell.set_xlabel("pressure [MPa]")
+    cells[0].set_ylabel("blocked force [kN]")
+    cells[0].legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _levels(cell: Axes, fit: MuscleFit, colours: dict[float, str] | str) -> None:
+    """Forces of the shown stand-in, and a fit's, at all pressures."""
+    own = stand_in(_SHOWN)
+    for psi in LEVELS:
+        pressure = psi * PSI
+        e = own.contractions(pressure)
+        cell.plot(100.0 * e, own.force(pressure, e) / 1e3, **_DOTS)
+        near = np.linspace(max(e[0], fit.muscle_at(pressure).contraction_limits[0]), e[-1], 200)
+        cell.plot(
+            100.0 * near,
+            fit.muscle_at(pressure).force(pressure, near) / 1e3,
+            color=colours if isinstance(colours, str) else colours[psi],
+            lw=1.0,
+        )
+    cell.set_xlabel("contraction [%]")
+
+
+def _free() -> Figure:
+    figure, cells = _axes(1, 2, 3.8, sharey=True)
+    found = sample()[_SHOWN]
+    for cell, name, title, colour in (
+        (cells[0], "constant", "constant thickness, cylinder", COLOURS["before"]),
+        (cells[1], "elliptic", "non-constant thickness, elliptic ends", COLOURS["after"]),
+    ):
+        _levels(cell, found.free[name], colour)
+        cell.set_title(title)
+    cells[0].set_ylabel("force [kN]")
+    cells[0].set_ylim(-0.6, 9.5)
+    return figure
+
+
+def _moduli() -> Figure:
+    figure, cells = _axes(1, 4, 2.8)
+    found = sample()[_SHOWN]
+    pressure = np.asarray(found.table.levels)
+    free = np.array(
+        [found.free["elliptic"].muscle_at(float(p)).parameters["modulus_offset"] for p in pressure]
+    )
+    for k, cell in enumerate(cells):
+        reach = [free[2:, k] / 1e6]  # at the lowest pressures a short stroke tells little
+        cell.plot(pressure / 1e6, free[:, k] / 1e6, "o", ms=3.5, color=COLOURS["before"])
+        for order, colour in zip(ORDERS, _ORDER_COLOUR, strict=True):
+            if order <= k:
+                continue
+            x = found.linear[order].x
+            line = x[k] * pressure + x[order + k]
+            reach.append(line[2:] / 1e6)
+            cell.plot(pressure / 1e6, line / 1e6, color=colour, lw=1.2, label=f"order {order}")
+        cell.set_title(f"E{k + 1}")
+        cell.set_xlabel("pressure [MPa]")
+        values = np.concatenate(reach)
+        room = 0.25 * float(np.ptp(values))
+        cell.set_ylim(float(values.min()) - room, float(values.max()) + room)
+    cells[0].set_ylabel("modulus [MPa]")
+    cells[0].legend(fontsize=7.0, frameon=False)
+    return figure
+
+
+def _orders() -> Figure:
+    figure, cells = _axes(2, 2, 5.6, sharex=True, sharey=True)
+    found = sample()[_SHOWN]
+    for order, cell in zip(ORDERS, cells, strict=True):
+        _levels(cell, found.linear[order], COLOURS["after"])
+        cell.set_title(f"order {order}")
+    for cell in (cells[0], cells[2]):
+        cell.set_ylabel("force [kN]")
+    for cell in cells[:2]:
+        cell.set_xlabel("")
+    return figure
+
+
+def _bands(cell: Axes, sets: list[tuple[str, str, Array]]) -> None:
+    """Median and range over the stand-ins: label, colour, errors (stand-ins, levels)."""
+    places = np.arange(len(LEVELS), dtype=np.float64)
+    for k, (label, colour, values) in enumerate(sets):
+        at = places + 0.16 * (k - 0.5 * (len(sets) - 1))
+        middle = np.median(values, axis=0)
+        reach = np.abs(np.array([values.min(axis=0), values.max(axis=0)]) - middle)
+        cell.errorbar(
+            at, 100.0 * middle, yerr=100.0 * reach, fmt="o", ms=4, lw=1.0, color=colour, label=label
+        )
+    cell.set_xticks(places, [f"{psi:g}" for psi in LEVELS])
+    cell.set_xlabel("pressure [psi]")
+    cell.set_ylabel("error (2.37) [%]")
+    cell.set_ylim(bottom=0.0)
+    cell.legend(fontsize=7.5, frameon=False)
+
+
+def _errors() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.2)
+    every = sample()
+    _bands(
+        cell,
+        [
+            (f"order {m}", colour, np.array([f.error(f.linear[m]) for f in every]))
+            for m, colour in zip(ORDERS, _ORDER_COLOUR, strict=True)
+        ],
+    )
+    return figure
+
+
+def _stress() -> Figure:
+    figure, (left, right) = _axes(1, 2, 3.0)
+    own, found = stand_in(_SHOWN), sample()[_SHOWN]
+    colours = _shades()
+    for psi in LEVELS:
+        pressure = psi * PSI
+        e = own.contractions(pressure)
+        hoop = own.muscle.circumferential_strain(e)
+        moduli = np.array(found.linear[4].muscle_at(pressure).parameters["modulus_offset"])
+        for cell, strain in ((left, -e), (right, hoop)):
+            x = np.linspace(float(strain.min()), float(strain.max()), 200)
+            cell.plot(x, own.stress(x, pressure) / 1e6, color="#c4c8ce", lw=2.4, zorder=0)
+            powers = x[:, None] ** np.arange(1, moduli.size + 1)
+            cell.plot(x, powers @ moduli / 1e6, color=colours[psi], lw=1.0)
+    left.set_xlabel("axial strain [1]")
+    right.set_xlabel("hoop strain [1]")
+    left.set_ylabel("stress [MPa]")
+    return figure
+
+
+def _shades() -> dict[float, str]:
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
+    table = colormaps["viridis"]
+    return {psi: to_hex(table(0.95 * k / (len(LEVELS) - 1))) for k, psi in enumerate(LEVELS)}
+
+
+def _three() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.8)
+    colours = {psi: "#1f1f1f" if psi in THREE else COLOURS["before"] for psi in LEVELS}
+    _levels(cell, sample()[_SHOWN].three, colours)
+    cell.set_ylabel("force [kN]")
+    return figure
+
+
+def _three_errors() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.0)
+    every: list[Fits] = sample()
+    _bands(
+        cell,
+        [
+            ("all eight", COLOURS["after"], np.array([f.error(f.linear[4]) for f in every])),
+            ("20, 60, 120 psi", COLOURS["before"], np.array([f.error(f.three) for f in every])),
+        ],
+    )
+    return figure
+
+
+def _loops() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.8)
+    own, fit = stand_in(_SHOWN), sample()[_SHOWN].linear[4]
+    loops = own.loops()
+    for psi in LEVELS:
+        pressure = psi * PSI
+        rows = np.isclose(loops.pressure, pressure)
+        e = 1.0 - loops.length[rows] / loops.rest_length
+        cell.plot(100.0 * e, loops.force[rows] / 1e3, color="#9ca3af", lw=2.0)
+        mean = fit.muscle_at(pressure).force(pressure, e)
+        share = max(0.16 - 0.145 * pressure / 1e6, 0.01)
+        cell.plot(
+            100.0 * e,
+            (mean + loops.direction[rows] * share * np.abs(mean)) / 1e3,
+            color=COLOURS["after"],
+            lw=0.9,
+        )
+    cell.set_xlabel("contraction [%]")
+    cell.set_ylabel("force [kN]")
+    return figure

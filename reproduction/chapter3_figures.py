@@ -1,0 +1,490 @@
+"""The pictures of chapter 3: our curves, and the published numbers as marks (its figures are not
+digitised).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pamrs.design import lift
+from pamrs.report.figures import COLOURS, decimate
+from reproduction import drawing, elbow
+from reproduction.chapter3 import GROUPS, step_by_area
+from reproduction.elbow import FOOT_POUND, PSI
+from reproduction.page import Picture
+
+__all__ = ["pictures"]
+
+#: Colours of a picture.
+_KEPT: Final = 64
+_COLOUR: Final = {"conserving": COLOURS["after"], "printed": COLOURS["before"]}
+_NAMES: Final = {
+    "conserving": "torque that conserves power",
+    "printed": "torque as printed (3.6)-(3.8)",
+}
+_GREEN, _PURPLE, _INK, _FAINT = "#009e73", "#cc79a7", "#1f1f1f", "#9ca3af"
+_ROTATION: Final = "rotation from the rest angle [deg]"
+
+
+def pictures() -> list[Picture]:
+    """Every picture of the chapter, in the order of its figures.
+
+    Returns
+    -------
+    list of Picture
+    """
+    return [
+        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
+        for name, group, draw, caption in _pictures()
+    ]
+
+
+def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
+    """Name, group, function and caption of each picture."""
+    return [
+        (
+            "fig3_07_torque",
+            "torque",
+            _torque,
+            (
+                "Fig. 3.7: torque of six muscles at 150 psi by torque law and muscle; the bar is "
+                "the published range."
+            ),
+        ),
+        (
+            "muscles",
+            "torque",
+            _muscles,
+            "Where the torque is above 200 ft lbf at 150 psi, by the number of muscles.",
+        ),
+        (
+            "fig3_08_step",
+            "step",
+            _step,
+            "Fig. 3.8: step of pressure with 100 lb at the tip, three valves; dashed: published.",
+        ),
+        (
+            "fig3_08_valve",
+            "step",
+            _valve,
+            (
+                "Peak and mean rate of that step by the valve's effective area; the mean jumps "
+                "where a swing first reaches 90 deg."
+            ),
+        ),
+        (
+            "fig3_12_triangle",
+            "triangle",
+            _triangle,
+            (
+                "Fig. 3.12: triangular pressure of 0.05 Hz with 135 lb, without hysteresis and "
+                "with that of the 0.75-in muscle."
+            ),
+        ),
+        (
+            "fig3_13_loop",
+            "triangle",
+            _loop,
+            (
+                "Fig. 3.13: torque of the payload by (3.24) over pressure in the same runs; arrows "
+                "show the way round."
+            ),
+        ),
+        (
+            "fig3_16_ramp",
+            "ramp",
+            _ramp,
+            (
+                "Fig. 3.16: ramp to 145 psi and hold with 100 lb; dashed: the published largest "
+                "torque and its rotation."
+            ),
+        ),
+        (
+            "eq3_24_payload",
+            "construction",
+            _payload,
+            (
+                "(3.24): torque of payloads at 20 in against that of the muscles at 150 psi; dots: "
+                "where the arm rests."
+            ),
+        ),
+        (
+            "lift",
+            "construction",
+            _lift,
+            (
+                "How far a payload is lifted at a pressure; dots: 83 deg with 100 lb at 145 psi "
+                "(3.4), 90 deg at 150 psi (3.2.4)."
+            ),
+        ),
+    ]
+
+
+def _feet(axes: Axes) -> None:
+    """A second scale in ft lbf beside one in N m."""
+    _second_scale(axes, FOOT_POUND, "[ft lbf]")
+
+
+def _second_scale(axes: Axes, unit: float, label: str) -> None:
+    """A scale on the right of what the left one shows, in another unit."""
+
+    def there(x: Any) -> Any:
+        return x / unit
+
+    def back(x: Any) -> Any:
+        return x * unit
+
+    axes.secondary_yaxis("right", functions=(there, back)).set_ylabel(label)
+    axes.spines["right"].set_visible(True)
+
+
+def _degrees(result: Any) -> Any:
+    return np.degrees(result["joint_angle"] - elbow.rest_angle())
+
+
+# ------------------------------------------------------------------------- statics
+
+
+def _torque() -> Figure:
+    figure, axes = drawing.figure(height=3.9)
+    rotation = np.linspace(0.0, 110.0, 331)
+    for law in elbow.LAWS:
+        axes.plot(
+            rotation,
+            elbow.elbow_torque(np.radians(rotation), law=law),
+            color=_COLOUR[law],
+            lw=1.8,
+            label=_NAMES[law],
+        )
+    edges = [
+        elbow.elbow_torque(np.radians(rotation), law="printed", muscle=elbow.mooney_rivlin(share))
+        for share in (0.0, 1.0)
+    ]
+    axes.fill_between(
+        rotation,
+        *edges,
+        color=_GREEN,
+        alpha=0.3,
+        lw=0,
+        label="as printed, muscle of (3.21): C10 alone to C01 alone",
+    )
+    level = 200.0 * FOOT_POUND
+    axes.axhline(level, color=_INK, lw=0.9, ls=(0, (5, 2)))
+    axes.plot(
+        [0.0, 78.0],
+        [level, level],
+        color=_INK,
+        lw=3.5,
+        solid_capstyle="butt",
+        label="published: above 200 ft lbf from 0 to 78 deg",
+    )
+    axes.set(xlabel=_ROTATION, ylabel="torque [N m]", xlim=(0.0, 110.0), ylim=(0.0, 660.0))
+    axes.legend(loc="upper right")
+    _feet(axes)
+    return figure
+
+
+def _muscles() -> Figure:
+    figure, axes = drawing.figure(height=3.2)
+    counts = range(4, 13)
+    for law, shift in (("conserving", -0.14), ("printed", 0.14)):
+        for count in counts:
+            first, last = np.degrees(
+                elbow.torque_range(
+                    partial(elbow.elbow_torque, law=law, count=count), 200.0 * FOOT_POUND
+                )
+            )
+            axes.plot(
+                [count + shift] * 2, [first, last], color=_COLOUR[law], lw=7, solid_capstyle="butt"
+            )
+        axes.plot([], [], color=_COLOUR[law], lw=7, label=_NAMES[law])
+    axes.plot([6.0, 6.0], [0.0, 78.0], color=_INK, lw=2.5, solid_capstyle="butt", label="published")
+    axes.set_xticks(list(counts))
+    axes.grid(visible=False, axis="x")
+    axes.set(xlabel="muscles", ylabel=_ROTATION.replace(" from", "\nfrom"), ylim=(0.0, 150.0))
+    axes.annotate("none", (4.14, 2.0), ha="center", color=_COLOUR["printed"], fontsize=8)
+    axes.legend(loc="upper left", ncols=3)
+    return figure
+
+
+def _payload() -> Figure:
+    figure, axes = drawing.figure(height=3.9)
+    angle = np.radians(np.linspace(0.0, 120.0, 361))
+    rest = elbow.rest_angle()
+    above = angle[angle >= rest]
+    for law in elbow.LAWS:
+        label = f"muscles at 150 psi, {_NAMES[law]}"
+        axes.plot(
+            np.degrees(above),
+            elbow.elbow_torque(above - rest, law=law),
+            color=_COLOUR[law],
+            lw=1.8,
+            label=label,
+        )
+    own = elbow.arm_rig().model["arm"]
+    for pounds, low in ((50.0, 66), (100.0, 66), (135.0, 66), (200.0, 44), (380.0, 32)):
+        load = elbow.payload_torque(pounds, angle)
+        weight = own["first_moment"] * own["gravity"] * np.sin(angle)
+        axes.plot(np.degrees(angle), load, color=_FAINT, lw=1.3)
+        axes.annotate(
+            (f"{pounds:.0f} lb"),
+            (low, float(np.interp(math.radians(low), angle, load))),
+            (0, 3),
+            textcoords=("offset points"),
+            ha="right",
+            color="#4b5563",
+            fontsize=8,
+        )
+        for law in elbow.LAWS:
+            reached = elbow.rotation_reached(pounds, 150.0, law=law) + rest
+            axes.plot(
+                math.degrees(reached),
+                float(np.interp(reached, angle, load + weight)),
+                "o",
+                ms=5,
+                color=_COLOUR[law],
+                mec="white",
+            )
+    axes.plot([], [], color=_FAINT, lw=1.3, label="payload at 20 in (3.24)")
+    axes.plot([], [], "o", ms=5, color=_INK, label="rest, the arm's own weight counted")
+    axes.set(
+        xlabel="angle from the vertical [deg]",
+        ylabel="torque [N m]",
+        xlim=(0.0, 120.0),
+        ylim=(0.0, 640.0),
+    )
+    axes.legend(loc="upper right", fontsize=8)
+    _feet(axes)
+    return figure
+
+
+def _lift() -> Figure:
+    figure, axes = drawing.figure(height=3.6)
+    rest = elbow.rest_angle()
+    for psi, colour in (
+        (60.0, "#9ecae1"),
+        (90.0, "#6baed6"),
+        (120.0, "#3182bd"),
+        (150.0, "#08519c"),
+    ):
+        result = lift(elbow.arm_rig(coulomb=0.0), pressure=psi * PSI)
+        usable = (result.capacity > 0.0) & (result.capacity < 400.0)
+        pounds = result.capacity[usable] / elbow.POUND
+        axes.plot(
+            pounds,
+            np.degrees(result.angle[usable] - rest),
+            color=colour,
+            lw=1.8,
+            label=f"{psi:.0f} psi",
+        )
+    axes.plot([100.0, 100.0], [83.0, 90.0], "o", ms=5, color=_INK, label="published")
+    axes.plot([380.0, 380.0], [0.0, 75.0], color=_INK, lw=0.9, ls=(0, (5, 2)))
+    axes.annotate(
+        "largest payload tested, 380 lb",
+        (380.0, 60.0),
+        (-4, 0),
+        textcoords="offset points",
+        ha="right",
+        color=_INK,
+    )
+    axes.set(
+        xlabel="payload at the tip [lb]",
+        ylabel="lifted up to [deg of rotation]",
+        xlim=(0.0, 420.0),
+        ylim=(0.0, 112.0),
+    )
+    axes.legend(loc="upper right", ncols=5)
+    return figure
+
+
+# ------------------------------------------------------------------------ dynamics
+
+
+def _mark(axes: Axes, level: float, text: str, *, at: float = 1.0) -> None:
+    """A published number as a dashed line."""
+    axes.axhline(level, color=_INK, lw=0.9, ls=(0, (5, 2)))
+    axes.annotate(
+        text,
+        (at, level),
+        (-3, 3),
+        xycoords=("axes fraction", "data"),
+        textcoords="offset points",
+        ha="right",
+        color=_INK,
+        fontsize=8,
+    )
+
+
+def _step() -> Figure:
+    figure, (angle, rate, pressure) = drawing.figure(3, 1, 6.0, sharex=True)
+    area = elbow.valve_for_peak(math.radians(200.0))
+    slow = max(
+        (item for item in step_by_area() if item.mean < math.radians(57.3)),
+        key=lambda item: item.area,
+    )
+    for item, colour, words in (
+        (elbow.step(), _FAINT, "the rig's"),
+        (elbow.step(area), COLOURS["after"], "peak rate as published"),
+        (slow, _GREEN, "first swing just short of 90 deg"),
+    ):
+        result = item.simulation
+        show = result.time <= 4.0
+        for axes, values in (
+            (angle, _degrees(result)),
+            (rate, np.degrees(result["joint_rate"])),
+            (pressure, result["muscle_pressure"] / 1e5),
+        ):
+            axes.plot(
+                *decimate(result.time[show], values[show]),
+                color=colour,
+                lw=1.5,
+                label=f"{1e6 * item.area:.2f} mm2, {words}",
+            )
+    _mark(angle, 90.0, "90 deg", at=0.08)
+    angle.plot([0.0, 1.5], [0.0, 90.0], color=_INK, lw=0.9, ls=(0, (1, 1.5)))
+    angle.annotate("mean 60 deg/s", (1.17, 56.0), color=_INK, fontsize=8)
+    _mark(rate, 200.0, "200 deg/s")
+    _mark(pressure, 150.0 * PSI / 1e5, "150 psi", at=0.12)
+    angle.set(ylabel="rotation [deg]", ylim=(0.0, 150.0))
+    rate.set(ylabel="rate [deg/s]")
+    pressure.set(ylabel="pressure [bar]", xlabel="time [s]", xlim=(0.0, 4.0), ylim=(0.0, 13.0))
+    angle.legend(loc="upper right", ncols=3, fontsize=7.5)
+    return figure
+
+
+def _valve() -> Figure:
+    figure, axes = drawing.figure(height=3.3)
+    for law, style in (("conserving", "-"), ("printed", (0, (4, 2)))):
+        steps = step_by_area(law)
+        area = np.array([1e6 * item.area for item in steps])
+        short = {"conserving": "conserving", "printed": "as printed"}[law]
+        for name, colour in (("peak", COLOURS["after"]), ("mean", _GREEN)):
+            values = np.degrees([getattr(item, name) for item in steps])
+            if name == "mean":  # a jump is no line
+                values[1:][np.abs(np.diff(values)) > 25.0] = math.nan
+            axes.plot(area, values, color=colour, lw=1.6, ls=style, label=f"{name}, torque {short}")
+    _mark(axes, 200.0, "published peak, 200 deg/s")
+    _mark(axes, 60.0, "published mean, 60 deg/s")
+    axes.axvline(8.4, color=_FAINT, lw=1.0)
+    axes.annotate(
+        "valve of the rig",
+        (8.4, 8.0),
+        (-4, 0),
+        textcoords="offset points",
+        ha="right",
+        color="#4b5563",
+        fontsize=8,
+    )
+    axes.set(
+        xlabel="effective area of the open valve [mm2]",
+        ylabel="rate [deg/s]",
+        xlim=(1.0, 12.0),
+        ylim=(0.0, 400.0),
+    )
+    axes.legend(loc="upper left", ncols=2)
+    return figure
+
+
+def _triangle() -> Figure:
+    figure, (pressure, angle) = drawing.figure(2, 1, 4.4, sharex=True)
+    for hysteresis, colour, words in (
+        (False, COLOURS["after"], "without hysteresis"),
+        (True, _PURPLE, "with hysteresis (2.36)"),
+    ):
+        result = elbow.triangle(hysteresis=hysteresis)
+        angle.plot(*decimate(result.time, _degrees(result)), color=colour, lw=1.5, label=words)
+        if not hysteresis:
+            pressure.plot(result.time, result["muscle_pressure"] / 1e5, color=_INK, lw=1.5)
+    mirrored = elbow.triangle(hysteresis=True)
+    angle.plot(
+        mirrored.time,
+        _degrees(mirrored)[::-1],
+        color=_PURPLE,
+        lw=0.8,
+        ls=(0, (2, 2)),
+        label="the same, mirrored",
+    )
+    pressure.set(ylabel="pressure [bar]", ylim=(0.0, 11.5))
+    _second_scale(pressure, PSI / 1e5, "[psi]")
+    angle.set(ylabel="rotation [deg]", xlabel="time [s]", xlim=(0.0, 20.0), ylim=(0.0, 95.0))
+    angle.legend(loc="upper left")
+    return figure
+
+
+def _loop() -> Figure:
+    figure, axes = drawing.figure(height=3.6)
+    for hysteresis, colour, words in (
+        (False, COLOURS["after"], "without hysteresis"),
+        (True, _PURPLE, "with hysteresis (2.36)"),
+    ):
+        result = elbow.triangle(hysteresis=hysteresis)
+        psi, torque = (
+            result["muscle_pressure"] / PSI,
+            elbow.payload_torque(135.0, result["joint_angle"]),
+        )
+        axes.plot(psi, torque, color=colour, lw=1.5, label=words)
+        if hysteresis:
+            for row in (600, 1400):
+                start, end = ((psi[k], torque[k]) for k in (row, row + 40))
+                axes.annotate(
+                    "",
+                    end,
+                    start,
+                    arrowprops={
+                        "arrowstyle": "-|>",
+                        "color": colour,
+                        "lw": 1.5,
+                        "mutation_scale": 14,
+                    },
+                )
+    static = elbow.static_curve(135.0)
+    axes.plot(
+        static.psi,
+        elbow.payload_torque(135.0, elbow.rest_angle() + static.rotation),
+        color=_INK,
+        lw=1.0,
+        ls=(0, (5, 2)),
+        label="at rest",
+    )
+    axes.set(
+        xlabel="pressure [psi]",
+        ylabel="torque of the payload (3.24) [N m]",
+        xlim=(0.0, 152.0),
+        ylim=(0.0, 340.0),
+    )
+    axes.legend(loc="upper left")
+    _feet(axes)
+    return figure
+
+
+def _ramp() -> Figure:
+    figure, (pressure, torque, angle) = drawing.figure(3, 1, 6.0, sharex=True)
+    for law in elbow.LAWS:
+        result = elbow.ramp_and_hold(law=law)
+        for axes, values in ((torque, result["joint_torque"]), (angle, _degrees(result))):
+            axes.plot(*decimate(result.time, values), color=_COLOUR[law], lw=1.5, label=_NAMES[law])
+    pressure.plot(result.time, result["muscle_pressure"] / 1e5, color=_INK, lw=1.5)
+    rough = elbow.ramp_and_hold(law="printed", hysteresis=True)
+    for axes, values in ((torque, rough["joint_torque"]), (angle, _degrees(rough))):
+        axes.plot(
+            *decimate(rough.time, values),
+            color=_PURPLE,
+            lw=1.0,
+            label="as printed, with hysteresis (2.36)",
+        )
+    _mark(torque, 190.0 * FOOT_POUND, "190 ft lbf", at=0.12)
+    _mark(angle, 83.0, "83 deg", at=0.08)
+    _mark(pressure, 145.0 * PSI / 1e5, "145 psi", at=0.12)
+    pressure.set(ylabel="pressure [bar]", ylim=(0.0, 12.0))
+    torque.set(ylabel="torque [N m]", ylim=(0.0, 390.0))
+    angle.set(ylabel="rotation [deg]", xlabel="time [s]", xlim=(0.0, 10.0), ylim=(0.0, 105.0))
+    torque.legend(loc="upper left", ncols=3, fontsize=7.5)
+    _feet(torque)
+    return figure

@@ -1,0 +1,313 @@
+"""The pictures of chapter 6: our curves beside the ranges that it prints (its figures are not
+digitised).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from pamrs.library import entry
+from pamrs.library.evaluate import free_contraction
+from pamrs.report.figures import COLOURS
+from reproduction import drawing
+from reproduction import recruiting as rec
+from reproduction.chapter6 import BAR, GROUPS, latest
+from reproduction.page import Picture
+from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Cycles
+
+__all__ = ["pictures"]
+
+_KEPT: Final = 64
+_COLOUR: Final = dict(zip(MUSCLES, ("#d55e00", "#0072b2", "#1f1f1f"), strict=True))
+_BAND: Final[dict[str, Any]] = {"color": "#c4c8ce", "alpha": 0.5, "zorder": 0, "lw": 0.0}
+
+
+def pictures() -> list[Picture]:
+    """Every picture of the chapter, in the order of its figures, from the experiments that were run
+    last.
+
+    Returns
+    -------
+    list of Picture
+    """
+    drawn: list[tuple[str, str, Callable[[], Figure], str]] = [
+        (
+            "pair",
+            "pair",
+            _pair,
+            "Figs. 6.1 and 6.2: one muscle at full pressure (lines) and two at half (dashed).",
+        ),
+        (
+            "efficiency",
+            "cycles",
+            _efficiency,
+            "Figs. 6.7 and 6.8: efficiency over payload; open: not in Tables 6.2 and 6.3.",
+        ),
+        (
+            "best",
+            "best",
+            _best,
+            "Fig. 6.9: efficiency up to 63 kg of those that follow every cycle; crosses: the tank "
+            "ran low.",
+        ),
+        (
+            "rubber",
+            "rubber",
+            _rubber,
+            "Fig. 6.10: efficiency with the bladder's elasticity (lines) and without (dashed), 90 "
+            "deg; grey: 10-30 and 52-66 %, as printed.",
+        ),
+        (
+            "readings",
+            "readings",
+            _readings,
+            "Range of the efficiency over Table 6.3 by reading, with elasticity (orange) and "
+            "without (blue); grey: as printed.",
+        ),
+        (
+            "time",
+            "tests",
+            _time,
+            "Fig. 6.11: 18 kg, 2 muscles, 90 deg: angle, torque and pressures; red: where work is "
+            "done.",
+        ),
+        (
+            "loops",
+            "tests",
+            _loops,
+            "Fig. 6.12: torque over pressure, 18 kg, 2 muscles, second cycle, without and with the "
+            "hysteresis (2.36).",
+        ),
+        (
+            "energy",
+            "tests",
+            _energy,
+            "Figs. 6.14 and 6.15: work and input energy over payload, 90 deg; open: not in Table "
+            "6.3.",
+        ),
+        (
+            "suspects",
+            "suspects",
+            _suspects,
+            "Input energy with each suspect over that without, the ten cases of Table 6.3.",
+        ),
+    ]
+    return [
+        Picture(f"ch6_{name}", GROUPS[group], caption, drawing.png(draw, _KEPT))
+        for name, group, draw, caption in drawn
+    ]
+
+
+def _axes(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, list[Axes]]:
+    figure, cells = drawing.figure(rows, columns, height, squeeze=False, **more)
+    return figure, list(cells.ravel())
+
+
+def _pair() -> Figure:
+    figure, cells = _axes(1, 2, 3.2)
+    for cell, name, title in (
+        (cells[0], "pam_a_1in", "A, latex"),
+        (cells[1], "pam_b_075in", "B, silicone"),
+    ):
+        muscle = entry(name).muscle
+        for pressure, colour in ((2.0, COLOURS["before"]), (4.0, COLOURS["after"])):
+            for count, style in ((1, "-"), (2, "--")):
+                own = 2.0 * pressure / count * BAR
+                e = np.linspace(0.0, free_contraction(muscle, own), 200)
+                cell.plot(
+                    100.0 * e,
+                    count * muscle.force(own, e) / 1e3,
+                    style,
+                    color=colour,
+                    label=f"{count} at {own / BAR:g} bar",
+                )
+        cell.set_title(title)
+        cell.set_xlabel("contraction [%]")
+        cell.set_ylim(bottom=0.0)
+    cells[0].set_ylabel("force [kN]")
+    cells[0].legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _lines(cell: Axes, found: Cycles, values: Any, style: str = "-", label: str = "") -> None:
+    """Values (n,) over payload, a line for each number of muscles; open where not tested."""
+    allowed = MATRIX[found.high]
+    for n in MUSCLES:
+        rows = [found.row(p, n) for p in PAYLOADS]
+        cell.plot(
+            PAYLOADS,
+            values[rows],
+            style,
+            color=_COLOUR[n],
+            lw=1.2,
+            label=f"{n} muscles{label}",
+        )
+        for p, row in zip(PAYLOADS, rows, strict=True):
+            face = _COLOUR[n] if (p, n) in allowed else "white"
+            cell.plot(p, values[row], "o", ms=4.5, mec=_COLOUR[n], mfc=face)
+    cell.set_xlabel("payload [kg]")
+    cell.set_xticks(PAYLOADS)
+
+
+def _efficiency() -> Figure:
+    figure, cells = _axes(1, 2, 3.2, sharey=True)
+    done = latest()
+    for cell, found in zip(cells, (done.flat, done.steep), strict=True):
+        _lines(cell, found, 100.0 * found.efficiency)
+        cell.set_title(f"up to {found.high:.0f} deg")
+    cells[0].set_ylabel("efficiency [%]")
+    cells[0].set_ylim(bottom=0.0)
+    cells[0].legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _best() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.2)
+    found = latest().steep
+    loads = np.array([*PAYLOADS, *EXTENDED])
+    whole = found.followed() == found.count
+    for n in MUSCLES:
+        rows = np.array([found.row(float(p), n) for p in loads])
+        ran = whole[rows]
+        values = 100.0 * found.efficiency[rows]
+        cell.plot(loads[ran], values[ran], "-o", ms=4.5, color=_COLOUR[n], label=f"{n} muscles")
+        some = ~ran & (found.followed()[rows] > 0)
+        cell.plot(loads[some], values[some], "x", ms=6, color=_COLOUR[n])
+    cell.set_xlabel("payload [kg]")
+    cell.set_ylabel("efficiency [%]")
+    cell.set_ylim(0.0, 66.0)
+    cell.set_xticks(loads)
+    cell.legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _rubber() -> Figure:
+    figure, (cell,) = _axes(1, 1, 3.6)
+    done = latest()
+    for low, high in ((10.0, 30.0), (52.0, 66.0)):
+        cell.axhspan(low, high, **_BAND)
+    _lines(cell, done.steep, 100.0 * done.steep.efficiency)
+    _lines(cell, done.bare, 100.0 * done.bare.efficiency, "--", ", no rubber")
+    cell.set_ylabel("efficiency [%]")
+    cell.set_ylim(0.0, 72.0)
+    cell.legend(fontsize=7.0, frameon=False, ncols=2, loc="lower right")
+    return figure
+
+
+def _readings() -> Figure:
+    done = latest().readings
+    names = list(done)[::-1]
+    figure, (cell,) = _axes(1, 1, 0.3 * len(names) + 1.0)
+    for low, high in ((10.0, 30.0), (52.0, 66.0)):
+        cell.axvspan(low, high, **_BAND)
+    for place, name in enumerate(names):
+        for found, colour, shift in zip(
+            done[name], (COLOURS["before"], COLOURS["after"]), (0.13, -0.13), strict=True
+        ):
+            values = 100.0 * np.array([found.of(*case) for case in MATRIX[90.0]])
+            cell.plot(
+                [values.min(), values.max()],
+                [place + shift] * 2,
+                color=colour,
+                lw=3.0,
+                solid_capstyle="butt",
+            )
+            cell.plot(values, [place + shift] * values.size, "|", ms=7, color="#1f1f1f", mew=0.8)
+    cell.set_yticks(range(len(names)), names)
+    cell.set_xlabel("efficiency [%]")
+    cell.set_xlim(0.0, 80.0)
+    return figure
+
+
+def _time() -> Figure:
+    figure, cells = _axes(3, 1, 4.6, sharex=True)
+    found = latest().steep
+    row = found.row(18.0, 2)
+    angle, torque = np.degrees(found.angle[row]), found.torque[row]
+    rising = np.concatenate([[False], np.diff(found.angle[row]) > 5e-5])
+    for cell, values, label in (
+        (cells[0], angle, "angle [deg]"),
+        (cells[1], torque, "torque [N m]"),
+    ):
+        cell.plot(found.time, values, color="#1f1f1f", lw=1.0)
+        cell.plot(found.time, np.where(rising, values, np.nan), color="#d62728", lw=1.8)
+        cell.set_ylabel(label)
+    cells[2].plot(found.time, found.source[row] / BAR, color=COLOURS["after"], label="tank")
+    cells[2].plot(found.time, found.pressure[row] / BAR, color="#1f1f1f", lw=1.0, label="muscles")
+    cells[2].set_ylabel("pressure [bar]")
+    cells[2].set_ylim(0.0, 20.0)
+    cells[2].legend(fontsize=7.5, frameon=False, ncols=2, loc="upper right")
+    cells[2].set_xlabel("time [s]")
+    return figure
+
+
+def _loops() -> Figure:
+    figure, cells = _axes(1, 2, 3.2, sharey=True)
+    base = latest().readings["as it is"][0]
+    rubbing = rec.lifting(
+        [(18.0, 2)], 90.0, 2, changed=rec.SUSPECTS["hysteresis of the muscles (2.36)"]
+    )
+    for cell, found, title in (
+        (cells[0], base, "the rig as it is"),
+        (cells[1], rubbing, "with hysteresis (2.36)"),
+    ):
+        row = found.row(18.0, 2)
+        now = found.time - rec.CYCLE
+        for begin, colour, label in ((0.0, "#d62728", "up"), (11.0, COLOURS["after"], "down")):
+            part = (now >= begin) & (now <= begin + 11.0)
+            cell.plot(
+                found.pressure[row][part] / BAR,
+                found.torque[row][part],
+                color=colour,
+                lw=1.2,
+                label=label,
+            )
+        cell.set_title(title)
+        cell.set_xlabel("pressure [bar]")
+    cells[0].set_ylabel("torque [N m]")
+    cells[0].legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _energy() -> Figure:
+    figure, cells = _axes(1, 2, 3.2)
+    found = latest().steep
+    for cell, values, label in (
+        (cells[0], found.work, "work [kJ]"),
+        (cells[1], found.energy, "input energy [kJ]"),
+    ):
+        _lines(cell, found, values / 1e3)
+        cell.set_ylabel(label)
+        cell.set_ylim(bottom=0.0)
+    cells[1].legend(fontsize=7.5, frameon=False)
+    return figure
+
+
+def _suspects() -> Figure:
+    done = latest()
+    base = done.readings["as it is"][0]
+    energy = base.energy[[base.row(*case) for case in MATRIX[90.0]]]
+    sets = {name: found.energy / energy for name, found in done.suspects.items()}
+    gauge = done.readings["gauge pressures in (6.4)"][0]
+    sets["(6.4) in gauge pressures in the simulation"] = (
+        energy / gauge.energy[[gauge.row(*case) for case in MATRIX[90.0]]]
+    )
+    names = list(sets)[::-1]
+    figure, (cell,) = _axes(1, 1, 0.28 * len(names) + 1.2)
+    for place, name in enumerate(names):
+        for (_, n), value in zip(MATRIX[90.0], sets[name], strict=True):
+            cell.plot(
+                100.0 * (value - 1.0), place + 0.18 * (n - 4) / 2, "o", ms=4, color=_COLOUR[n]
+            )
+    for n in MUSCLES:
+        cell.plot([], [], "o", ms=4, color=_COLOUR[n], label=f"{n} muscles")
+    cell.axvline(0.0, color="#9ca3af", lw=1.0)
+    cell.set_yticks(range(len(names)), names)
+    cell.set_xlabel("input energy, change [%]")
+    cell.legend(fontsize=7.5, frameon=False, loc="upper right")
+    return figure

@@ -1,0 +1,270 @@
+"""Every chapter at once: what is kept and when, how it goes on, and the page of all statements."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+import reproduction
+from pamrs.comparison import judge
+from reproduction import CHAPTERS, store
+from reproduction.__main__ import main
+from reproduction.page import Picture, Section, page
+from reproduction.summary import counts, summary
+
+DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
+ROWS = (
+    judge("one", "a | b", "6.2", 1.0, 1.01, "bar", tolerance=0.1),
+    judge("one", "c", "6.3", 1.0, 2.0, tolerance=0.1, note="because | of it"),
+    judge("two", "d", "6.4", math.nan, math.inf, cannot_tell="no number", note="really"),
+    judge("two", "e", "6.4", 1.0, 1.0, used=True),
+    judge("two", "f", "6.5", 1.0, 2.0, apart="a trial"),
+)
+SECTION = Section(
+    "Chapter 6: a title",
+    ROWS,
+    {"one": "the first group"},
+    ["In short."],
+    [("a.b", "1 m", "the reason")],
+    [Picture("first", "one", "what it shows", b"\x89PNG 1"), Picture("second", "one", "", b"2")],
+    [("nu", "error squared", "rad2 s")],
+    {"two": "| a |\n|---|\n| 1 |"},
+)
+
+
+def same(a, b):
+    """Whether two chapters are the same, numbers that are none included."""
+    assert repr([row.to_dict() for row in a.rows]) == repr([row.to_dict() for row in b.rows])
+    assert replace(a, rows=(), pictures=list(a.pictures)) == replace(
+        b, rows=(), pictures=list(b.pictures)
+    )
+
+
+# ------------------------------------------------------------------------ what is kept
+
+
+def test_kept_chapter_is_the_same(tmp_path):
+    assert store.kept(tmp_path / "none", "key") is None
+    store.keep(tmp_path / "made", "key", SECTION)
+    same(store.kept(tmp_path / "made", "key"), SECTION)
+    assert [path.name for path in (tmp_path / "made").iterdir()] == ["key"]
+    assert page([store.kept(tmp_path / "made", "key")], "x") == page([SECTION], "x")
+
+
+@pytest.mark.parametrize("broken", ["", "{", "[]", '{"title": "a"}', "null"])
+def test_what_cannot_be_read_is_made_again(tmp_path, broken):
+    store.keep(tmp_path, "key", SECTION)
+    (tmp_path / "key" / "section.json").write_text(broken)
+    assert store.kept(tmp_path, "key") is None
+    store.keep(tmp_path, "key", SECTION)
+    same(store.kept(tmp_path, "key"), SECTION)
+    (tmp_path / "key" / "second.png").unlink()
+    assert store.kept(tmp_path, "key") is None
+
+
+def test_half_a_chapter_is_never_there(tmp_path):
+    bad = replace(SECTION, chosen=[("a", "b", object())])
+    with pytest.raises(TypeError):
+        store.keep(tmp_path, "key", bad)
+    assert list(tmp_path.iterdir()) == []
+    assert json.loads("[]") == []
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """A package and a reproduction of a few files in place of these."""
+    for name in (
+        "pamrs/_core.abi3.so",
+        "pamrs/rig/__init__.py",
+        "pamrs/rigs/shoulder.toml",
+        "pamrs/cli/fit.py",
+        "pamrs/__pycache__/x.pyc",
+        "reproduction/page.py",
+        "reproduction/chapter6.py",
+        "reproduction/chapter6_figures.py",
+        "reproduction/symbols.py",
+        "reproduction/chapter3.py",
+    ):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("")
+    monkeypatch.setattr(store, "_ROOTS", (tmp_path / "pamrs", tmp_path / "reproduction"))
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("file", "matters"),
+    [
+        ("pamrs/_core.abi3.so", True),
+        ("pamrs/rig/__init__.py", True),
+        ("pamrs/rigs/shoulder.toml", True),
+        ("reproduction/chapter6.py", True),
+        ("reproduction/chapter6_figures.py", True),
+        ("reproduction/symbols.py", True),
+        ("reproduction/chapter3.py", False),
+        ("reproduction/page.py", False),
+        ("pamrs/cli/fit.py", False),
+        ("pamrs/__pycache__/x.pyc", False),
+    ],
+)
+def test_chapter_depends_on_what_it_is_calculated_from(package, file, matters):
+    before = store.digest("ch6", search=True)
+    assert store.digest("ch6", search=True) == before
+    (package / file).write_text("# changed")
+    assert (store.digest("ch6", search=True) != before) == matters
+
+
+def test_chapter_depends_on_what_was_asked_for_and_on_packages(package, monkeypatch):
+    before = store.digest("ch6", search=True)
+    assert before not in (store.digest("ch6", search=False), store.digest("ch3", search=True))
+    monkeypatch.setattr(store.metadata, "version", lambda name: "0.0")
+    assert store.digest("ch6", search=True) != before
+
+
+def test_every_chapter_has_its_files():
+    for name, module in CHAPTERS.items():
+        files = {Path(part).name for part in store.inputs(name)}
+        assert {f"{module}.py", "drawing.py", "shoulder.toml"} <= files
+        assert any(part.startswith("_core") for part in files)
+        assert all(part.startswith(module) for part in files if part.startswith("chapter"))
+
+
+# ------------------------------------------------------------------------- it goes on
+
+
+def test_what_is_stopped_goes_on_and_a_second_call_does_nothing(tmp_path, monkeypatch):
+    made, stop, told = [], ["ch4"], []
+
+    def section(name, **_):
+        if name in stop:
+            raise KeyboardInterrupt
+        made.append(name)
+        return replace(SECTION, title=name)
+
+    def every(**more):
+        return reproduction.every(list(CHAPTERS), tmp_path, progress=told.append, **more)
+
+    monkeypatch.setattr(reproduction, "section", section)
+    with pytest.raises(KeyboardInterrupt):
+        every()
+    assert made == ["ch2", "ch3"]
+    stop.clear()
+    found = every()
+    assert made == ["ch2", "ch3", "ch4", "ch5", "ch6"]
+    assert [one.title for one in found.values()] == made
+    told.clear()
+    assert list(every()) == made == list(CHAPTERS)
+    assert len(told) == 5
+    assert all("nothing changed" in text for text in told)
+    every(search=False)
+    assert len(made) == 10
+
+
+def test_code_that_changes_while_it_runs_is_not_kept(tmp_path, monkeypatch):
+    keys = iter(range(100))
+    monkeypatch.setattr(store, "digest", lambda *_, **__: str(next(keys)))
+    monkeypatch.setattr(reproduction, "section", lambda name, **_: SECTION)
+    told = []
+    reproduction.every(list(CHAPTERS), tmp_path, progress=told.append)
+    assert list(tmp_path.glob("*")) == []
+    assert sum("not kept" in text for text in told) == 5
+
+
+# ---------------------------------------------------------------------------- the page
+
+
+def test_summary_has_each_statement_that_counts():
+    assert counts(SECTION) == {
+        "agree": 2,
+        "differs": 1,
+        "cannot tell": 1,
+        "used": 1,
+        "apart": 1,
+    }
+    text = summary({"ch6": SECTION, "ch2": replace(SECTION, title="Two")}, "pamrs x")
+    lines = text.splitlines()
+    assert "Made by `pamrs x`; change the code, not this page." in lines
+    assert "| [Chapter 6: a title](chapter6.md) | 2 | 1 | 1 | 1 | 1 |" in lines
+    assert "| **all** | 4 | 2 | 2 | 2 | 2 |" in lines
+    heads = [k for k, line in enumerate(lines) if line.startswith("| **the first group** |")]
+    assert len(heads) == 2
+    rows = lines[heads[0] + 1 :]
+    assert rows[0].startswith("| a \\| b | 6.2 |")
+    assert "[1](chapter6/first.png) [2](chapter6/second.png)" in rows[0]
+    assert "| **differs** | because \\| of it |" in rows[1]
+    assert rows[2] == "| **two** | | | | | | |"
+    assert "(chapter2/" in lines[heads[1] + 1]
+    assert "| none | inf |" not in text
+    assert "agree (used)" in text
+    assert "| f |" not in text
+    assert "no number; really" in text
+
+
+def test_summary_in_the_documentation_counts_the_tables_beside_it():
+    import csv
+
+    text = (DOCS / "README.md").read_text(encoding="utf-8")
+    assert "Made by `make reproduce`" in text
+    total = [0] * 5
+    for chapter in CHAPTERS.values():
+        with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
+            rows = list(csv.DictReader(stream))
+        counted = [row for row in rows if not row["apart"]]
+        found = [
+            sum(row["verdict"] == "agree" for row in counted),
+            sum(row["verdict"] == "agree" and row["used"] == "yes" for row in counted),
+            sum(row["verdict"] == "differs" for row in counted),
+            sum(row["verdict"] == "cannot tell" for row in counted),
+            len(rows) - len(counted),
+        ]
+        assert f"({chapter}.md) | {' | '.join(map(str, found))} |" in text
+        total = [a + b for a, b in zip(total, found, strict=True)]
+    assert f"| **all** | {' | '.join(map(str, total))} |" in text
+
+
+# -------------------------------------------------------------------------- the command
+
+
+def test_command_writes_pages_tables_and_pictures(capsys, tmp_path, monkeypatch):
+    monkeypatch.setattr(
+        reproduction, "section", lambda name, **_: replace(SECTION, title=f"Chapter {name}")
+    )
+    folder, cache = tmp_path / "out", tmp_path / "cache"
+    words = [str(folder), "--cache", str(cache)]
+    main([*words, "--only", "ch6"])
+    assert {path.name for path in folder.iterdir()} == {"chapter6", "chapter6.md"}
+    main(words)
+    out = capsys.readouterr().out
+    assert "Chapter ch6: 2 agree (1 used to identify), 1 differ" in out
+    assert "ch2: reproducing" in out
+    assert out.count("nothing changed") == 1
+    assert "Made by `make reproduce`;" in (folder / "README.md").read_text(encoding="utf-8")
+    for chapter in CHAPTERS.values():
+        own = (folder / f"{chapter}.md").read_text(encoding="utf-8")
+        assert f"![what it shows]({chapter}/first.png)" in own
+        assert "Made by `make reproduce`;" in own
+        assert (folder / chapter / "first.png").read_bytes() == b"\x89PNG 1"
+        assert (folder / chapter / "facts.csv").is_file()
+    main([*words, "--no-search"])
+    assert "Made by `make reproduce without searches`" in (folder / "README.md").read_text()
+
+
+def test_command_that_is_stopped_says_that_it_goes_on(tmp_path, monkeypatch):
+    def section(name, **_):
+        if name == "ch3":
+            raise KeyboardInterrupt
+        return SECTION
+
+    monkeypatch.setattr(reproduction, "section", section)
+    with pytest.raises(SystemExit, match="what was finished is kept, the same command goes on"):
+        main([str(tmp_path / "out"), "--cache", str(tmp_path / "cache")])
+    assert len(list((tmp_path / "cache").iterdir())) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_command_refuses_chapters_that_there_are_not(capsys, tmp_path):
+    with pytest.raises(SystemExit):
+        main([str(tmp_path / "x"), "--only", "ch9"])
+    assert "invalid choice: 'ch9'" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()

@@ -1,0 +1,276 @@
+"""Chapter 4 beside ours: small runs of its experiments, and how its statements are judged."""
+
+import csv
+import io
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs.control import PID, closed_loop
+from pamrs.control.metrics import evaluate
+from pamrs.errors import ParameterError
+from pamrs.rig import Joint
+from reproduction import chapter4, lift, lift_diagnosis
+from reproduction.chapter4_statements import SERIES, statements
+from reproduction.elbow import PSI
+from reproduction.lift import GAINS, PAYLOADS, VARIANTS, Lifts
+from reproduction.two_branches import two_branches
+
+DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
+TIME = np.arange(2501) * 0.01
+PATH = lift.trajectory()
+
+
+def made(late=0.3, swing=0.0, rest=0.0, above=0.0):
+    """Four payloads that follow the reference late, swing, settle ``rest`` deg off and pass the
+    hold by ``above`` deg.
+    """
+    wanted = np.asarray(PATH(TIME).angle)
+    angle = np.asarray(PATH(np.maximum(TIME - late, 0.0)).angle)
+    angle = angle + np.radians(swing) * np.sin(8.0 * TIME) + np.radians(rest) * (TIME > 20.0)
+    angle = angle + np.radians(above) * np.exp(-(((TIME - 11.0) / 0.5) ** 2))
+    angle = np.tile(angle, (4, 1))
+    rate = np.gradient(angle, TIME, axis=1)
+    metrics = evaluate(TIME, wanted, angle, rate=rate, parts=PATH.phases)
+    return Lifts(TIME, wanted, angle, rate, np.zeros_like(angle), metrics)
+
+
+def verdicts(**changed):
+    """Verdict of every statement for runs that all lag by 0.3 s, but for some."""
+    runs = dict.fromkeys(GAINS, made()) | changed
+    return {row.fact: row.verdict for row in statements("group", runs)}
+
+
+def test_reference_is_three_segments_of_5_s_in_a_record_of_25_s():
+    assert PATH.duration == 25.0
+    assert {name: span for name, span in PATH.phases.items() if name != "rest"} == {
+        "lift": (5.0, 10.0),
+        "hold": (10.0, 15.0),
+        "return": (15.0, 20.0),
+    }
+    assert math.degrees(float(PATH(12.0).angle)) == pytest.approx(80.0)
+
+
+def test_overshoot_swing_and_delay_are_read_off_the_angle():
+    run = made(late=0.5, above=7.0)
+    np.testing.assert_allclose(run.overshoot, 7.0, atol=0.01)
+    np.testing.assert_allclose(run.swing, 0.0, atol=0.01)
+    np.testing.assert_allclose(run.delay, 0.5 + 1.0 / 13.0, atol=0.011)
+    np.testing.assert_allclose(made(swing=3.0).swing, 6.0, rtol=0.01)
+    np.testing.assert_allclose(made(rest=-4.0).undershoot, 4.0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "good", "bad", "fact"),
+    [
+        ("fuzzy", {"late": 0.7}, {"late": 1.2}, "fuzzy: lag, mean of 11, 23, 34 kg"),
+        ("fuzzy", {"late": 0.7}, {"late": 0.7, "above": 5.0}, "fuzzy: largest overshoot"),
+        ("FF+PID", {}, {"above": 5.0}, "FF+PID: largest overshoot of the hold"),
+        ("FF+fuzzy", {}, {"swing": 5.0}, "FF+fuzzy: swing in the last 2 s of the hold"),
+        ("PID", {"rest": -5.0}, {}, "PID, 34 kg: overshoot below the rest position"),
+        (
+            "FF+fuzzy, kM 0.5",
+            {"rest": 3.0},
+            {"rest": 0.1},
+            "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return",
+        ),
+        (
+            "FF+PID, PID's gains",
+            {"late": 0.1},
+            {"late": 0.6},
+            "11 kg: error with feedforward, worst stage over PID alone",
+        ),
+        ("FF+PID, PID's gains", {}, {"swing": 4.0}, "11 kg: omega, FF+PID over PID"),
+    ],
+)
+def test_a_statement_changes_sides_with_what_it_says(name, good, bad, fact):
+    plain = {"PID": made(late=0.3, swing=1.0)} if "omega" in fact else {}
+    assert verdicts(**plain, **{name: made(**good)})[fact] == "agree"
+    assert verdicts(**plain, **{name: made(**bad)})[fact] == "differs"
+
+
+def test_best_gain_of_the_series_is_the_one_with_the_least_error():
+    fact = "kM with the smallest RMS error, 23 kg"
+    for km, name in SERIES.items():
+        runs = {other: made(late=0.6) for other in SERIES.values()} | {name: made(late=0.2)}
+        assert (verdicts(**runs)[fact] == "agree") == (km == 0.5)
+
+
+def test_a_lift_of_a_batch_is_the_one_alone():
+    gains = {"PID": GAINS["PID"], "FF": GAINS["FF"]}
+    names, payloads = ["as printed", "muscle damping 3000 N s/m"], PAYLOADS[:2]
+    together = lift.lifts(names, gains, payloads=payloads)
+    assert list(together) == names
+    alone = lift.lifts([names[1]], {"PID": GAINS["PID"]}, payloads=payloads[1:])[names[1]]["PID"]
+    np.testing.assert_array_equal(together[names[1]]["PID"].angle[1], alone.angle[0])
+    assert not np.array_equal(together[names[0]]["PID"].angle[1], alone.angle[0])
+    # and the one of a closed loop that knows of no batch
+    rig = lift.plant(VARIANTS[names[1]], payloads[1])
+    start = {
+        "joint_angle": float(alone.angle[0, 0]),
+        "muscle_pressure": float(alone.pressure[0, 0]),
+    }
+    controller = PID(1.4, 2.5, period=lift.PERIOD, anti_windup="none")
+    single = closed_loop(rig, controller, PATH, sample_time=lift.PERIOD, step=1e-3, initial=start)
+    np.testing.assert_allclose(alone.angle[0], single.angle[::2], atol=1e-9)
+
+
+def test_a_plant_hides_its_effects_and_shares_its_valve():
+    variant = replace(VARIANTS["muscle damping 3000 N s/m"], known=VARIANTS["valve 4.2 mm2"].known)
+    rig, model = lift.plant(variant, 20.0), lift.assumed(variant)
+    assert [effect["id"] for effect in rig.effects] == ["muscle_rate_damping"]
+    assert model.effects == []
+    for one in (rig, model):
+        assert one.parameter("valve.discharge_area_max").value == pytest.approx(4.2e-6)
+    assert rig.parameter("arm.inertia").value != model.parameter("arm.inertia").value
+    rubbing = VARIANTS["as printed, and hysteresis (2.36)"]
+    assert lift.plant(rubbing, 20.0).model["muscle"]["friction_coefficient"] == 0.16
+    assert lift.assumed(rubbing).model["muscle"]["friction_coefficient"] == 0.0
+    smooth = VARIANTS["smooth muscle"]
+    assert (model.muscle.model, lift.assumed(smooth).muscle.model) == ("elbow_linear", "robinson")
+    fed = lift.plant(VARIANTS["regulated supply, dead band 50 kPa"], 20.0)
+    assert fed.model["supply"]["kind"] == "regulator"
+    assert fed.model["supply"]["initial_pressure"] == model.model["supply"]["initial_pressure"]
+    with pytest.raises(
+        ParameterError, match=r"names has 'no such plant'; the plants are: as printed"
+    ):
+        lift.lifts(["no such plant"])
+
+
+def test_every_trial_changes_what_the_arm_does():
+    """An effect that a rig has no part for would be a trial of nothing."""
+    gains = {"FF+fuzzy": GAINS["FF+fuzzy"]}
+    down = "as printed, (4.4) both ways in the feedforward"  # only where the muscle lengthens
+    names = [name for name in VARIANTS if name != down]
+    found = lift.lifts(names, gains, payloads=PAYLOADS[1:2], duration=6.5)
+    plain = found.pop("as printed")["FF+fuzzy"].angle
+    for name, runs in found.items():
+        assert np.abs(runs["FF+fuzzy"].angle - plain).max() > 1e-4, name
+    found = lift.lifts(["as printed", down], gains, payloads=PAYLOADS[1:2], duration=16.5)
+    one, other = (runs["FF+fuzzy"].angle[0] for runs in found.values())
+    until = TIME[: one.size] <= 15.0
+    np.testing.assert_array_equal(one[until], other[until])
+    assert np.abs(one - other).max() > 1e-4
+
+
+def test_a_map_has_the_metrics_of_its_loops_in_both_units():
+    name = "muscle damping 3000 N s/m"
+    found = lift.fuzzy_map([0.3, 0.6], [0.4, 0.8], name, PAYLOADS[1:2])
+    run = lift.lifts([name], {"fuzzy": (0.0, 0.3, 0.6, 0.8)}, payloads=PAYLOADS[1:2])[name]["fuzzy"]
+    assert found.nu[0, 0, 1] == pytest.approx(float(run.metrics.squared_error[0]), rel=1e-3)
+    for unit in ("rad", "deg"):
+        omega = evaluate(run.time, run.reference, run.angle, rate=run.rate, unit=unit).curvature
+        assert found.omega[unit][0, 0, 1] == pytest.approx(float(omega[0]), rel=1e-9)
+        assert found.j[unit].min() >= 1.0
+        i, k = np.unravel_index(int(found.j[unit][0].argmin()), (2, 2))
+        assert found.best(found.j[unit]) == [((0.3, 0.6)[i], (0.4, 0.8)[k])]
+
+
+def test_records_for_the_diagnosis_have_what_is_measured():
+    name = chapter4.DAMPED
+    truth, model = (
+        lift.plant(VARIANTS[name], PAYLOADS[1], seed=None),
+        lift.assumed(VARIANTS[name]).with_parameters({"arm.payload": PAYLOADS[1]}),
+    )
+    one, again = (lift_diagnosis.recorded(truth, model, PATH, "fit", 3, 1.0) for _ in range(2))
+    assert {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"} <= set(
+        one.channels
+    )
+    np.testing.assert_array_equal(one.channels["joint_angle"], again.channels["joint_angle"])
+    # the effect is in the plant alone: nothing else of it differs
+    assert truth.without_effect("muscle_rate_damping").model == model.model
+
+
+def test_page_has_every_plant_and_no_picture_is_missing():
+    text = (DOCS / "chapter4.md").read_text(encoding="utf-8")
+    assert "`make reproduce`" in text.splitlines()[2]
+    links = re.findall(r"\]\(([^)]+\.png)\)", text)
+    assert len(links) == 9
+    assert all((DOCS / link).is_file() for link in links)
+    stored = list(
+        csv.DictReader(io.StringIO((DOCS / "chapter4" / "facts.csv").read_text(encoding="utf-8")))
+    )
+    assert {row["group"] for row in stored} == set(chapter4.GROUPS.values())
+    tried = [row for row in stored if row["group"] == chapter4.GROUPS["effects"]]
+    own = [f"{name}, gains of its own maps" for name in (chapter4.PRINTED, chapter4.RUBBING)]
+    assert [row["fact"] for row in tried] == [*VARIANTS, *own]
+    # each statement counts once: the printed plant's, of which there is another reading
+    counted = {row["fact"] for row in stored if not row["apart"]}
+    assert len(counted) == sum(not row["apart"] for row in stored)
+    for name, apart in (("printed", False), ("rubbing", True), ("effects", True), ("unit", True)):
+        rows = [row for row in stored if row["group"] == chapter4.GROUPS[name]]
+        assert {bool(row["apart"]) for row in rows} == {apart}
+    facts = set(verdicts())
+    agree = {
+        row["fact"]
+        for row in stored
+        if row["group"] == chapter4.GROUPS["printed"] and row["verdict"] == "agree"
+    }
+    score = next(row for row in tried if row["fact"] == own[0])
+    assert int(float(score["ours"])) == len(agree & facts)
+
+
+def test_the_printed_muscle_lets_go_at_its_free_contraction():
+    """3.2.2: 37 % at 150 psi; and (4.7) is above (4.4), since it resists being stretched."""
+    muscle = two_branches()
+    told = {name: value for name, value, _ in chapter4.chosen()}["E_R of (4.5), (4.6)"]
+    assert told == f"{muscle.parameters['bladder_modulus'] / 1e6:.2f} MPa"
+    psi = 150.0 * PSI
+    assert float(muscle.force(psi, 0.37, -1.0)) == pytest.approx(0.0, abs=1e-6)
+    up, down = (muscle.force(psi, [0.05, 0.2, 0.35], way) for way in (-1.0, 1.0))
+    assert np.all(down > up + 1.0)
+    # (4.7): FL and FT are in proportion to E_R, and less by a fifth
+    stiff = muscle.replace(bladder_modulus=2.0 * muscle.parameters["bladder_modulus"])
+    once, twice = (float(one.force(0.0, 0.2, 1.0)) for one in (muscle, stiff))
+    assert twice == pytest.approx(2.0 * once, rel=1e-12)
+    assert once == pytest.approx(0.8 * float(muscle.force(0.0, 0.2, -1.0)), rel=1e-12)
+
+
+def test_gains_by_payload_are_those_of_each_payload_alone():
+    both = {"PID": (0.0, (1.4, 0.5), (2.5, 1.5))}
+    together = lift.lifts(gains=both, payloads=PAYLOADS[:2], duration=8.0)["as printed"]["PID"]
+    for k, gains in enumerate(((0.0, 1.4, 2.5), (0.0, 0.5, 1.5))):
+        one = lift.lifts(gains={"PID": gains}, payloads=PAYLOADS[k : k + 1], duration=8.0)
+        np.testing.assert_array_equal(together.angle[k], one["as printed"]["PID"].angle[0])
+
+
+def test_the_predicted_pressure_holds_the_arm():
+    run = made()
+    wanted = lift.predicted(run, PAYLOADS[1:3])
+    rig = lift.assumed().with_parameters({"arm.payload": PAYLOADS[2]})
+    arm, hold = rig.model["arm"], int(np.argmin(np.abs(TIME - 12.0)))
+    joint = Joint.from_model(rig.model["joint"])
+    torque = joint.torque(rig.muscle, wanted[1, hold], math.radians(lift.HIGH), count=6)
+    weight = (arm["first_moment"] + arm["payload"] * arm["length"]) * arm["gravity"]
+    assert float(torque) == pytest.approx(weight * math.sin(math.radians(lift.HIGH)), rel=1e-6)
+    assert np.all(wanted[1] > wanted[0])
+
+
+def test_lines_of_gains_are_loops_with_the_gains_of_each_payload():
+    best = [(0.5, 1.5), (1.4, 2.5)]
+    line = lift.derivative_line([0.0, 0.1], best)
+    gains = {"PID": (0.0, (0.5, 1.4), (1.5, 2.5))}
+    run = lift.lifts(gains=gains, payloads=PAYLOADS[:2])["as printed"]["PID"]
+    np.testing.assert_allclose(line.nu[:, 0, 0], run.metrics.squared_error, rtol=1e-3)
+    assert np.all(line.nu[:, 1, 0] != line.nu[:, 0, 0])
+    fuzzy = lift.rate_line([0.3, 0.6], [(0.45, 0.65)])
+    one = lift.lifts(gains={"fuzzy": (0.0, 0.45, 0.6, 0.65)}, payloads=PAYLOADS[:1])
+    metrics = one["as printed"]["fuzzy"].metrics
+    assert fuzzy.nu[0, 1, 0] == pytest.approx(float(metrics.squared_error[0]), rel=1e-3)
+
+
+def test_an_error_too_small_for_a_figure_decides_nothing():
+    fact = "fuzzy: error at the end of the hold, least"
+    for late, verdict in ((0.3, "differs"), (5.05, "cannot tell"), (5.5, "agree")):
+        assert verdicts(fuzzy=made(late=late))[fact] == verdict
+
+
+def test_an_optimum_at_the_end_of_a_line_decides_nothing():
+    inside, end = [0.3, 0.6, 0.4], [0.3, chapter4._RATE[-1], 0.4]
+    assert chapter4._at_an_end(inside) == ""
+    assert "end of the line" in chapter4._at_an_end(end)
+    assert "end of the line" in chapter4._at_an_end([chapter4._RATE[0], 0.3])

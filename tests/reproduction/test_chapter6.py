@@ -1,0 +1,232 @@
+"""Chapter 6 beside ours: work, input and cycles of known curves, the law of what air can give, and
+the short experiments.
+"""
+
+import csv
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs.errors import ParameterError
+from pamrs.library import pam_a_1in
+from reproduction import chapter6, recruiting
+from reproduction.chapter6 import GROUPS
+from reproduction.recruiting import CYCLE, MATRIX, Cycles, lifting, plant
+
+DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
+#: Statements of which ours differ; one that changes sides must be noticed.
+DIFFER = {
+    "air in two muscles at half the pressure over that in one, 4 and 8 bar",
+    "one at 8 bar less two at 4 bar, e = 0.05",
+    "loss of B / loss of A, 2 bar, e = 0.10",
+    "least of tank less muscles with which the arm still reaches its angle",
+    "with elasticity: least efficiency",
+    "without elasticity: least efficiency",
+    "without elasticity: largest efficiency",
+    "without elasticity, 27 kg: two muscles less the worse of four and six",
+}
+
+
+def cycles(tops=((90.0, 90.0),), fall=1e5):
+    """Made-up cycles: up to given angles [deg], the torque 100 N m up and 50 N m down."""
+    time = np.arange(0.0, CYCLE * len(tops[0]) + 1e-9, 0.01)
+    angle = np.full((len(tops), time.size), math.radians(15.0))
+    torque = np.full(angle.shape, 100.0)
+    for row, tried in enumerate(tops):
+        for k, top in enumerate(tried):
+            now = time - CYCLE * k
+            up, hold, down = (
+                (now >= 0.0) & (now < 6.0),
+                (now >= 6.0) & (now < 11.0),
+                ((now >= 11.0) & (now < 17.0)),
+            )
+            reach = math.radians(top - 15.0)
+            angle[row, up] += reach * now[up] / 6.0
+            angle[row, hold] += reach
+            angle[row, down] += reach * (1.0 - (now[down] - 11.0) / 6.0)
+            torque[row, down] = 50.0
+    source = np.linspace(13e5, 13e5 - fall, time.size) + np.zeros_like(angle)
+    cases = tuple((9.0, n) for n in (2, 4, 6)[: len(tops)])
+    return Cycles(
+        cases,
+        90.0,
+        0.015,
+        time,
+        angle,
+        torque,
+        np.full(angle.shape, 5e5),
+        source,
+        np.zeros(len(tops), dtype=bool),
+    )
+
+
+# ------------------------------------------------------------------- work and input
+
+
+def test_work_counts_what_rises_and_input_what_the_tank_loses():
+    found = cycles(fall=2e5)
+    rise = 2.0 * math.radians(75.0)
+    assert found.work[0] == pytest.approx(100.0 * rise, rel=1e-3)
+    assert found.energy[0] == pytest.approx(2e5 * 0.015)
+    assert found.efficiency[0] == pytest.approx(100.0 * rise / 3000.0, rel=1e-3)
+    assert found.of(9.0, 2) == found.efficiency[0]
+    assert found.count == 2
+    with pytest.raises(ValueError, match="not in tuple"):
+        found.row(9.0, 6)
+
+
+def test_cycles_are_followed_up_to_the_first_that_is_not():
+    found = cycles(((90.0, 90.0, 90.0), (90.0, 80.0, 90.0), (70.0, 90.0, 90.0)))
+    np.testing.assert_allclose(found.tops()[1], [90.0, 80.0, 90.0], atol=0.01)
+    assert found.followed().tolist() == [3, 1, 0]
+    np.testing.assert_allclose(found.gradient()[0, 0], 13e5 - 1e5 / 6.0 - 5e5, rtol=1e-2)
+
+
+def test_best_number_follows_most_cycles_before_it_is_efficient():
+    found = cycles(((90.0, 60.0), (90.0, 90.0), (90.0, 90.0)))
+    torque = found.torque.copy()
+    torque[0] *= 9.0
+    torque[1] *= 0.5
+    other = Cycles(
+        found.cases,
+        90.0,
+        0.015,
+        found.time,
+        found.angle,
+        torque,
+        found.pressure,
+        found.source,
+        found.failed,
+    )
+    assert chapter6.best_number(other, 9.0) == (6, 2)
+    assert chapter6.best_number(found, 9.0)[1] == 2
+
+
+def test_loop_is_as_wide_as_it_was_drawn():
+    found = cycles(((90.0, 90.0),))
+    share = np.degrees(found.angle) / 90.0
+    other = Cycles(
+        found.cases,
+        90.0,
+        0.015,
+        found.time,
+        found.angle,
+        found.torque,
+        5e5 * share,
+        found.source,
+        found.failed,
+    )
+    assert chapter6.loop_width(other, 0) == pytest.approx(0.5)
+
+
+# ------------------------------------------------------------------------- the plants
+
+
+def test_plants_have_their_muscles_and_their_share_of_the_volume():
+    six, two = plant(9.0, 6), plant(9.0, 2)
+    assert six.parameter("chamber.dead_volume").value == pytest.approx(1.5e-4)
+    assert two.parameter("chamber.dead_volume").value == pytest.approx(5e-5)
+    assert two.parameter("muscle.count").value == 2
+    assert two.parameter("arm.payload").value == 9.0
+    assert (9.0, 2) in MATRIX[90.0]
+    assert (18.0, 2) not in MATRIX[90.0]
+    assert (18.0, 2) in MATRIX[50.0]
+    with pytest.raises(ParameterError, match="cases is empty"):
+        lifting([], 90.0, 1)
+
+
+@pytest.fixture(scope="module")
+def one():
+    return lifting([(9.0, 2), (9.0, 6)], 90.0, 1)
+
+
+def test_work_is_what_lifts_the_arm_and_rubs(one):
+    rig = plant(9.0, 2)
+    arm = {key: rig.parameter(f"arm.{key}").value for key in ("first_moment", "viscous", "coulomb")}
+    weight = (arm["first_moment"] + 9.0 * 0.9) * 9.80665
+    for row in range(2):
+        high = one.angle[row].max()
+        rate = np.gradient(one.angle[row], one.time)
+        rising = np.maximum(rate, 0.0)
+        lift = weight * (math.cos(one.angle[row, 0]) - math.cos(high))
+        rub = np.trapezoid(
+            arm["viscous"] * rising**2 + arm["coulomb"] * np.tanh(rate / 0.02) * rising, one.time
+        )
+        assert one.work[row] == pytest.approx(lift + rub, rel=0.01)
+    assert one.energy[0] < one.energy[1]
+    assert one.followed().tolist() == [1, 1]
+
+
+def test_isothermal_air_gives_no_more_than_its_gauge_pressure_over_its_pressure():
+    found = lifting(
+        [(0.0, 6), (9.0, 4)],
+        90.0,
+        1,
+        elastic=False,
+        changed=recruiting.READINGS["isothermal gas"],
+    )
+    pressure = found.pressure.max(axis=1)
+    assert np.all(found.efficiency < pressure / (pressure + 101325.0))
+    assert np.all(found.efficiency > 0.3 * pressure / (pressure + 101325.0))
+
+
+def test_vented_muscles_that_bow_out_cost_nothing(one):
+    bowed = recruiting.beside_idle(9.0, 90.0, 1)
+    struts = recruiting.beside_idle(9.0, 90.0, 1, struts=True)
+    assert bowed.efficiency[0] == pytest.approx(one.efficiency[0], rel=0.02)
+    assert struts.efficiency[0] < 0.8 * one.efficiency[0]
+
+
+def test_loss_to_the_rubber_is_that_of_the_offsets():
+    muscle = pam_a_1in()
+    offset = np.array(muscle.parameters["modulus_offset"])
+    for pressure in (2e5, 4e5):
+        expected = -float(muscle.elastic_basis(0.1) @ offset) / float(
+            muscle.force(2 * pressure, 0.0)
+        )
+        assert float(chapter6._loss(muscle, pressure, 0.1)) == pytest.approx(expected)
+
+
+def test_arm_of_the_test_matrix_is_just_not_lifted():
+    from pamrs.design import lift
+
+    least, most = chapter6._moments()
+    assert most - least == pytest.approx(9.0 * 0.9)
+    rig = plant(18.0, 2).with_parameters({"arm.first_moment": least + 0.01})
+    assert not lift(rig, pressure=11.8e5, to=math.radians(90.0)).can_lift
+    rig = plant(18.0, 2).with_parameters({"arm.first_moment": least - 0.01})
+    assert lift(rig, pressure=11.8e5, to=math.radians(90.0)).can_lift
+
+
+# ---------------------------------------------------------------------------- the page
+
+
+@pytest.mark.slow
+def test_short_experiments_fill_the_page():
+    rows = chapter6.facts(search=False)
+    # of two cycles the first, which fills the empty muscles, is half
+    close = "50 deg: least gain of efficiency from a number of muscles to the next lower"
+    differ = {row.fact for row in rows if row.verdict == "differs" and not row.apart}
+    assert differ - {close} == DIFFER
+    assert len({(row.group, row.fact) for row in rows}) == len(rows)
+    assert all(row.where[:2] in ("6.", "Ta", "no") for row in rows)
+    assert {row.group for row in rows} == set(GROUPS.values())
+    assert all(chapter6.in_short(rows))
+    tables = chapter6.tables()
+    assert set(tables) <= set(GROUPS.values())
+    with (DOCS / "chapter6" / "facts.csv").open(encoding="utf-8", newline="") as stream:
+        stored = {(row["group"], row["fact"]): row for row in csv.DictReader(stream)}
+    assert list(stored) == [(row.group, row.fact) for row in rows]
+    whole = {
+        fact
+        for (_, fact), row in stored.items()
+        if row["verdict"] == "differs" and not row["apart"]
+    }
+    assert whole == DIFFER | {"largest payload that follows every cycle"}
+    from reproduction.chapter6_figures import pictures
+
+    for picture in pictures():
+        assert picture.group in GROUPS.values()
+        assert picture.png.startswith(b"\x89PNG")
