@@ -28,10 +28,10 @@ from benchmarks.real import (
     shown_errors,
     shown_values,
 )
+from cases.zillen_cylinders.compare import compare_friction_laws
+from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.fit import fit_map, fit_muscle, load_measured_muscle
-from pamrs.fit.cylinder.compare import compare_friction_laws
-from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
 from trial.summary import table
 
 Say = Callable[[str], None]
@@ -224,7 +224,7 @@ def cylinder_page(name: str, records: Sequence[FrictionRecord]) -> Page:
                 ]
             ),
             following="Strokes of 2, 10 and 40 mm/s at 1, 4 and 7 bar, in random order, twice "
-            "(18 runs). `pamrs diagnose` does not take cylinders; `pamrs.fit.cylinder` does.",
+            "(18 runs). `pamrs diagnose` does not take cylinders; `cases/zillen_cylinders` does.",
         ),
     )
 

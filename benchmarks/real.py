@@ -22,13 +22,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pamrs
+from cases.zillen_cylinders.compare import compare_friction_laws
+from cases.zillen_cylinders.laws import fit_cylinder_friction
+from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import PamrsError, RecordingError
-from pamrs.fit.cylinder.compare import compare_friction_laws
-from pamrs.fit.cylinder.friction import fit_cylinder_friction
-from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
 from pamrs.recordings import Case
 from pamrs.simulation import core_rig
 from trial.summary import table
@@ -311,7 +311,7 @@ CHAMBER_AFTER = """
 CYLINDER_WORDS = """## Four cylinders (E. Zillen, TU Delft, 2021)
 
 Printed cylinders whose pistons are pulled at constant pressures of 1 to 7 bar. They are no muscles,
-and `pamrs diagnose` does not take them: `pamrs.fit.cylinder` judges them. The nominal model is the
+and `pamrs diagnose` does not take them: the case's own fit judges them. The nominal model is the
 piston's area times the pressure and no friction; each pressure is predicted from the others by a
 friction that is constant and by one that is linear in the pressure. Intervals draw the three to
 seven pressures again, and are rough. Errors: noise / no friction / constant / linear.

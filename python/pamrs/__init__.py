@@ -9,8 +9,6 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any, Final
 
-from pamrs import _moved
-
 if TYPE_CHECKING:
     from pamrs import fit, library, rigs, sweeps
     from pamrs.design import Lift, lift, sizing
@@ -138,15 +136,10 @@ def __getattr__(name: str) -> Any:
         value = importlib.import_module(_MODULES[name])
     elif name in _HOMES:
         value = getattr(importlib.import_module(_HOMES[name]), name)
-    elif name in _moved.PACKAGES:
-        return _moved.module(name)
     else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     globals()[name] = value
     return value
-
-
-_moved.register()
 
 
 def __dir__() -> list[str]:

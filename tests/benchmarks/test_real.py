@@ -61,7 +61,7 @@ def test_recordings_that_are_not_there_are_missed(tmp_path: Path) -> None:
 
 @pytest.mark.skipif(not FRICTION.is_dir(), reason="the recordings are not there")
 def test_shares_of_a_cylinder_add_up() -> None:
-    from pamrs.fit.cylinder.record import load_friction_folder
+    from cases.zillen_cylinders.record import load_friction_folder
 
     told = cylinder_budget(load_friction_folder(FRICTION).cylinders["Kidney_lc"])
     assert np.isclose(sum(v for v, _, _ in told["shares"].values()), 1.0)

@@ -26,7 +26,6 @@ LAYERS = (
         "_stretches",
         "_termination",
         "_writing",
-        "_moved",
     ),
     ("effects",),
     ("rig",),

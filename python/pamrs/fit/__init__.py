@@ -23,13 +23,11 @@ if TYPE_CHECKING:
     from pamrs.fit._solution import COEFFICIENTS, GEOMETRY
     from pamrs.fit._statistics import FitParameter
     from pamrs.fit._validation import CrossValidation, PressureErrors
-    from pamrs.fit.cylinder.friction import CylinderFriction, fit_cylinder_friction
 
 __all__ = [
     "COEFFICIENTS",
     "GEOMETRY",
     "CrossValidation",
-    "CylinderFriction",
     "FitError",
     "FitParameter",
     "ForceMap",
@@ -40,7 +38,6 @@ __all__ = [
     "MuscleFit",
     "PressureErrors",
     "compare_models",
-    "fit_cylinder_friction",
     "fit_friction",
     "fit_map",
     "fit_muscle",
@@ -52,7 +49,6 @@ __all__ = [
 _HOMES: Final[dict[str, str]] = {
     "COEFFICIENTS": "_solution",
     "CrossValidation": "_validation",
-    "CylinderFriction": "cylinder.friction",
     "FitParameter": "_statistics",
     "ForceMap": "_data",
     "FrictionFit": "_friction",
@@ -63,7 +59,6 @@ _HOMES: Final[dict[str, str]] = {
     "MuscleFit": "_result",
     "PressureErrors": "_validation",
     "compare_models": "_compare",
-    "fit_cylinder_friction": "cylinder.friction",
     "fit_friction": "_friction",
     "fit_map": "_map",
     "fit_muscle": "_engine",

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._data import ForceMap
-from pamrs.fit._level_line import LawParameter, LevelLine, fit_levels
 from pamrs.fit._validation import WEAK
 from pamrs.fit._ways import held_lengths
+from pamrs.fit.levels import LawParameter, LevelLine, fit_levels
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle

@@ -12,7 +12,7 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from pamrs.fit.cylinder.friction import CylinderFriction
+    from cases.zillen_cylinders.laws import CylinderFriction
 
 __all__ = ["plot_cylinders"]
 

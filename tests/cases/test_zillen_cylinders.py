@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from cases.zillen_cylinders.compare import compare_friction_laws
+from cases.zillen_cylinders.figure import plot_cylinders
+from cases.zillen_cylinders.laws import fit_cylinder_friction, mean_of_series
+from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder, load_friction_record
+from cases.zillen_cylinders.strokes import find_strokes, onset_at_rest, pair_strokes
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit._level_line import fit_levels, mean_of_series
-from pamrs.fit.cylinder._strokes import find_strokes, onset_at_rest, pair_strokes
-from pamrs.fit.cylinder.compare import compare_friction_laws
-from pamrs.fit.cylinder.figure import plot_cylinders
-from pamrs.fit.cylinder.friction import fit_cylinder_friction
-from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder, load_friction_record
+from pamrs.fit.levels import fit_levels
 
 DATA = (
     Path(__file__).parents[2]

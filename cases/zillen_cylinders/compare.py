@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 from scipy.stats import norm, qmc
 
+from cases.zillen_cylinders.laws import LevelFriction, fit_cylinder_friction
+from cases.zillen_cylinders.record import FrictionRecord
 from pamrs.errors import RecordingError
-from pamrs.fit.cylinder.friction import LevelFriction, fit_cylinder_friction
-from pamrs.fit.cylinder.record import FrictionRecord
 
 __all__ = ["COMPARED", "LawComparison", "compare_friction_laws"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Final
 
-from pamrs.fit._level_line import LawParameter
+from pamrs.fit.levels import LawParameter
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
-    from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, LevelFriction
+    from cases.zillen_cylinders.laws import CylinderFriction, HeldOut, LevelFriction
 
 __all__ = ["held_out_lines", "report_text"]
 

@@ -16,21 +16,28 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit._level_line import LawParameter, fit_levels, mean_of_series
-from pamrs.fit.cylinder._strokes import (
+from cases.zillen_cylinders.record import FrictionRecord
+from cases.zillen_cylinders.strokes import (
     Onset,
     StrokePairs,
     onset_at_rest,
     pair_strokes,
     reversal_onsets,
 )
-from pamrs.fit.cylinder.record import FrictionRecord
+from pamrs.errors import ParameterError, RecordingError
+from pamrs.fit.levels import LawParameter, fit_levels
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["LAWS", "CylinderFriction", "HeldOut", "LevelFriction", "fit_cylinder_friction"]
+__all__ = [
+    "LAWS",
+    "CylinderFriction",
+    "HeldOut",
+    "LevelFriction",
+    "fit_cylinder_friction",
+    "mean_of_series",
+]
 
 Array = NDArray[np.float64]
 
@@ -44,6 +51,7 @@ LAWS: Final[dict[str, tuple[tuple[str, str], ...]]] = {
 }
 _SAME: Final = 0.1  # relative difference of pressures that are still one level
 _COLLINEAR: Final = 0.95  # correlation of speed and pressure above which the two are not told apart
+_MOST_CORRELATION: Final = 0.9  # of neighbouring repeats
 _PEAKS: Final = ("seen", "at least")
 
 
@@ -276,13 +284,13 @@ class CylinderFriction:
 
     def fit_report(self) -> str:
         """The result in words and tables, without the leave-one-out refits."""
-        from pamrs.fit.cylinder.report import report_text
+        from cases.zillen_cylinders.report import report_text
 
         return report_text(self)
 
     def plot(self) -> Figure:
         """Friction over pressure and one loop; needs matplotlib."""
-        from pamrs.fit.cylinder.figure import plot_cylinders
+        from cases.zillen_cylinders.figure import plot_cylinders
 
         return plot_cylinders([self])
 
@@ -516,3 +524,31 @@ def _correlation(levels: Sequence[LevelFriction]) -> float:
     if np.ptp(speed) == 0.0:
         return 0.0
     return float(np.corrcoef(pressure, speed)[0, 1])
+
+
+def mean_of_series(values: Array) -> tuple[float, float]:
+    """Mean and its standard error of repeats in the order they were measured.
+
+    Repeats that drift or hang together count as fewer: ``n (1 - r)/(1 + r)`` of them, at least 2,
+    with ``r`` the correlation of neighbours, corrected for its bias in a short series and kept
+    within 0 and 0.9.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Two repeats at least.
+
+    Returns
+    -------
+    (mean, stderr) : tuple of float
+    """
+    n = len(values)
+    mean = float(np.mean(values))
+    off = values - mean
+    power = float(np.sum(off**2))
+    if power == 0.0:
+        return mean, 0.0
+    r = float(np.sum(off[1:] * off[:-1])) / power
+    r = min(max(r + (1.0 + 4.0 * r) / n, 0.0), _MOST_CORRELATION) if n > 3 else 0.0
+    effective = max(n * (1.0 - r) / (1.0 + r), min(2.0, n))
+    return mean, float(np.sqrt(power / (n - 1) / effective))

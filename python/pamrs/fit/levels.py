@@ -16,12 +16,11 @@ from numpy.typing import NDArray
 
 from pamrs._normal import solve_normal
 
-__all__ = ["LawParameter", "LevelLine", "fit_levels", "mean_of_series"]
+__all__ = ["LawParameter", "LevelLine", "fit_levels"]
 
 Array = NDArray[np.float64]
 
 _STEPS: Final = 80  # halvings of the interval in which the extra scatter is sought
-_MOST_CORRELATION: Final = 0.9
 _EXACT: Final = 1e-9  # relative: no mean is known better
 
 
@@ -118,31 +117,3 @@ def fit_levels(design: Array, observed: Array, stderr: Array) -> LevelLine:
         values, covar, _ = solved(high)
         between = float(np.sqrt(high))
     return LevelLine(values / scale, covar / np.outer(scale, scale), between, redchi)
-
-
-def mean_of_series(values: Array) -> tuple[float, float]:
-    """Mean and its standard error of repeats in the order they were measured.
-
-    Repeats that drift or hang together count as fewer: ``n (1 - r)/(1 + r)`` of them, at least 2,
-    with ``r`` the correlation of neighbours, corrected for its bias in a short series and kept
-    within 0 and 0.9.
-
-    Parameters
-    ----------
-    values : (n,) array
-        Two repeats at least.
-
-    Returns
-    -------
-    (mean, stderr) : tuple of float
-    """
-    n = len(values)
-    mean = float(np.mean(values))
-    off = values - mean
-    power = float(np.sum(off**2))
-    if power == 0.0:
-        return mean, 0.0
-    r = float(np.sum(off[1:] * off[:-1])) / power
-    r = min(max(r + (1.0 + 4.0 * r) / n, 0.0), _MOST_CORRELATION) if n > 3 else 0.0
-    effective = max(n * (1.0 - r) / (1.0 + r), min(2.0, n))
-    return mean, float(np.sqrt(power / (n - 1) / effective))

@@ -1,7 +1,7 @@
 """Friction of four real cylinders: fitted on three pressures, predicted at the others; see the
 README beside.
 
-    python cases/zillen_cylinders/friction.py out/zillen_cylinders
+    python -m cases.zillen_cylinders out/zillen_cylinders
 
 prints the tables and writes ``report.txt`` and ``friction.png`` into the folder.
 """
@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from cases.zillen_cylinders.compare import COMPARED, compare_friction_laws
+from cases.zillen_cylinders.figure import plot_cylinders
+from cases.zillen_cylinders.laws import CylinderFriction, HeldOut, fit_cylinder_friction
+from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder
+from cases.zillen_cylinders.report import held_out_lines
 from pamrs.errors import RecordingError
-from pamrs.fit.cylinder.compare import COMPARED, compare_friction_laws
-from pamrs.fit.cylinder.figure import plot_cylinders
-from pamrs.fit.cylinder.friction import CylinderFriction, HeldOut, fit_cylinder_friction
-from pamrs.fit.cylinder.record import FrictionRecord, load_friction_folder
-from pamrs.fit.cylinder.report import held_out_lines
 
 DATA = (
     Path(__file__).parents[2]

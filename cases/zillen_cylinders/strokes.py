@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from cases.zillen_cylinders.record import FrictionRecord
 from pamrs.errors import ParameterError, RecordingError
-from pamrs.fit.cylinder.record import FrictionRecord
 
 __all__ = [
     "Onset",
