@@ -25,7 +25,7 @@ import pamrs
 from pamrs.diagnosis.evidence import weigh
 from pamrs.effects import id_of
 from pamrs.errors import PamrsError
-from trial.second.inserted import truth_of
+from trial.inserted import truth_of
 
 SCHEMES = {"what is left": 0.0, "prediction": 1.0, "both": 0.5}
 """Share of prediction in each scheme."""

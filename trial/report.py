@@ -1,34 +1,14 @@
-"""The page of a trial: targets against measurements, tables, pictures, and the commands that make
-it.
-"""
+"""How a trial was made: keys against the digests that were published, the run, code and machine."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from .concealed import write
-from .effects import LISTED
-from .pictures import pictures
 from .plan import MANIFEST
 from .plan import SCHEMA as MANIFEST_SCHEMA
-from .score import score
-from .sidebyside import compared, side_by_side
-from .summary import markdown
-
-_CAPTIONS = {
-    ("strength"): (
-        "Detection and naming against what the effect leaves after a refit, with Wilson intervals "
-        "of 95 %"
-    ),
-    "calibration": "How often the leading hypothesis was true, against its stated probability",
-    "confusion": "What was named first for what; pairs are left out",
-    "gap": "Gap closed on held-out recordings by effect and strength: every case, and the median",
-    "baselines": "Median gap closed by every method",
-}
 
 
 def checked(folder: Path) -> tuple[str, int]:
@@ -112,65 +92,3 @@ def about(folder: Path, digest: str, count: int, run: dict[str, Any], command: s
                 "they are quoted.**"
             )
     return [*lines, f"\nMade by\n\n```\n{command}\n```\n"]
-
-
-def report(
-    folder: Path, results: Path, out: Path, command: str, catalogue: Sequence[str] = LISTED
-) -> Path:
-    """Score a trial and write its page ``trial.md`` with its pictures.
-
-    Parameters
-    ----------
-    folder : Path
-        The trial: ``cases``, ``keys``, ``manifest.json``.
-    results : Path
-        From ``pamrs prove`` and ``python -m benchmarks.baselines``.
-    out : Path
-        Folder for the page and the pictures.
-    command : str
-        What makes the page, as the page says.
-    catalogue : sequence of str
-        As in :func:`trial.score.score`.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    ValueError
-        The keys are not those that were published, or the results are of another trial.
-    """
-    digest, count = checked(folder)
-    run = run_of(results, digest)
-    scores = score(folder / "keys", results, catalogue)
-    others = compared(folder / "keys", results, catalogue)
-    drawn = pictures(scores, others, out)
-    images = {p.stem: f"![{_CAPTIONS[p.stem]}]({p.name})\n\n*{_CAPTIONS[p.stem]}.*" for p in drawn}
-    text = "\n".join(
-        [
-            "# Blinded trial\n",
-            *about(folder, digest, count, run, command),
-            markdown(scores, catalogue),
-        ]
-    )
-    closes = {
-        "## Measures": "strength",
-        "## What was named first": "gap",
-        "## Calibration of the leading": "confusion",
-    }
-    for heading, name in closes.items():
-        text = text.replace(
-            heading, f"{images[name]}\n\n{heading}", 1
-        )  # a picture closes the part before it
-    parts = [text, images["calibration"], "\n## Other methods on the same cases\n"]
-    parts.append(
-        side_by_side(others)
-        if others
-        else "The baselines were not run (`python -m benchmarks.baselines`)."
-    )
-    if "baselines" in images:
-        parts.append("\n" + images["baselines"])
-    write(out / "trial.md", "\n".join(parts) + "\n")
-    return out / "trial.md"

@@ -49,6 +49,12 @@ def split(name: str) -> tuple[str, str]:
     return section, key
 
 
+def value_of(model: dict[str, Any], name: str) -> Any:
+    """A value of a nested model by its dotted name."""
+    section, key = split(name)
+    return model[section][key]
+
+
 def read_rig(path: Path) -> tuple[dict[str, Any], dict[str, float]]:
     """Nominal model and tolerances of a rig file.
 

@@ -15,8 +15,8 @@ from .excitation import DAC_STEP
 from .pair.places import BOTH, Placed, has_place
 from .pair.plant import PairPlant
 from .plant import Plant
+from .rig_kinds import nominal_pair
 from .rigfile import default_rig, read_rig, to_parameters
-from .second.rigs import nominal_pair
 from .solver import TOLERANCE
 
 

@@ -15,11 +15,9 @@ from pathlib import Path
 
 from pamrs.diagnosis.prove import cases_of
 from pamrs.errors import PamrsError
+from trial.peers import beside, peers_page
 from trial.plan import MANIFEST
 from trial.report import checked
-from trial.second.marks import is_second
-from trial.second.peers import beside, peers_page
-from trial.sidebyside import compared, side_by_side
 
 
 def main(words: list[str] | None = None) -> int:
@@ -58,11 +56,7 @@ def main(words: list[str] | None = None) -> int:
         )
         keys = args.folder / "keys"
         if keys.is_dir():
-            text = (
-                peers_page(beside(keys, results), _made(args.folder))
-                if is_second(keys)
-                else side_by_side(compared(keys, results))
-            )
+            text = peers_page(beside(keys, results), _made(args.folder))
             print(text)
             if args.markdown is not None:
                 args.markdown.write_text(text + "\n", encoding="utf-8")

@@ -24,7 +24,7 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 from tests.diagnosis import synthetic
 from tests.diagnosis.test_assemble import NAMES, recorded
-from trial.score import _result as scored
+from trial.marks import result_of as scored
 
 SETTINGS = DiagnosisSettings()
 

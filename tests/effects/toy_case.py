@@ -107,7 +107,7 @@ def main(folder: Path) -> None:
     """Simulate, conceal, diagnose, report."""
     moved = simulated()
     trial.effects.TYPES[EFFECT] = ToySpring
-    spec = Spec("toy", EFFECT, 7, tuple(select(4)), 20.0, ("strong",), measure="left")
+    spec = Spec("toy", EFFECT, 7, tuple(select(4)), 20.0, strength=0.3812)  # ten noises are left
     case = generate(spec, default_rig())
     store(case, folder)
     found = pamrs.diagnose(folder / "toy")

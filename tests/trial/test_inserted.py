@@ -8,9 +8,9 @@ from typing import Any
 
 import pytest
 
-from tests.trial.test_second import CREEP, HOSE, LEAK, key_of, result_of
+from tests.trial.test_cases import CREEP, HOSE, LEAK, key_of, result_of
 from trial.__main__ import main
-from trial.second.inserted import (
+from trial.inserted import (
     FAILED,
     FORM,
     QUIET,
@@ -66,7 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             raise ValueError(f"{case}: the model leaves its range")
         return again
 
-    monkeypatch.setattr("trial.second.inserted.diagnosed", diagnosed)
+    monkeypatch.setattr("trial.inserted.diagnosed", diagnosed)
     return tmp_path
 
 
@@ -89,11 +89,11 @@ def test_the_command_writes_the_table(folder: Path, capsys: pytest.CaptureFixtur
     assert "| search | 1 |" in text
 
 
-def test_keys_of_another_plan_are_refused(
+def test_a_trial_without_keys_is_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["insert", str(tmp_path)]) == 2
-    assert "no keys of plans second" in capsys.readouterr().err
+    assert "no key in" in capsys.readouterr().err
 
 
 def test_a_case_that_is_none_says_why(tmp_path: Path) -> None:

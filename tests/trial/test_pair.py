@@ -9,29 +9,29 @@ import pytest
 
 import pamrs
 from pamrs.simulation import replay
+from trial.bench import Bench
+from trial.cases import _truths, make
 from trial.concealed import store
+from trial.design import PAIRS, ROUND, Spec, possible, specs
 from trial.effects import TYPES, Effects, Setting, draw
 from trial.effects.chamber import Leak
 from trial.effects.sensors import PressureLag
 from trial.effects.valve import InputLag
+from trial.errors import KINDS, pair_errors, stated_lines
+from trial.families import BY_LABEL, KNOWN, LATER, OTHER
+from trial.inserted import truth_of
+from trial.labs import Lab, noise_of, table
+from trial.marks import covered, mark
 from trial.pair.bench import PairBench
 from trial.pair.course import FIT, FREE, HELD, PairDriver, pair_course
 from trial.pair.places import BOTH, PLACES, SIDES, Placed, has_place
 from trial.pair.plant import PairPlant, pair_parameters
 from trial.pair.recording import CHANNELS, PairPath
 from trial.plant import Plant
-from trial.second.bench import Bench
-from trial.second.cases import _truths, make
-from trial.second.design import PAIRS, ROUND, Spec, possible, specs
-from trial.second.errors import KINDS, pair_errors, stated_lines
-from trial.second.families import BY_LABEL, KNOWN, LATER, OTHER
-from trial.second.inserted import truth_of
-from trial.second.labs import Lab, noise_of, table
-from trial.second.marks import covered, mark
-from trial.second.pooled import page, pooled
-from trial.second.rigs import PAIR, RIGS, nominal, nominal_pair, stated
-from trial.second.tables import markdown, scores, to_json
+from trial.pooled import page, pooled
+from trial.rig_kinds import PAIR, RIGS, nominal, nominal_pair, stated
 from trial.selfcheck import against_fine, against_lsoda
+from trial.tables import markdown, scores, to_json
 
 MODEL, TOLERANCE = stated(PAIR)
 PAR = pair_parameters(MODEL)

@@ -1,25 +1,23 @@
 """The trial's plant, its effects, and how they are scaled and written."""
 
-import hashlib
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from pamrs.effects import CATALOGUE
-from trial import concealed, plan
-from trial.concealed import Spec, generate
+from trial.__main__ import main
+from trial.concealed import Spec, generate, make_case
 from trial.effects import LISTED, TYPES, UNLISTED, Effects, Setting, Start, draw
 from trial.effects.arm import PayloadSwing
 from trial.excitation import Excitation
-from trial.plan import kinds, specs, write_plan
 from trial.plant import Plant
-from trial.recording import ANGLE_STEP, CHANNELS, CommandPath, Noise, follow, prepare, reach, run
+from trial.recording import ANGLE_STEP, CommandPath, Noise, follow, prepare, reach, run
 from trial.rigfile import default_rig, read_rig, to_parameters
 from trial.selfcheck import against_fine, against_lsoda
-from trial.strength import STRENGTHS, aim
 
 MODEL, TOLERANCE = read_rig(default_rig())
 PAR = to_parameters(MODEL)
@@ -198,56 +196,7 @@ def test_memory_starts_where_the_arm_is():
         assert len(effect.start(at)) == len(effect.sizes())
 
 
-@pytest.mark.parametrize(
-    "law", [lambda f: 7.0 * f, lambda f: 40.0 * f**0.5, lambda f: 12.0 * f / (1.0 + f) + f**2]
-)
-@pytest.mark.parametrize("target", STRENGTHS.values())
-def test_aim_finds_the_size(law, target):
-    factor, found, kept = aim(lambda f: (law(f), f), target, 1.0e6)
-    assert found == pytest.approx(target, rel=0.1)
-    assert kept == factor
-    assert found == law(factor)
-
-
-def test_aim_stops_at_what_is_physical():
-    factor, found, _ = aim(lambda f: (f, None), 10.0, 4.0)
-    assert (factor, found) == (4.0, 4.0)
-
-
 RECORDINGS = (("multisine", "fit"), ("open_cycles", "fit"), ("angle_steps", "held_out"))
-
-
-@pytest.mark.parametrize(
-    ("kind", "label", "measure"),
-    [
-        ("leak_muscle", "medium", "reach"),
-        ("payload_swing", "strong", "reach"),
-        ("muscle_hysteresis", "weak", "left"),
-    ],
-)
-def test_wanted_multiple_is_met(kind, label, measure):
-    key = json.loads(
-        generate(Spec("c", kind, 3, RECORDINGS, 6.0, (label,), measure=measure), default_rig()).key
-    )
-    found = key["reach" if measure == "reach" else "reach_left"]
-    assert found == pytest.approx(STRENGTHS[label], rel=0.3)
-    assert key["reach_left"] <= key["reach"] * 1.05
-    assert key["reach_channel"] in CHANNELS
-    top = max(max(r["reach"].values()) for r in key["recordings"].values() if r["role"] == "fit")
-    assert key["reach"] == pytest.approx(top)
-
-
-def test_a_shift_of_a_parameter_leaves_little():
-    # 0.8 tolerances more payload is what the refit can absorb; the same plant with a leak is not
-    spec = Spec("c", "none", 4, RECORDINGS[:2], 8.0)
-    bench = concealed._Bench(spec, MODEL, TOLERANCE, BARE, NOISE)
-    changed = {k: dict(v) for k, v in MODEL.items()}
-    changed["arm"]["payload"] += 0.8 * TOLERANCE["arm.payload"]
-    heavy = concealed._Bench(spec, changed, TOLERANCE, BARE, NOISE).measure(Effects())
-    as_effect = {i: (r, r.clean - follow(BARE, r, i)) for i, (r, _) in heavy.items()}
-    raw = bench.most_moved(as_effect)[1]
-    assert raw > 5.0
-    assert bench.left(as_effect) < 0.2 * raw
 
 
 def test_parameters_stay_inside_their_tolerances():
@@ -262,93 +211,33 @@ def test_parameters_stay_inside_their_tolerances():
             assert any(key["moved_tolerances"].values())
 
 
-def test_full_plan():
-    found = kinds("full", np.random.default_rng(1))
-    assert len(found) >= 300
-    assert sum(k == "none" for k, _ in found) == sum(k == "parameters" for k, _ in found) == 30
-    for name in LISTED:
-        assert sorted(label for k, (label,) in (f for f in found if f[0] == name)) == sorted(
-            [*STRENGTHS] * 3
-        )
-    pairs = [k.split("+") for k, _ in found if "+" in k]
-    assert len(pairs) == 30
-    assert all(TYPES[a].block != TYPES[b].block for a, b in pairs)
-    assert sum(k in UNLISTED for k, _ in found) == 3 * len(UNLISTED)
-    made = specs("full", 2)
-    assert len({s.seed for s in made}) == len({s.name for s in made}) == len(made)
-    assert [s.kind for s in made] != [k for k, _ in found]
-    for spec in made:
-        roles = dict(spec.recordings)
-        assert 3 <= len(roles) <= 5
-        assert "open_cycles" in roles
-        assert {"fit", "held_out"} == set(roles.values())
-    # a part of the plan has the same cases
-    assert specs("full", 2, 20) == made[:20]
-
-
-def test_small_plan_is_fixed():
-    assert len(specs("small", 1)) == 12
-    assert specs("small", 1) == specs("small", 1)
-    assert specs("small", 1) != specs("small", 2)
-
-
-@pytest.fixture
-def two():
-    cut = [s for s in specs("small", 7, duration=3.0) if s.kind in ("none", "pressure_lag")]
-    return [replace(s, recordings=RECORDINGS) for s in cut]
-
-
-def test_plan_goes_on_where_it_stopped(two, tmp_path):
-    made = []
-    manifest = write_plan(tmp_path, two[:1], progress=lambda *a: made.append(a))
-    write_plan(tmp_path, two, progress=lambda *a: made.append(a))
-    assert made == [(two[0].name, 1, 1), (two[1].name, 2, 2)]
-    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
-    (tmp_path / "cases" / two[1].name / "multisine.csv").unlink()
-    (tmp_path / "keys" / f"{two[0].name}.json").write_text("{}")
-    write_plan(tmp_path, two, progress=lambda *a: made.append(a))
-    assert [a[0] for a in made[2:]] == [two[0].name, two[1].name]
-    assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
-    digests = json.loads(manifest.read_text())["keys"]
-    for spec in two:
-        content = (tmp_path / "keys" / f"{spec.name}.json").read_bytes()
-        assert digests[spec.name] == hashlib.sha256(content).hexdigest()
-        folder = tmp_path / "cases" / spec.name
-        assert (folder / "case.toml").is_file()
-        # nothing in the case tells what is concealed
-        told = "".join(p.read_text() for p in folder.iterdir() if p.name != "rig.toml")
-        assert not any(name in told for name in TYPES)
-
-
-def test_digest_is_published_before_the_case(two, tmp_path, monkeypatch):
-    seen = []
-
-    def store(case, out):
-        seen.append(
-            json.loads((tmp_path / "manifest.json").read_text())["keys"][case.name] == case.digest()
-        )
-        assert not (out / case.name).exists()
-
-    monkeypatch.setattr(plan, "store", store)
-    write_plan(tmp_path, two[:1])
-    assert seen == [True]
-
-
-def test_other_manifest_is_not_overwritten(two, tmp_path):
-    (tmp_path / "manifest.json").write_text('{"schema": "other"}')
-    with pytest.raises(ValueError, match="schema"):
-        write_plan(tmp_path, two[:1])
-
-
 def test_wrong_arguments_are_named(tmp_path):
-    with pytest.raises(ValueError, match="unknown plan"):
-        kinds("huge", np.random.default_rng(1))
     with pytest.raises(ValueError, match="given twice"):
         Effects(effect_of("leak_muscle"), effect_of("leak_muscle"))
     with pytest.raises(ValueError, match="two effects at the port 'motion'"):
         Plant(PAR, Effects(effect_of("payload_swing"), effect_of("base_flexibility")))
-    with pytest.raises(ValueError, match="strength must be one of"):
-        concealed.make_case(tmp_path, tmp_path / "k", "none", seed=1, wanted="huge")
+    for kind in ("huge", "none+leak_muscle", "wrong_parameter"):
+        with pytest.raises(ValueError, match=f"unknown kind '{re.escape(kind)}'"):
+            make_case(tmp_path, tmp_path / "k", kind, seed=1)
+    with pytest.raises(ValueError, match="strength must be positive"):
+        make_case(tmp_path, tmp_path / "k", "none", seed=1, strength=0.0)
+    with pytest.raises(ValueError, match="must not lie inside a case folder"):
+        make_case(tmp_path, tmp_path / "case_001", "none", seed=1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_case_does_not_tell_what_it_conceals(tmp_path):
+    words = ["--out", str(tmp_path / "c"), "--keys-dir", str(tmp_path / "k"), "--seed", "3"]
+    more = ["--kind", "leak_muscle+payload_swing", "--recordings", "1", "--duration", "2"]
+    assert main(["make", *words, *more]) == 0
+    key = json.loads((tmp_path / "k" / "case_001.json").read_text())
+    assert key["effects"] == ["leak_muscle", "payload_swing"]
+    assert key["verdict"] == "effects"
+    folder = tmp_path / "c" / "case_001"
+    told = "".join(path.read_text() for path in folder.iterdir() if path.name != "rig.toml")
+    assert (folder / "case.toml").is_file()
+    assert not any(name in told for name in TYPES)
+    assert main(["make", *words, "--kind", "huge"]) == 2
 
 
 def test_open_loop_commands_do_not_depend_on_the_plant():

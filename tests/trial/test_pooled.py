@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from trial.__main__ import main
-from trial.second.pooled import page, pooled, table_of_cases
-from trial.second.tables import scores, to_json
+from trial.pooled import page, pooled, table_of_cases
+from trial.tables import scores, to_json
 
 PROOF = Path(__file__).parents[2] / "docs" / "proof"
 TABLE = PROOF / "cases.jsonl.gz"

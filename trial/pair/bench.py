@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from ..bench import Bench
 from ..effects import Effect
 from ..plant import Parameters
 from ..recording import Array, Record
+from ..rig_kinds import nominal_pair
 from ..rigfile import split
-from ..second.bench import Bench
-from ..second.rigs import nominal_pair
 from .course import PairDriver, pair_course
 from .places import SIDES, Placed
 from .plant import PairParameters, PairPlant, pair_parameters

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drive import FREE, course, range_of
 from ..excitation import Excitation, Loop
-from ..second.drive import FREE, course, range_of
-from ..second.rigs import RigKind
+from ..rig_kinds import RigKind
 from .places import SIDES
 from .plant import PairPlant
 

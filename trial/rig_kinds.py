@@ -7,10 +7,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from ..pair.places import SIDES
-from ..pair.plant import PairPlant, pair_parameters
-from ..plant import Parameters, Plant
-from ..rigfile import HOME, read_rig, to_parameters
+from .pair.places import SIDES
+from .pair.plant import PairPlant, pair_parameters
+from .plant import Parameters, Plant
+from .rigfile import HOME, read_rig, to_parameters
 
 PAIR = "antagonistic_pair"
 ARM = ("arm.inertia", "arm.first_moment", "arm.payload", "arm.viscous")

@@ -1,20 +1,24 @@
-"""Open the keys of the second plan and mark what a diagnosis said about each case."""
+"""Open the keys and mark what a diagnosis said about each case."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..pair.places import BOTH, SIDES
-from ..score import HEALTHY, RESULTS, gap_of
 from .cases import SCHEMA
 from .design import SECOND, STRENGTHS
 from .families import KNOWN, OTHER, UNLISTED
+from .pair.places import BOTH, SIDES
 
+RESULTS = ("pamrs.diagnosis/1", "pamrs.diagnosis/2")
+HEALTHY = ("none", "parameters")
+#: sum over the channels of what a refit leaves above the noise, in units of it, below which there
+#: is no gap to close
+LEAST_ROOM = 0.05
 #: noises that must be left for the targets to ask for a name: 3, less what the search for a size
 #: leaves open
 SEEN = 2.5
@@ -406,6 +410,23 @@ def _placed(truth: _Truth, told: _Told) -> bool | None:
     return said in ({""}, set(SIDES)) if right == BOTH else said == {right}
 
 
+def gap_of(result: dict[str, Any]) -> float | None:
+    """Share of the gap to the noise that the diagnosis closed on held-out recordings.
+
+    What named nothing closed nothing: 0, unless its table of errors shows that there was no gap,
+    which gives None.
+    """
+    fit = result.get("fit", {})
+    gap = _number(fit.get("gap_closed"))
+    table = fit.get("held_out") or fit.get("channels") or {}
+    if gap is not None or not table:
+        return gap
+    pairs = [(_number(e.get("refit")), _number(e.get("noise"))) for e in table.values()]
+    room = sum(r / s - 1.0 for r, s in pairs if r is not None and s)
+    named = result["verdict"] == "effects" or bool(result.get("wrong_parameters"))
+    return 0.0 if room >= LEAST_ROOM and not named else None
+
+
 def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
     """Mark one case; a missing result is wrong wherever a question arises."""
     truth = _truth(key)
@@ -462,6 +483,26 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
     )
 
 
+def keys_of(folder: Path, first: int | None = None) -> list[dict[str, Any]]:
+    """The keys of a folder, or the first so many.
+
+    Raises
+    ------
+    ValueError
+        No key, or one of another schema.
+    """
+    files = sorted(Path(folder).glob("*.json"))[:first]
+    if not files:
+        raise ValueError(f"no key in {folder}")
+    found = []
+    for file in files:
+        key: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+        if key.get("schema") != SCHEMA:
+            raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+        found.append(key)
+    return found
+
+
 def marks(keys: Path, results: Path, first: int | None = None) -> list[Mark]:
     """Mark every case whose key is in a folder, or the first so many.
 
@@ -470,16 +511,7 @@ def marks(keys: Path, results: Path, first: int | None = None) -> list[Mark]:
     ValueError
         No key, a key of another plan, or a result of another schema.
     """
-    files = sorted(Path(keys).glob("*.json"))[:first]
-    if not files:
-        raise ValueError(f"no key in {keys}")
-    found = []
-    for file in files:
-        key = json.loads(file.read_text(encoding="utf-8"))
-        if key.get("schema") != SCHEMA:
-            raise ValueError(f"{file}: schema must be {SCHEMA!r}")
-        found.append(mark(key, result_of(Path(results), str(key["case"]))))
-    return found
+    return [mark(key, result_of(Path(results), str(key["case"]))) for key in keys_of(keys, first)]
 
 
 def result_of(folder: Path, case: str) -> dict[str, Any] | None:
@@ -497,12 +529,6 @@ def result_of(folder: Path, case: str) -> dict[str, Any] | None:
                 raise ValueError(f"{path}: schema must be one of {', '.join(RESULTS)}")
             return data
     return None
-
-
-def is_second(keys: Path) -> bool:
-    """Whether the keys in a folder are those of the second plan."""
-    first: Sequence[Path] = sorted(Path(keys).glob("*.json"))[:1]
-    return any(json.loads(p.read_text(encoding="utf-8")).get("schema") == SCHEMA for p in first)
 
 
 def plan_of(keys: Path) -> str:

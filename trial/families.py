@@ -1,4 +1,4 @@
-"""Which forms of which families the second plan conceals, and how each is marked.
+"""Which forms of which families the plans conceal, and how each is marked.
 
 `known`: a form that the catalogue is to have; `other`: one of the same family that it is never to
 have, so that leaving forms out is measured; `unlisted`: a family of no catalogue.
@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from ..effects import TYPES, Effect, Setting
-from ..effects.base import REFERENCE_DENSITY, uniform
-from ..pair.places import Placed
-from ..plant import Parameters
 from . import forms as more
 from . import later
+from .effects import TYPES, Effect, Setting
+from .effects.base import REFERENCE_DENSITY, uniform
+from .pair.places import Placed
+from .plant import Parameters
 
 KNOWN, OTHER, UNLISTED = "known", "other", "unlisted"
 MARKS = (KNOWN, OTHER, UNLISTED)

@@ -1,4 +1,4 @@
-"""Other methods on cases of the second plan: how much of the error each closes by stratum, and what
+"""Other methods on cases of a trial: how much of the error each closes by stratum, and what
 a user can read from them.
 """
 
@@ -12,10 +12,10 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-from ..sidebyside import told_by_others
-from ..summary import percent, table
 from .marks import CHANNEL, Mark, marks
+from .summary import percent, table
 
+SCHEMA = "pamrs.baselines/1"
 METHODS = {
     "refit": "refit inside tolerances",
     "free": "refit, free",
@@ -117,6 +117,20 @@ def _one(mark: Mark, key: dict[str, Any], told: dict[str, Any]) -> Beside:
         bool(told["detected"]["refit"]),
         sum(told["seconds"].values()),
     )
+
+
+def told_by_others(file: Path) -> dict[str, Any]:
+    """What the other methods made of a case.
+
+    Raises
+    ------
+    ValueError
+        A result of another schema.
+    """
+    told: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
+    if told.get("schema") != SCHEMA:
+        raise ValueError(f"{file}: schema must be {SCHEMA!r}")
+    return told
 
 
 def beside(keys: Path, results: Path) -> list[Beside]:
@@ -241,7 +255,7 @@ def peers_page(cases: Sequence[Beside], head: str = "") -> str:
     spent = [c.seconds for c in cases]
     said = f"median {median(lengths):.0f}, most {max(lengths)}" if lengths else "none"
     parts = [
-        "# Other methods on cases of the second plan\n",
+        "# Other methods on cases of a trial\n",
         f"{len(cases)} cases, the recordings that the diagnosis had. A refit of the parameters "
         "inside their tolerances (3 of them at most) is where all begin. `refit, free` goes on "
         "without tolerances, to 10 times the value or 30 tolerances. SINDy and a Gaussian process "

@@ -8,7 +8,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..effects.base import (
+from .effects.base import (
     RECORDING_PERIOD,
     REFERENCE_DENSITY,
     Effect,

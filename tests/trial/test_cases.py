@@ -1,4 +1,4 @@
-"""The second plan of the trial: its design, its cases, its forms and its scores."""
+"""The plans of the trial: their design, its cases, its forms and its scores."""
 
 import hashlib
 import json
@@ -12,14 +12,13 @@ import pamrs
 from pamrs.effects import CATALOGUE
 from pamrs.simulation import replay
 from trial.__main__ import main
+from trial.bench import Bench, search
+from trial.cases import SCHEMA, bench_of, complete, make
 from trial.concealed import store
+from trial.design import PERCENTS, PLANS, ROUND, SECOND, STRENGTHS, THIRD, Spec, specs
 from trial.effects import LISTED, Effects, Setting
-from trial.plant import Plant
-from trial.second.bench import Bench, search
-from trial.second.cases import SCHEMA, bench_of, complete, make
-from trial.second.design import PERCENTS, PLANS, ROUND, SECOND, STRENGTHS, THIRD, Spec, specs
-from trial.second.errors import KINDS, model_errors
-from trial.second.families import (
+from trial.errors import KINDS, model_errors
+from trial.families import (
     BY_LABEL,
     FORMS,
     KNOWN,
@@ -30,10 +29,11 @@ from trial.second.families import (
     UNLISTED,
     most,
 )
-from trial.second.labs import BITS, MISSING, RATES, Lab, noise_of, table
-from trial.second.marks import mark, place
-from trial.second.rigs import PAIR, RIGS, nominal, parameters_of, stated
-from trial.second.tables import markdown, measures, scores, targets, to_json
+from trial.labs import BITS, MISSING, RATES, Lab, noise_of, table
+from trial.marks import mark, place
+from trial.plant import Plant
+from trial.rig_kinds import PAIR, RIGS, nominal, parameters_of, stated
+from trial.tables import markdown, measures, scores, targets, to_json
 
 MODEL, TOLERANCE, SHOULDER = nominal("shoulder")
 SETTING = Setting(recordings=1, duration=6.0)
@@ -289,25 +289,44 @@ def test_search_reaches_strong_effects_or_their_bound(power, bound, expected):
         search(lambda _: float("inf"), 10.0, 1e6, 1.0)
 
 
-def test_write_goes_on_and_publishes_the_keys(tmp_path, capsys):
+def test_write_goes_on_and_publishes_the_keys(tmp_path, capsys, monkeypatch):
     # its first case is healthy and has no muscle
     def words(n):
-        plan = ["--plan", "second", "--cases", n, "--seed", "32", "--duration", "2"]
-        return ["write", str(tmp_path), *plan]
+        return ["write", str(tmp_path), "--cases", n, "--seed", "32", "--duration", "2"]
 
-    assert main([*words("1"), "--rig", "x.toml"]) == 2
+    with pytest.raises(SystemExit):
+        main([*words("1"), "--plan", "full"])
+    seen = []
+
+    def stored(case, out):
+        told = json.loads((tmp_path / "manifest.json").read_text())["keys"]
+        seen.append(told[case.name] == case.digest() and not (out / case.name).exists())
+        store(case, out)
+
+    monkeypatch.setattr("trial.plan.store", stored)
     assert main(words("1")) == 0
+    assert seen == [True], "the digest is there before the case"
     told = json.loads((tmp_path / "manifest.json").read_text())["keys"]
     key = (tmp_path / "keys" / "case_0001.json").read_bytes()
     assert told["case_0001"] == hashlib.sha256(key).hexdigest()
     (spec,) = specs(32, 1, 2.0)
     assert complete(tmp_path, spec, told)
     assert not complete(tmp_path, replace(spec, strength=77.0), told)
+    before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
+    assert main(words("1")) == 0
+    assert len(seen) == 1, "what is there is not made again"
+    (tmp_path / "keys" / "case_0001.json").write_text("{}")
+    next((tmp_path / "cases" / "case_0001").glob("*.csv")).unlink()
+    assert main(words("1")) == 0
+    assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
     capsys.readouterr()
     place = ["--keys", str(tmp_path / "keys"), "--results", str(tmp_path / "results")]
     assert main(["score", *place, "--json", str(tmp_path / "s.json")]) == 0
     assert "## Targets" in capsys.readouterr().out
     assert json.loads((tmp_path / "s.json").read_text())["all"]["missing"] == 1
+    (tmp_path / "manifest.json").write_text('{"schema": "other"}')
+    assert main(words("1")) == 2
+    assert "schema" in capsys.readouterr().err
 
 
 # ------------------------------------------------------------------------------------ scores

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from trial.second.marks import Mark
-from trial.second.peers import _one, peers_page
+from trial.marks import Mark
+from trial.peers import _one, peers_page
 
 TAGS = {"strength": ("10",), "model error": ("0 %",), "truth": ("effect",), "log": ()}
 

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from ..effects import Effect, Effects
-from ..pair.places import Placed
-from ..plant import Parameters, Plant
-from ..recording import CHANNELS, Array, Noise, Record, follow, run
-from ..rigfile import split
-from ..strength import FIRST, STRENGTHS
 from .design import Spec
 from .drive import Driver, course
+from .effects import Effect, Effects
 from .families import most
-from .rigs import RIGS, nominal, parameters_of
+from .pair.places import Placed
+from .plant import Parameters, Plant
+from .recording import CHANNELS, Array, Noise, Record, follow, run
+from .rig_kinds import RIGS, nominal, parameters_of
+from .rigfile import split
+from .strength import FIRST, MEDIUM
 
 #: part of a tolerance for the differences of the refit, and time between two of its rows [s]
 _STEP, _EVERY = 0.1, 0.05
@@ -220,7 +220,7 @@ class Bench:
             except (ArithmeticError, ValueError, OverflowError):
                 return math.inf
 
-        start = 2.0 * FIRST.get(effect.id, 1.0) * target / STRENGTHS["medium"]
+        start = 2.0 * FIRST.get(effect.id, 1.0) * target / MEDIUM
         return search(reached, target, bound, start)
 
 
@@ -277,7 +277,7 @@ _nobody = _Nobody()
 
 
 def _still(count: int) -> Any:
-    from ..excitation import Excitation
+    from .excitation import Excitation
 
     zero = np.zeros(count)
     return Excitation(zero, zero.astype(bool), zero, zero.astype(bool))

@@ -1,4 +1,4 @@
-"""How the rigs of the second plan are driven: courses of the reference and the controller."""
+"""How the rigs are driven: courses of the reference and the controller."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from ..excitation import Excitation, Loop, build
-from ..plant import Plant
-from .rigs import PAIR, RigKind
+from .excitation import Excitation, Loop, build
+from .plant import Plant
+from .rig_kinds import PAIR, RigKind
 
 Array = NDArray[np.floating]
 FREE = "free_log"

@@ -1,4 +1,4 @@
-"""What the cases of the second plan are: a design of strata, 24 cases to a round.
+"""What the cases of a plan are: a design of strata, 24 cases to a round.
 
 A round has every kind of truth and spreads strengths, rigs and ways to record over them at random,
 each as often as in any other round. Rounds follow one another, so that case k of a seed is the same
@@ -14,14 +14,14 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..effects.base import log_uniform
-from ..pair import course as pair_course
-from ..pair.places import PLACES, has_place
-from ..rigfile import split
 from .drive import FREE
+from .effects.base import log_uniform
 from .families import APART, BY_LABEL, FORMS, KNOWN, LATER, OTHER, UNLISTED, Form
 from .labs import BITS, MISSING, RATES, Lab
-from .rigs import PAIR, RIGS, RigKind, stated
+from .pair import course as pair_course
+from .pair.places import PLACES, has_place
+from .rig_kinds import PAIR, RIGS, RigKind, stated
+from .rigfile import split
 
 T = TypeVar("T")
 STRENGTHS = (1.5, 3.0, 10.0, 30.0, 100.0, 300.0)
@@ -90,7 +90,7 @@ _HELD = ("angle_steps", "slow_triangle")
 
 @dataclass(frozen=True)
 class Spec:
-    """What a case of the second plan is made from; `forms` are labels of :mod:`.families`,
+    """What a case is made from; `forms` are labels of :mod:`.families`,
     `strength` the noises that each of them leaves alone; of the parameters in `wrong`, with by how
     many tolerances they are off, the first is taken that leaves enough to be seen. `stated`: the
     rig file states the model error. `places`, of a pair: where each form acts, empty for what the

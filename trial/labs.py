@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..pair.places import SIDES
-from ..recording import Noise, Record
-from .rigs import PAIR, RigKind
+from .pair.places import SIDES
+from .recording import Noise, Record
+from .rig_kinds import PAIR, RigKind
 
 RATES = (50, 100, 200, 500, 1000)
 BITS = (10, 12, 14, 16)

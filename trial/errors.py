@@ -13,9 +13,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ..effects.base import Effect, Env, Port, State
-from ..pair.places import SIDES, Placed, has_place
-from .rigs import PAIR, RigKind
+from .effects.base import Effect, Env, Port, State
+from .pair.places import SIDES, Placed, has_place
+from .rig_kinds import PAIR, RigKind
 
 
 @dataclass(frozen=True)

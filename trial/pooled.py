@@ -1,4 +1,4 @@
-"""Scores of several trials of the second plan together: more cases in each stratum.
+"""Scores of several trials together: more cases in each stratum.
 
 A trial comes from the JSON of ``python -m trial score`` or, beside others, from a compressed table
 of scored cases, one JSON object a line with the name of its trial (``docs/proof/cases.jsonl.gz``).
@@ -13,8 +13,8 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from ..summary import percent, table
 from .marks import BlockMark, Mark
+from .summary import percent, table
 from .tables import SCHEMA, SHARES, scores, share_of, tables
 
 __all__ = ["CASES", "page", "pooled", "table_of_cases"]

@@ -1,4 +1,4 @@
-"""Make the cases of the second plan: files for the diagnosis, and the key with every size."""
+"""Make the cases of a plan: files for the diagnosis, and the key with every size."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..concealed import Case, stored_key
-from ..effects import Effect, Setting
-from ..pair.bench import PairBench
-from ..pair.places import BOTH, SIDES, Placed
-from ..recording import Noise
-from ..rigfile import draw_parameters, split
 from .bench import Bench, put
+from .concealed import Case, case_toml, stored_key
 from .design import Spec
+from .effects import Effect, Setting
 from .errors import model_errors, pair_errors, stated_lines
 from .families import BY_LABEL, UNLISTED, Form
 from .labs import Hole, holes, noise_of, table
-from .rigs import PAIR, RIGS, stated
+from .pair.bench import PairBench
+from .pair.places import BOTH, SIDES, Placed
+from .recording import Noise
+from .rig_kinds import PAIR, RIGS, stated
+from .rigfile import draw_parameters, split, value_of
 
 SCHEMA = "pamrs.trial-key/2"
 #: noises that a parameter far off is to leave
@@ -53,13 +53,6 @@ def bench_of(spec: Spec, true: dict[str, Any], tolerance: dict[str, float], nois
 def block_of(effect: Acting) -> str:
     """Block of the rig in which an effect shows: supply, chamber or arm."""
     return _SENSORS.get(effect.id) or _SHOWS.get(effect.block, "arm")
-
-
-def case_toml(recordings: tuple[tuple[str, str], ...]) -> str:
-    """The list of recordings of a case."""
-    parts = ['schema = "pamrs.case/1"\nrig = "rig.toml"\n']
-    parts += [f'[[recording]]\nfile = "{n}.csv"\nrole = "{role}"\n' for n, role in recordings]
-    return "\n".join(parts)
 
 
 def _chosen(
@@ -154,10 +147,8 @@ def _wrong_left(bench: Bench, name: str, model: dict[str, Any]) -> dict[str, flo
     return bench.left(plain, (name,))
 
 
-def make(spec: Spec, rig: Path | None = None) -> Case:
-    """Make one case in memory; the same spec gives the same bytes. `rig` is not used: a spec names
-    its own.
-    """
+def make(spec: Spec) -> Case:
+    """Make one case in memory; the same spec gives the same bytes."""
     model, kind = stated(spec.rig)[0], RIGS[spec.rig]
     noise = noise_of(spec.lab, kind, np.random.default_rng([spec.seed, 20260701]))
     bench, moved, wrong = _baseline(spec, noise)
@@ -187,8 +178,8 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
         },
         "wrong_parameters": {
             name: {
-                "nominal": _value(model, name),
-                "value": _value(true, name),
+                "nominal": value_of(model, name),
+                "value": value_of(true, name),
                 "tolerances": z,
             }
             for name, z in wrong.items()
@@ -205,12 +196,6 @@ def make(spec: Spec, rig: Path | None = None) -> Case:
         "case.toml": case_toml(spec.recordings),
     }
     return Case(spec.name, json.dumps(key, indent=1) + "\n", files)
-
-
-def _value(model: dict[str, Any], name: str) -> Any:
-    """A value of a nested model by its dotted name."""
-    section, key = split(name)
-    return model[section][key]
 
 
 def _named(error: Acting) -> str:

@@ -19,9 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..pair.places import SIDES
 from .families import UNLISTED
-from .marks import mark, result_of
+from .marks import keys_of, mark, result_of
+from .pair.places import SIDES
 
 #: what a missed case failed by
 SEARCH, WEIGHT, FORM, QUIET = "search", "weight", "form", "quiet"
@@ -66,8 +66,7 @@ class Inserted:
 
 def missed(keys: Path, results: Path) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
     """Keys and results of the cases whose leading name, or whose wrong parameter, was missed."""
-    for file in sorted(keys.glob("*.json")):
-        key = json.loads(file.read_text(encoding="utf-8"))
+    for key in keys_of(keys):
         result = result_of(results, str(key["case"]))
         if result is None:
             continue

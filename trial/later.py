@@ -11,7 +11,7 @@ from typing import ClassVar, Self
 
 import numpy as np
 
-from ..effects.base import (
+from .effects.base import (
     RECORDING_PERIOD,
     Effect,
     Env,
@@ -22,7 +22,7 @@ from ..effects.base import (
     either_sign,
     uniform,
 )
-from ..geometry import JointTables
+from .geometry import JointTables
 
 #: a lag below cannot be seen and would only make the equations stiff [s]
 _LEAST = 3.0e-4

@@ -1,4 +1,4 @@
-"""Scores of the second plan by stratum, beside their targets, as Markdown and as JSON."""
+"""Scores by stratum, beside their targets, as Markdown and as JSON."""
 
 from __future__ import annotations
 
@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
-from ..summary import percent, table
-from ..targets import mean_interval, median_interval, wilson
 from .families import OTHER
 from .marks import BLOCKS, BlockMark, Mark
+from .summary import mean_interval, median_interval, percent, table, wilson
 
 SCHEMA = "pamrs.trial-scores/2"
 BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 1.0)
