@@ -156,7 +156,7 @@ format:  ## rewrite the sources in the house's layout
 	$(BIN)/ruff check --quiet --fix $(PYTHON_SOURCES)
 	$(BIN)/ruff format $(PYTHON_SOURCES)
 
-bench: build $(VENV)/.bench  ## this package beside Numba, JAX, SciPy and its reference, to docs/benchmarks.md
+bench: build $(VENV)/.bench  ## this package beside Numba, JAX and SciPy, to docs/benchmarks.md
 	$(CARGO) bench --quiet --package pam-core $(LOCKED)
 	$(BIN)/python -m benchmarks.report --command "make bench"
 

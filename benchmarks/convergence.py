@@ -23,6 +23,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 import pamrs
+from benchmarks.pages import written
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 from tests.runs import FRICTIONLESS, RUNS, Run, misses
@@ -32,7 +33,6 @@ HALVINGS = 6
 #: Fraction of a range below which an error is that of rounding, for channels whose magnitude is at
 #: most so many ranges.
 ROUNDING, RANGES = 1e-12, 50.0
-COMMAND = "make convergence"
 DEGREE = math.pi / 180.0
 GROUPS = {
     "pressures": ("muscle_pressure", "supply_pressure", "line_pressure", "segment_pressure"),
@@ -291,50 +291,6 @@ def table(head: list[str], rows: list[list[str]]) -> list[str]:
     return [f"| {' | '.join(line)} |" for line in lines]
 
 
-TEXT = f"""\
-# Convergence
-
-Made by `{COMMAND}` (`python -m benchmarks.convergence docs`). Errors are the largest of any row, \
-in fractions of the channel's range.
-
-The core takes fourth-order Runge-Kutta steps of fixed length: 1 ms at most where nothing else is \
-said, each divided into equal parts
-where the rig is stiffer. The order is measured over halved steps of a smooth run: in motion from \
-the start, no joint that turns back,
-no flow that becomes choked, no stop. The errors at 1 ms are those of a working run that fills, \
-vents, turns back and chokes, against
-a step 64 times finer.
-
-{{packaged}}
-
-Where the order is less, something is not smooth:
-
-- A muscle's friction: its elements stick or slip from one step to the next (the antagonists as \
-they come).
-- Coulomb friction where a joint turns back: it changes its direction over `coulomb_speed`, which \
-light links pass in less than 1 ms.
-  All of the two-joint arm's error comes from there; without it 4e-8 is left.
-- The positive work at the joints, which has a kink there: order two.
-- A flow that turns round: next to equal pressures, above a ratio of 0.999, its law is linear, and \
-a fast pressure passes both kinks in
-  one step. That is the largest error of the table, in the air that a regulator relieves while its \
-outlet rises from 0 bar.
-- A front in a long tube: behind it friction turns from laminar to turbulent, in one segment after \
-the other.
-
-Small volumes behind the shoulder's valve, at the same 1 ms. The errors are those against the \
-independent reference
-(`tests/reference`: other code, implicit and adaptive, tolerance 1e-10), so that they speak for \
-the equations too. The smallest volume
-is stable, but at a price: the explicit steps follow a rate that has died away long before \
-anything happens.
-
-{{stiff}}
-
-![Error against step](convergence.png)
-"""
-
-
 # ------------------------------------------------------------------ picture
 
 
@@ -433,7 +389,7 @@ def main() -> None:
         ],
         rows,
     )
-    text = TEXT.format(packaged="\n".join(packaged), stiff="\n".join(volumes))
+    text = written("convergence", packaged="\n".join(packaged), stiff="\n".join(volumes))
     (out / "convergence.md").write_text(text, encoding="utf-8")
     draw(
         smooth,

@@ -1,4 +1,4 @@
-"""What the benchmarks run on: processor, versions, and what it can do at most."""
+"""What the benchmarks run on: processor, versions."""
 
 from __future__ import annotations
 
@@ -7,25 +7,11 @@ import os
 import platform
 import re
 import subprocess
-import time
-from collections.abc import Callable
 from pathlib import Path
 
-import numpy as np
-
-__all__ = ["best", "commit", "describe", "peaks", "versions"]
+__all__ = ["commit", "describe", "versions"]
 
 PACKAGES = ("numpy", "scipy", "numba", "llvmlite", "jax", "jaxlib", "diffrax")
-
-
-def best(work: Callable[[], object], calls: int) -> float:
-    """Shortest of some calls [s]."""
-    times = []
-    for _ in range(calls):
-        start = time.perf_counter()
-        work()
-        times.append(time.perf_counter() - start)
-    return min(times)
 
 
 def describe() -> dict[str, str]:
@@ -72,24 +58,3 @@ def commit() -> str:
         return subprocess.run(words, check=True, capture_output=True, text=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return "no repository"
-
-
-def peaks() -> dict[str, float]:
-    """Multiply-adds of a matrix product [flop/s] and bandwidth of a triad [B/s], on one core.
-
-    The product counts as the peak of the arithmetic; NumPy's library must be held to one thread.
-    The triad ``a = b + s c`` over 192 MiB is done in two passes, of two and of three streams.
-    """
-    size = 768
-    generator = np.random.default_rng(1)
-    one, other = generator.random((size, size)), generator.random((size, size))
-    out = np.empty((size, size))
-    product = best(lambda: np.matmul(one, other, out=out), 100)
-    count = 8 * 2**20
-    a, b, c = np.zeros(count), np.ones(count), np.ones(count)
-
-    def triad() -> None:
-        np.multiply(c, 3.0, out=a)
-        np.add(a, b, out=a)
-
-    return {"flops": 2.0 * size**3 / product, "bytes": 5.0 * 8.0 * count / best(triad, 30)}

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pamrs
+from benchmarks.pages import written
 from pamrs.control import ClosedLoop, Recruitment, RigController, RigModel, closed_loop
 from pamrs.control.trajectories import cosine_cycles, degrees
 from pamrs.rig import Rig
@@ -297,56 +298,23 @@ def _table(lifts: dict[str, Lift], volume: float) -> list[str]:
 
 def page(found: dict[str, dict[str, Lift]], volume: float, sizes: Sequence[Scaled]) -> str:
     """The page, Markdown."""
-    lines = ["# Recruitment in real time", "", _HEAD.format(top=TOP), ""]
-    lines += ["![One heavy piece](recruitment.png)", ""]
+    profiles: list[str] = []
     for name, lifts in found.items():
         payloads = ", ".join(f"{mass:g}" for mass in PROFILES[name])
-        lines += [f"## {name}: {payloads} kg", "", *_table(lifts, volume), ""]
-    lines += [*_WORDS, "", "## Bundles of many small muscles", "", _SCALING, ""]
-    lines += [
+        profiles += [f"## {name}: {payloads} kg", "", *_table(lifts, volume), ""]
+    bundles = [
         "| muscles, a valve each | made [s] | a simulated second [s] | one update [ms] | "
         "efficiency | rms [deg] | most active | changes |",
         "|---|---|---|---|---|---|---|---|",
     ]
-    lines += [
+    bundles += [
         f"| {one.muscles} | {one.made:.2f} | {one.second:.3f} | {1e3 * one.update:.2f} | "
         f"{100 * one.efficiency:.1f} % | {one.rms:.2f} | {one.most} | {one.changes} |"
         for one in sizes
     ]
-    return "\n".join(lines) + "\n"
-
-
-_HEAD = (
-    "Written by `python -m benchmarks.recruitment docs` (`make recruitment`). The rig "
-    "`recruitment`: three pairs of muscles on the shoulder, a valve each, one tank of 15 l at 13.8 "
-    "bar.\nCycles of 6.4.2 (6 s up to {top:.0f} deg, 5 s hold, 6 s down, 5 s hold); the payload "
-    "changes between them. The law of motion (sliding) knows the payload, the scheduler\n"
-    "(`pamrs.control.Recruitment`) does not: it sees the torque that the law asks for. Work is "
-    "(6.7), energy (6.8), what the tank has lost."
-)
-_WORDS = [
-    "`changes` counts how often the number of active pairs changed. What the tables show:",
-    "",
-    "- As few pairs as possible take the least air, where they can lift at all. Of all that follow "
-    "in every cycle, those in real time take the least.",
-    "- When pairs come and go matters as much as how many there are. One that comes in the middle "
-    "of a lift is filled to several bar while the others\n  give air away; one that goes on the "
-    "way down leaves the others to be filled. Told how far it lifts (`reach`), the scheduler adds "
-    "at the bottom,\n  where the pressures are low, and keeps the pairs until less hangs on the "
-    "arm.",
-    "- By rates alone it is better to drop late (`drop_at` 0.3 in the place of 0.7), when there is "
-    "little air in the pair.",
-    "- A pair that is not used has to be open to the ambient: held at zero by a pressure loop it "
-    "is drawn out by the others, and fed from the tank.",
-]
-_SCALING = (
-    "The six muscles as N thinner ones of the same length, braid and sum of cross-sections, valves "
-    "and dead volumes as parts of the same sum, of which\nat least a sixth stays active. One lift "
-    "of 27 kg, recruited in real time. Processor time on a machine shared with other work; a valve "
-    "for each muscle\ncosts in proportion to their number. Finer steps use fewer of them (nine "
-    "of 24 in the place of three of six) at a higher pressure, and save a point of efficiency at "
-    "most."
-)
+    return written(
+        "recruitment", top=TOP, profiles="\n".join(profiles).rstrip(), bundles="\n".join(bundles)
+    )
 
 
 def draw(lifts: dict[str, Lift], sizes: Sequence[Scaled], path: Path) -> None:

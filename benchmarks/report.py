@@ -21,7 +21,6 @@ os.environ["XLA_FLAGS"] = "--xla_cpu_multi_thread_eigen=false intra_op_paralleli
 
 from . import machine
 from .goals import goals, one_step, table_and_solve
-from .limit import limit
 from .page import Results, page
 from .scaling import over_size, over_threads
 
@@ -29,7 +28,7 @@ ROOT = Path(__file__).parents[1]
 SIZES = [10**k for k in range(7)]
 
 
-def measure(command: str, repeats: int, sizes: list[int], reference: list[str]) -> Results:
+def measure(command: str, repeats: int, sizes: list[int], alone: list[str]) -> Results:
     """Measure all of it; each part says that it begins."""
 
     def say(part: str) -> None:
@@ -44,9 +43,7 @@ def measure(command: str, repeats: int, sizes: list[int], reference: list[str]) 
     say("scaling")
     few = max(3, repeats // 3)
     by_size, by_threads = over_size(sizes, few), over_threads(few)
-    say("limit")
-    share = limit(repeats)
-    say(f"reference: {', '.join(reference) or 'left out'}")
+    say(f"without a peer: {', '.join(alone) or 'left out'}")
     return Results(
         command=command,
         machine=known,
@@ -57,16 +54,15 @@ def measure(command: str, repeats: int, sizes: list[int], reference: list[str]) 
         look=look,
         sizes=by_size,
         threads=by_threads,
-        limit=share,
-        reference=beside_reference(reference),
+        alone=printed(alone),
     )
 
 
-def beside_reference(names: list[str]) -> str:
-    """Lines of ``benchmarks.bench``."""
+def printed(names: list[str]) -> str:
+    """Lines of ``benchmarks.alone``."""
     if not names:
         return ""
-    words = [sys.executable, "-m", "benchmarks.bench", *names]
+    words = [sys.executable, "-m", "benchmarks.alone", *names]
     return subprocess.run(words, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout
 
 
@@ -85,16 +81,16 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=15, help="turns of each work")
     parser.add_argument("--quick", action="store_true", help="three turns, small batches")
     parser.add_argument(
-        "--reference",
+        "--alone",
         nargs="*",
         metavar="NAME",
-        default=["import", "force", "simulate", "loop", "diagnose"],
-        help="parts of benchmarks.bench that are run too; no name: none",
+        default=["import", "loop", "diagnose"],
+        help="parts of benchmarks.alone that are run too; no name: none",
     )
     parser.add_argument("--command", default="python -m benchmarks.report", help="on the page")
     given = parser.parse_args()
     repeats, sizes = (3, SIZES[:3]) if given.quick else (given.repeats, SIZES)
-    results = measure(given.command, repeats, sizes, given.reference)
+    results = measure(given.command, repeats, sizes, given.alone)
     given.out.write_text(page(results), encoding="utf-8")
     given.out.with_suffix(".json").write_text(as_json(results), encoding="utf-8")
     print(f"{given.out} and {given.out.with_suffix('.json')}")

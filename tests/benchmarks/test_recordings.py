@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.real import (
+from benchmarks.recordings import (
     CHAMBERS,
     LEAKING,
     arm_text,

@@ -1,5 +1,5 @@
-"""``python -m benchmarks.real OUT --page PAGE``: what the diagnosis says about the recordings of
-others, as one page of budgets.
+"""``python -m benchmarks.recordings OUT --page PAGE``: what the diagnosis says about the recordings
+of others, as one page of budgets.
 
 Seven sealed chambers and four cylinders (Zillen, TU Delft) and the base joint of a four-joint arm
 (Shaj et al., on the arm of Buechler et al.). The recordings are read where they are; nothing of
@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import pamrs
+from benchmarks.pages import written
 from cases.zillen_cylinders.compare import compare_friction_laws
 from cases.zillen_cylinders.laws import fit_cylinder_friction
 from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder
@@ -271,72 +272,6 @@ def chamber_mark(name: str, told: dict[str, Any]) -> str:
 
 # ---------------------------------------------------------------------------- page
 
-INTRO = """# Budgets of the recordings of others
-
-Recordings that other laboratories made and published; they are read in place and are no part of
-this repository ([cases](../../cases)). There is no key. What is known of each rig is said in one
-sentence, and the answer is marked **right**, **wrong** or **cannot tell**.
-
-Made by
-
-```
-python -m benchmarks.real out/real --page docs/proof/real_recordings.md
-```
-
-A share is of the mean square error above the noise that the nominal model leaves, on held-out
-recordings where there are some. Errors are root mean squares.
-"""
-
-CHAMBER_WORDS = """## Seven sealed chambers (E. Zillen, TU Delft, 2021)
-
-One aluminium chamber and six printed ones are filled to about 7.5 bar and shut off. One recording
-each, so that nothing is held out: errors are those of the fit. The appendix of the thesis compares
-printing methods by how well they hold pressure; it gives no law of the leak and no volume.
-"""
-
-CHAMBER_AFTER = """
-- There is nothing in these shares of friction, hysteresis or a unit of pressure: no block but the
-  chamber is recorded, and the unit is documented.
-- **The law of the leak.** Told from the slope of the pressure alone, both leaks follow the gauge
-  pressure to a power between 1.0 and 1.3, not the laminar law. Until this page was made the answer
-  for Ultimaker_020 was the laminar law with 6.6 ± 0.5 s, which left 8.5 kPa: the fit of form
-  `power` began at a conductance 20 times too small and did not move. It begins at the size
-  that takes most now (docs/decisions/0013). What is left
-  of 020 is still three times what the form can reach (0.42 kPa at an exponent of 1.10).
-- The volumes are unknown, so that conductances are not determined; an exponent does not depend on
-  the volume. Its interval for Ultimaker_015 is that of a model that still misses 2.5 noises, and
-  says nothing of the law's own error.
-"""
-
-CYLINDER_WORDS = """## Four cylinders (E. Zillen, TU Delft, 2021)
-
-Printed cylinders whose pistons are pulled at constant pressures of 1 to 7 bar. They are no muscles,
-and `pamrs diagnose` does not take them: the case's own fit judges them. The nominal model is the
-piston's area times the pressure and no friction; each pressure is predicted from the others by a
-friction that is constant and by one that is linear in the pressure. Intervals draw the three to
-seven pressures again, and are rough. Errors: noise / no friction / constant / linear.
-"""
-
-CYLINDER_AFTER = """
-The abstract of the published article (PMC10907517) says that each test ran once and gives the
-largest friction, not its law; nothing independent is known of the law. The recordings themselves
-show friction that grows with pressure and a peak at breakaway.
-
-- Circle: dependence on pressure is named, and the recordings show it: **right**, as far as they go.
-- Kidney_lc and O-ring257: probable and not named, since speed falls as pressure rises:
-  **cannot tell**, as it says.
-- X-ring257: friction doubles from 5 to 7 bar, which no law here predicts; what is unexplained is
-  large, as it should be: **cannot tell**.
-- Hysteresis in the usual sense (force up against force down) is friction here by construction: the
-  half difference of two strokes. No share of it can be told apart.
-"""
-
-ARM_WORDS = """## The arm pam_arm_shaj (Shaj et al. 2020, on the arm of Buechler et al. 2016)
-
-The base joint: two pressures in, one angle out; 8 short episodes to fit, 4 held out. The unit of
-the pressures and the sample rate are not documented: every line assumes another unit.
-"""
-
 
 def arm_text(told: dict[float, dict[str, Any]], parts: dict[float, dict[str, float]]) -> str:
     """What the budgets of the arm under several units say."""
@@ -364,25 +299,20 @@ def arm_text(told: dict[float, dict[str, Any]], parts: dict[float, dict[str, flo
     answer = (
         "**cannot tell**, as it says" if not named else "**wrong**: a guess of the unit names it"
     )
-    return f"""
-- **Friction**: dry and viscous friction of the joint are parameters of the rig file, so that they
-  are no missing effect. Of the error's mean square, by values put back one group at a time:
-  {split}.
-- **Hysteresis**: no share can be given. It is not named under any unit.
-- **Unit of pressure**: with nominal values the assumed unit changes the error from
-  {min(nominal):.0f} to {max(nominal):.0f} mrad; after the refit from {min(refit):.0f} to
-  {max(refit):.0f} mrad, {_percent(hangs)} of the nominal mean square at {next(iter(told)):g} bar.
-  Friction and inertia take up the rest of a wrong unit: only their ratio to it shows in the angle.
-  So what is friction's at one unit is inertia's at another, and no share of friction holds.
-- **At the wall** under at least one unit: {", ".join(walls) or "nothing"}.
-- **What is known**: the moving masses of this arm are below 0.7 kg (Buechler et al. 2016), and in
-  36 % of the rows the joint is exactly still, so that there is dry friction. An arm of 0.5 m and
-  that mass has an inertia of 0.06 kg m2 (a rod) to 0.18 kg m2 (all at the end). The placeholder,
-  0.3 ± 0.045 kg m2, is above both; refitted it is {inertia}. The tool does not
-  call it wrong: where the unit is free, so is the inertia, and the rig file holds it too tightly.
-- **Mark**: {verdicts}. Geometry, unit and rate are unknown:
-  {answer}.
-"""
+    return written(
+        "arm",
+        split=split,
+        nominal_low=min(nominal),
+        nominal_high=max(nominal),
+        refit_low=min(refit),
+        refit_high=max(refit),
+        hangs=_percent(hangs),
+        first=next(iter(told)),
+        walls=", ".join(walls) or "nothing",
+        inertia=inertia,
+        verdicts=verdicts,
+        answer=answer,
+    )
 
 
 def page(cases: Path, recordings: Path, out: Path, say: Say, units: Sequence[float] = UNITS) -> str:
@@ -424,28 +354,20 @@ def page(cases: Path, recordings: Path, out: Path, say: Say, units: Sequence[flo
         (out / f"{key}.json").write_text(json.dumps(told), encoding="utf-8")
     rubbing = cylinder_rows(zillen / "results_pneumatic-actuator" / "data" / "friction")
     known = [(name, chamber_mark(name, told)) for name, told in chambers.items()]
-    return "\n".join(
-        [
-            INTRO,
-            CHAMBER_WORDS,
-            table(HEAD, [_row(n, d) for n, d in chambers.items()]),
-            "",
-            table(("chamber", "known, and the mark"), known),
-            CHAMBER_AFTER,
-            CYLINDER_WORDS,
-            table(("cylinder", *HEAD[1:4], "held-out error", "s"), rubbing),
-            CYLINDER_AFTER,
-            ARM_WORDS,
-            table(("assumed unit", *HEAD[1:]), [_row(f"{u:g} bar", d) for u, d in arms.items()]),
-            arm_text(arms, parts),
-        ]
+    return written(
+        "recordings",
+        chambers=table(HEAD, [_row(n, d) for n, d in chambers.items()]),
+        known=table(("chamber", "known, and the mark"), known),
+        cylinders=table(("cylinder", *HEAD[1:4], "held-out error", "s"), rubbing),
+        arms=table(("assumed unit", *HEAD[1:]), [_row(f"{u:g} bar", d) for u, d in arms.items()]),
+        arm=arm_text(arms, parts),
     )
 
 
 def main(words: list[str] | None = None) -> int:
     """Run the command line; 0 when the page is written, 2 when the input is wrong."""
     parser = argparse.ArgumentParser(
-        prog="python -m benchmarks.real", description="Budgets of the recordings of others."
+        prog="python -m benchmarks.recordings", description="Budgets of the recordings of others."
     )
     parser.add_argument("out", type=Path, help="folder for the arm's cases and the results")
     parser.add_argument("--cases", type=Path, default=Path("cases"), help="(default: cases)")
