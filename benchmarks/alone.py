@@ -78,7 +78,7 @@ def loop() -> None:
         lambda: closed_loop(rig, PID(4.0, 1.0, 0.2, period=PERIOD), wanted, DURATION),
     )
     show(
-        "  beside it a loop of ten lines",
+        "  the same, a loop of ten lines",
         lambda: pamrs.Simulator(rig, sample_time=PERIOD).control(Loop(4.0, 1.0), DURATION),
     )
     axes = {"kp": np.linspace(0.5, 20.0, 40), "ki": np.linspace(0.0, 20.0, 40)}

@@ -98,7 +98,7 @@ def goal_table(goals: list[Goal]) -> str:
     """The goals with a peer."""
     rows = [
         (
-            f"{goal.work}, beside {goal.peer}",
+            f"{goal.work}, against {goal.peer}",
             seconds(goal.ours),
             seconds(goal.theirs),
             spread(goal.ratio),

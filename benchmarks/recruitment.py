@@ -37,7 +37,7 @@ PROFILES = {
 SHOWN = "one heavy piece"
 #: Of the scheduler: a name, and its arguments.
 SCHEDULERS = {
-    "in real time, told how far it lifts": {"reach": math.radians(TOP)},
+    "in real time, knowing how far it lifts": {"reach": math.radians(TOP)},
     "the same, with little to spare": {
         "reach": math.radians(TOP),
         "add_at": 1.0,

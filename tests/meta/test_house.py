@@ -235,7 +235,7 @@ def test_decisions_that_are_referred_to_exist():
         *ROOT.glob("*.md"),
         *(
             path
-            for folder in folders
+            for folder in (*folders, "reproduction")
             for path in (ROOT / folder).rglob("*")
             if path.suffix in (".py", ".rs", ".md", ".toml")
         ),

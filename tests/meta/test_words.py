@@ -29,9 +29,9 @@ PRIVATE = {
 }
 FOUND = re.compile(rf"\b(?:{'|'.join(PRIVATE)})\b", re.IGNORECASE)
 
-#: Pages that a program writes from results that are kept, and packages that wait for their turn.
-WRITTEN = ("docs/reproduction/", "docs/benchmarks.md", "docs/recruitment.md")
-LATER = ("reproduce/", "comparison.py", "diagnosis/settings/")
+#: Pages of the reproduction, whose tables stay as they are, and modules that wait for their turn.
+WRITTEN = "docs/reproduction/"
+LATER = ("comparison.py", "diagnosis/settings/")
 
 
 def private_words(text):
