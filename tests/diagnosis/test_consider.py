@@ -76,7 +76,7 @@ def test_it_is_told_in_text_and_json(asked: pamrs.Diagnosis) -> None:
         list(own.names) for own in asked.considered
     ]
     said = " ".join(asked.summary().split())
-    assert "Asked for: base flexibility: where it acts, no block keeps more than noise" in said
+    assert "Asked for: base flexibility: only noise is left in the blocks where it acts" in said
 
 
 def test_without_a_mismatch_there_is_nothing_to_explain() -> None:

@@ -129,8 +129,8 @@ def test_a_gap_says_which_channels_it_is_over() -> None:
 
 def test_residuals_of_both_signs_do_not_cancel() -> None:
     swings = 20.0 * np.sin(np.linspace(0.0, 6 * np.pi, 300))
-    assert _sign(swings, rising=False) == ", measured above and below the model"
-    assert _sign(swings, rising=True) == ", measured rising and falling against the model"
-    assert _sign(np.abs(swings), rising=False) == ", measured above the model"
-    assert _sign(-np.abs(swings), rising=True) == ", measured falling against the model"
+    assert _sign(swings, rising=False) == ", where the measurement lies above and below the model"
+    assert _sign(swings, rising=True) == ", where the measurement rises and falls against the model"
+    assert _sign(np.abs(swings), rising=False) == ", where the measurement lies above the model"
+    assert _sign(-np.abs(swings), rising=True) == ", where the measurement falls against the model"
     assert _sign(0.01 * swings, rising=False) == ""  # noise has no side

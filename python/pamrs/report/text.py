@@ -93,10 +93,10 @@ SETTLED = 0.75
 settled, `VerdictSettings.settled`)."""
 
 BUDGET_NOTE = (
-    "A share is of the variance beyond the noise that the nominal model leaves, with all values as "
-    "in the final model. Parameters come first, by themselves; what they leave goes to the names. "
-    "Several names share it in proportion to the squares of what each changes in the prediction. "
-    "Below 0 % a step predicts worse, and others then take more than 100 %."
+    "Shares are of the variance that the nominal model leaves beyond the noise; all values are "
+    "those of the final model. Parameters come first, the rest goes to the names, in proportion "
+    "to the squares of what each changes in the prediction. A share below 0 % makes the "
+    "prediction worse; others are then above 100 %."
 )
 """What the shares of a budget are."""
 
@@ -292,7 +292,7 @@ def considered_sentence(own: Considered) -> str:
     """
     names = set_label(own.names)
     if not own.blocks:
-        return f"{names}: where it acts, no block keeps more than noise"
+        return f"{names}: only noise is left in the blocks where it acts"
     blocks = " and ".join(map(spoken_name, own.blocks))
     if own.left is None:
         return (

@@ -202,8 +202,8 @@ def describe(
         time = float(mask.mean())
         mean = float(z[mask].mean())
         text = (
-            f"{name}: {100 * share:.0f} % of what exceeds the noise, in {100 * time:.0f} % of the "
-            f"time{_sign(z[mask], rising=block.window is not None)}"
+            f"{name}: {100 * share:.0f} % of the excess over the noise, in {100 * time:.0f} % of "
+            f"the time{_sign(z[mask], rising=block.window is not None)}"
         )
         picture.conditions.append(Condition(name, share, time, mean, text))
     picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
@@ -221,11 +221,12 @@ def _sign(z: Array, *, rising: bool) -> str:
     """
     mean, size = float(z.mean()), float(np.sqrt(np.mean(z**2)))
     if abs(mean) > max(_ONE_SIDED * size, 2.0 / math.sqrt(z.size)):
-        words = ("falling against", "rising against") if rising else ("below", "above")
-        return f", measured {words[mean > 0.0]} the model"
+        words = ("falls against", "rises against") if rising else ("lies below", "lies above")
+        return f", where the measurement {words[mean > 0.0]} the model"
     if size < 1.0:
         return ""
-    return f", measured {'rising and falling against' if rising else 'above and below'} the model"
+    both = "rises and falls against" if rising else "lies above and below"
+    return f", where the measurement {both} the model"
 
 
 def _change(values: Array, rows: NDArray[np.bool_], width: int) -> Array:

@@ -449,11 +449,10 @@ def reservations(
             what = "the effect" if j.named else "the other value"
             times = error.after / error.noise
             why = "its equation is not the whole truth" if j.named else "something else acts"
-            name = "" if j.ambiguity else "the name remains, "
+            name = "" if j.ambiguity else "the name remains, but "
             out.append(
                 f"with {what} the model still misses {spoken_name(channel)} by {times:.2g} "
-                f"times the noise level: {name}{why}, and standard deviations hold only as far as "
-                "that matters little"
+                f"times the noise level: {name}{why}, and standard deviations do not include that"
             )
     named = [c for c in chosen if any(id_of(effect) in CATALOGUE for effect in c.effects)]
     far = settings.moved_tolerances
