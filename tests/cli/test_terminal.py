@@ -1,5 +1,6 @@
 """What files say is printed as text: no name moves a cursor, forges a line or is markup."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -42,6 +43,49 @@ def test_names_of_a_case_are_text(fault):
         assert case.name == "[/foo]"
     else:
         assert case.name == r"\x1b]0;pwn\x07\x1b[2J\x1b[31mred\r\nfake: verdict none"
+
+
+@pytest.mark.parametrize("fault", ["19_name_markup", "20_terminal_escape"])
+def test_a_diagnosis_on_a_terminal_prints_names_as_text(fault, tmp_path):
+    """Progress and result, as a person sees them."""
+    pty = pytest.importorskip("pty")
+    ours, theirs = pty.openpty()
+    words = [sys.executable, "-m", "pamrs", "diagnose", str(FAULTS / fault), "--json", "a.json"]
+    paths = str(Path(pamrs.__file__).parents[1])
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdin=theirs, stdout=theirs, stderr=theirs,
+        env={**os.environ, "PYTHONPATH": paths, "TERM": "xterm"},
+    ) as running:  # fmt: skip
+        os.close(theirs)
+        seen = b""
+        with contextlib.suppress(OSError):  # the other end is closed
+            while part := os.read(ours, 65536):
+                seen += part
+    os.close(ours)
+    assert running.returncode == 0
+    assert (tmp_path / "a.json").stat().st_size > 1000
+    name = pamrs.load_case(FAULTS / fault).name
+    assert name.encode() in seen
+    assert b"Traceback" not in seen
+    assert not any(mark in seen for mark in (b"\x1b]0;", b"\x1b[2J", b"\x07"))
+    assert not any(line.startswith(b"fake:") for line in seen.split(b"\n"))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is needed")
+@pytest.mark.parametrize("stream", [">&-", "2>/dev/full"])
+def test_a_diagnosis_is_written_although_it_cannot_be_told(stream, tmp_path):
+    shell = f'exec "$0" -m pamrs diagnose "$1" --json a.json {stream}'
+    done = subprocess.run(
+        ["sh", "-c", shell, sys.executable, str(FAULTS / "19_name_markup")],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(Path(pamrs.__file__).parents[1])},
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == cli.NOT_WRITTEN
+    assert (tmp_path / "a.json").stat().st_size > 1000
+    assert b"Traceback" not in done.stdout + done.stderr
+    assert b"Diagnosis of [/foo]" in done.stdout + done.stderr
 
 
 def test_a_command_sends_no_control_characters(capsys, tmp_path):

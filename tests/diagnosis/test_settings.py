@@ -27,6 +27,7 @@ CONSTANTS = {
     "prepare/_signals.py": {"_TERMS"},  # of a cubic
     "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
     "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
+    "prepare/_rails.py": {"_TOLD"},  # recordings that a message counts
     "next_experiment/_chains.py": {"_LEAST_SHARE"},  # of the choked flow
     "explain/_conditions.py": {"_MAP_CELLS", "_ONE_SIDED"},  # of a picture and of words
     "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import math
 from collections.abc import Callable
@@ -13,12 +14,16 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.prepare import prepare, without_rails
+from pamrs.diagnosis.fit import Problem, fit
+from pamrs.diagnosis.noise import excess, noise_levels
+from pamrs.diagnosis.prepare import available_blocks, prepare, without_rails
 from pamrs.diagnosis.result import schema
+from pamrs.diagnosis.search import misread
 from pamrs.diagnosis.settings import DiagnosisSettings, PlausibilitySettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Case, Recording
 from pamrs.report import render_html
+from pamrs.simulation import core_rig
 
 HERE = Path(__file__).parent
 ROOT = Path(pamrs.__file__).parent / "rigs"
@@ -33,8 +38,12 @@ def test_a_clipped_gauge_is_masked_in_all_recordings_and_said_first() -> None:
     found = pamrs.diagnose(case)
     assert found.verdict in ("none", "parameters")
     assert not found.effects
-    assert "muscle_pressure is clipped: its sensor's range ends at 6 bar" in found.warnings[0]
-    assert all(f" in {name}" in found.warnings[0] for name in "abc")
+    (clipped,) = found.faulty
+    assert (clipped.channel, clipped.kind) == ("muscle_pressure", "clipped")
+    claim = "muscle_pressure is clipped: its sensor's range ends at 6 bar"
+    assert clipped.text.startswith(claim)
+    assert all(f" in {name}" in clipped.text for name in "abc")
+    _says_first(found, claim)
     assert all(u.masked["muscle_pressure"] > 0.03 for u in found.data)
 
 
@@ -74,13 +83,23 @@ def test_an_absolute_pressure_as_gauge_is_said_first_and_nothing_is_named() -> N
     _says_nothing_else(found, "muscle_pressure is likely absolute and not gauge")
 
 
-def _says_nothing_else(found: pamrs.Diagnosis, claim: str) -> None:
-    """The text, the page and JSON begin with the unit, and have no name beside it."""
-    assert found.summary().splitlines()[1].startswith(claim[:60])
-    assert claim.replace("_", " ") in render_html(found).replace("_", " ")
-    jsonschema.validate(json.loads(found.to_json()), schema())
+def _says_first(found: pamrs.Diagnosis, claim: str) -> None:
+    """The text, the page and JSON begin with what is wrong with a channel."""
+    assert claim in found.headline[: len(claim) + 60]
+    assert found.summary().splitlines()[1].startswith(found.headline[:60])
+    page = html.unescape(render_html(found))
+    heading = page[page.index("<h1>") : page.index("</h1>")]
+    assert claim.replace("_", " ") in heading.replace("_", " ").replace("²", "2")
     written = json.loads(found.to_json())
-    assert claim in written["misread"][0]["text"]
+    jsonschema.validate(written, schema())
+    first = [*written["faulty"], *written["misread"]][0]
+    assert claim in first["text"]
+    assert list(written).index("faulty") < list(written).index("where")
+
+
+def _says_nothing_else(found: pamrs.Diagnosis, claim: str) -> None:
+    """The unit stands first, and nothing is named beside it."""
+    _says_first(found, claim)
     assert not found.effects
     assert not found.wrong_parameters
     assert {block.verdict for block in found.blocks} == {"not_judged"}
@@ -103,6 +122,54 @@ def test_volts_labelled_millivolts_are_told() -> None:
     assert found.misread[0].channels == ["valve_command"]
     assert found.misread[0].likely == "V"
     assert found.misread[0].factors == pytest.approx([1e3])
+
+
+KGF = 0.980665
+"""bar in a kgf/cm2."""
+
+
+def _in_bar(gains: dict[str, float]) -> Case:
+    """A sound rig whose log says bar, and whose gauges read by these factors more."""
+    case = _as(_healthy(lambda _: None), gains)
+    said = dict.fromkeys(("supply_pressure", "muscle_pressure"), "bar")
+    return replace(case, recordings=[replace(r, said=r.said | said) for r in case.recordings])
+
+
+def test_kgf_labelled_bar_is_told_beside_a_gain() -> None:
+    """Parameters inside their tolerances take up most of 2 %: a free factor tells."""
+    found = pamrs.diagnose(_in_bar({"supply_pressure": 1.0 / KGF}))
+    assert found.verdict == "units"
+    (read,) = found.misread
+    assert (read.channels, read.said, read.likely) == (["supply_pressure"], "bar", "kgf/cm2")
+    assert read.factors == pytest.approx([KGF])
+    _says_nothing_else(found, "likely in kgf/cm2, not in bar")
+    assert "another gain: " in read.text
+    assert "kgf/cm2 over bar is 0.9807" in read.text
+
+
+@pytest.mark.parametrize(
+    ("gains", "told"),
+    [
+        ({}, False),
+        ({"supply_pressure": 0.99}, False),
+        ({"supply_pressure": 1.03}, False),
+        ({"muscle_pressure": 1.01}, False),
+        ({"supply_pressure": 1.0 / KGF}, True),
+        # of the muscle's gauge values inside tolerance make up for 2 %
+        ({"muscle_pressure": 1.0 / KGF}, False),
+    ],
+)
+def test_a_gain_is_a_unit_only_where_the_list_has_it(gains: dict[str, float], told: bool) -> None:
+    problem, rig = _problem(_in_bar(gains))
+    assert (misread(problem, rig) is not None) is told
+
+
+def _problem(case: Case) -> tuple[Problem, pamrs.Rig]:
+    """The recordings as they are judged, and the rig."""
+    settings = DiagnosisSettings()
+    prepared = [prepare(r, case.rig, settings) for r in case.recordings]
+    blocks = available_blocks(case.rig, case.channels, settings.prepare)
+    return Problem(blocks, prepared, core_rig(case.rig), settings), case.rig
 
 
 @pytest.mark.parametrize("grid", [0.002, 0.005])
@@ -143,21 +210,46 @@ def _healthy(change: Callable[[dict[str, np.ndarray]], None]) -> pamrs.recording
     return replace(case, recordings=spoilt)
 
 
+def _rounded(case: Case, place: float) -> Case:
+    """Eight bits of 16 bar and of 180 deg, whose steps lie at a place."""
+    steps = {"supply_pressure": 6250.0, "muscle_pressure": 6250.0, "joint_angle": np.pi / 256}
+    made = []
+    for recording in case.recordings:
+        channels = dict(recording.channels)
+        for name, step in steps.items():
+            channels[name] = (np.round(channels[name] / step + place) - place) * step
+        made.append(replace(recording, channels=channels))
+    return replace(case, recordings=made)
+
+
 def test_rounding_to_eight_bits_is_no_physics() -> None:
     """Of a coarse converter the rounding is not white: it stays for as long as a step lasts."""
-
-    def rounded(channels: dict[str, np.ndarray]) -> None:
-        for name, top in (("supply_pressure", 1.6e6), ("muscle_pressure", 1.6e6)):
-            step = top / 256
-            channels[name][:] = np.round(channels[name] / step) * step
-        step = np.pi / 256
-        channels["joint_angle"][:] = np.round(channels["joint_angle"] / step) * step
-
-    case = _healthy(rounded)
+    case = _rounded(_healthy(lambda _: None), 0.0)
     made = prepare(case.recordings[0], case.rig, DiagnosisSettings())
     assert made.steps["muscle_pressure"] == pytest.approx(6250.0)
     found = pamrs.diagnose(case)
     assert found.verdict in ("none", "parameters")
+
+
+def test_a_repetition_at_eight_bits_is_no_physics() -> None:
+    """An external torque was named, 0.61: two recordings, one of them held out."""
+    found = pamrs.diagnose(HERE / "16_repeat_8_bit")
+    assert found.verdict in ("none", "parameters")
+    assert not found.effects
+
+
+@pytest.mark.parametrize("place", [0.0, 0.3])
+@pytest.mark.parametrize("pair", ["ab", "bc", "ac"])
+def test_two_recordings_of_eight_bits_leave_no_more_than_noise(pair: str, place: float) -> None:
+    case = _rounded(_healthy(lambda _: None), place)
+    case = replace(case, recordings=[r for r in case.recordings if r.name in pair])
+    problem, rig = _problem(case)
+    fitted = fit(problem, rig, (), {}, {block.name: 1.0 for block in problem.blocks})
+    levels = noise_levels(problem, core_rig(fitted.rig))
+    for block in problem.blocks:
+        assert problem.recordings[0].steps[block.channel] > 0.0
+        own = excess(block, problem.recordings, fitted.residuals, levels, problem.settings.noise)
+        assert own.ratio <= own.limit, block.name
 
 
 def test_blocks_without_a_value_are_no_physics() -> None:
@@ -168,12 +260,39 @@ def test_blocks_without_a_value_are_no_physics() -> None:
     assert pamrs.diagnose(_healthy(holes)).verdict in ("none", "parameters")
 
 
-def test_a_command_that_was_not_logged_is_refused_with_its_evidence() -> None:
-    def dead(channels: dict[str, np.ndarray]) -> None:
-        channels["valve_command"][:] = 5.0
+@pytest.mark.parametrize("which", ["abc", "c"])
+def test_a_command_that_was_not_logged_is_said_and_the_rest_is_judged(which: str) -> None:
+    """In all recordings the valve and what it fills are not judged; one beside others goes."""
+    case = pamrs.load_case(HERE / "12_absolute_as_gauge")
+    spoilt = []
+    for recording in case.recordings:
+        channels = {name: values.copy() for name, values in recording.channels.items()}
+        channels["muscle_pressure"] -= 101325.0
+        if recording.name in which:
+            channels["valve_command"][:] = 5.0
+        spoilt.append(replace(recording, channels=channels))
+    found = pamrs.diagnose(replace(case, recordings=spoilt))
+    (dead,) = found.faulty
+    assert (dead.channel, dead.kind) == ("valve_command", "not_logged")
+    claim = "valve_command has one value throughout (5 V) while muscle_pressure stands still"
+    assert claim in dead.text
+    _says_first(found, claim)
+    assert found.verdict in ("none", "parameters")
+    left = {name for block in found.not_judged for name in block.blocks}
+    assert left == ({"supply", "chamber"} if which == "abc" else set())
+    assert len(found.data) == (3 if which == "abc" else 2)
 
+
+def test_a_command_that_was_not_logged_is_refused_where_nothing_else_can_be_judged() -> None:
+    case = pamrs.load_case(HERE / "12_absolute_as_gauge")
+    spoilt = []
+    for recording in case.recordings:
+        channels = dict(recording.channels) | {"valve_command": np.full(len(recording), 5.0)}
+        channels["muscle_pressure"] = channels["muscle_pressure"] - 101325.0
+        del channels["joint_angle"]
+        spoilt.append(replace(recording, channels=channels))
     with pytest.raises(DiagnosisError, match="valve_command has one value throughout"):
-        pamrs.diagnose(_healthy(dead))
+        pamrs.diagnose(replace(case, recordings=spoilt))
 
 
 @pytest.mark.parametrize(("count", "apart"), [(16, 2.0), (37, 1.0)])

@@ -48,6 +48,7 @@ from pamrs.diagnosis.prepare import (
     with_own_values,
     with_tanks,
     without_copies,
+    without_dead_commands,
     without_impossible,
     without_poor_thermometers,
     without_rails,
@@ -57,6 +58,7 @@ from pamrs.diagnosis.search import examine, misread
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError, meant
+from pamrs.findings import Faulty
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
@@ -223,6 +225,8 @@ def diagnose(
     chosen = DiagnosisSettings() if settings is None else settings
     try:
         case, held = _nominal(case, chosen)
+        alive, dead = without_dead_commands(case.recordings, case.rig, chosen.plausibility)
+        case = replace(case, recordings=alive)
         check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
@@ -239,13 +243,17 @@ def diagnose(
         else:
             inner, outer, moved = _on_time(inner, outer, case.rig)
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
-    warnings = [*inner.losses.told, *clipped, *suspected, *masked, *held, *begun, *moved]
+    warnings = [*inner.losses.told, *suspected, *masked, *held, *begun, *moved]
     warnings += diagnosis.warnings
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     data = data_used(case.recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
     return replace(
-        diagnosis, warnings=warnings, data=data, seconds=round(time.perf_counter() - began, 3)
+        diagnosis,
+        faulty=[*dead, *clipped],
+        warnings=warnings,
+        data=data,
+        seconds=round(time.perf_counter() - began, 3),
     )
 
 
@@ -331,7 +339,7 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     return case.with_rig(without_passing(rig)), told
 
 
-def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str], list[str]]:
+def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty], list[str]]:
     """The case with what its recordings cannot have measured masked or left out; what is said of
     sensors whose range ends, and of the rest.
     """

@@ -60,6 +60,9 @@ class Diagnosis(Findings):
         Channels that are likely in another unit, or pressures with another zero, than the log says:
         ``channels``, ``said``, ``likely``, ``factors``, ``offset``, what the refitted baseline
         leaves ``before`` and ``after``, and ``text``.
+    faulty : list of Faulty
+        Channels that a sensor or logger spoiled, masked or left out, and said first: ``channel``,
+        ``kind``, ``text``.
     where : Where
         ``block``, ``channel``, ``intervals`` (pairs in s), ``conditions`` (``name``, ``share`` of
         the excess and of the ``time``, ``mean``, ``text``), ``text``; optionally ``recording``, to

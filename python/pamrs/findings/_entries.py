@@ -19,6 +19,7 @@ __all__ = [
     "Condition",
     "EffectFound",
     "EffectParameterFound",
+    "Faulty",
     "FitErrors",
     "FreeRun",
     "FreeRunError",
@@ -463,6 +464,26 @@ class Misread(Entry):
     offset: float = field(metadata=told("what is to be added to them then, SI"))
     before: float = field(metadata=told("what the baseline leaves, in variances of the noise"))
     after: float = field(metadata=told("the same with the channels read so"))
+    text: str
+
+
+@dataclass(frozen=True, eq=False)
+class Faulty(Entry):
+    """A channel that its sensor or logger spoiled, so that the rest is judged without it.
+
+    Attributes
+    ----------
+    channel : str
+        Which one.
+    kind : str
+        ``clipped``: the samples at the end of its sensor's range are masked; ``not_logged``: a
+        command of one value, which cannot be what the valve got, is left out.
+    text : str
+        The same in words, with the evidence.
+    """
+
+    channel: str
+    kind: str = field(metadata=told(enum=("clipped", "not_logged")))
     text: str
 
 

@@ -20,6 +20,7 @@ from pamrs.findings._entries import (
     BlockVerdict,
     BudgetTerm,
     EffectFound,
+    Faulty,
     FitErrors,
     FreeRun,
     FreeRunError,
@@ -61,6 +62,8 @@ class Findings:
         and nothing else is judged).
     misread : list of Misread
         Channels that are likely in another unit than the log says.
+    faulty : list of Faulty
+        Channels that a sensor or logger spoiled: masked or left out, and said first.
     where : Where
         Block, channel, intervals, conditions, and a sentence.
     effects : list of EffectFound
@@ -130,6 +133,13 @@ class Findings:
         default_factory=list,
         metadata=told(
             "channels that are likely in another unit than the log says, judged before any physics",
+            required=False,
+        ),
+    )
+    faulty: list[Faulty] = field(
+        default_factory=list,
+        metadata=told(
+            "channels that a sensor or logger spoiled: masked or left out, and said first",
             required=False,
         ),
     )

@@ -423,17 +423,19 @@ def headline(diagnosis: Findings) -> str:
 
 def claim(diagnosis: Findings) -> str:
     """The headline without what stays unexplained beside it, and without what was not judged: what
-    the whole rig misses from its commands alone, then the blocks, that with the largest mismatch
-    first.
+    a sensor or logger spoiled, what the whole rig misses from its commands alone, then the blocks,
+    that with the largest mismatch first.
     """
-    if diagnosis.misread:
-        return "; ".join(reading.text for reading in diagnosis.misread)
+    read = "; ".join(reading.text for reading in diagnosis.misread)
+    first = [entry.text for entry in diagnosis.faulty] + [read] * bool(read)
+    if read:
+        return ". ".join(first)
     off = off_sentence(diagnosis)
     found = _claims(diagnosis)
     # where something has no name anyway, that is the answer, and the whole rig stands beside it
     told = [found, off] if diagnosis.verdict == "unlisted" else [off, found]
     text = "; ".join(filter(None, told))
-    return text[:1].upper() + text[1:]
+    return ". ".join([*first, text[:1].upper() + text[1:]])
 
 
 def _claims(diagnosis: Findings) -> str:

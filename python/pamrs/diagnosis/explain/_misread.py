@@ -92,9 +92,16 @@ def _told(reading: Reading) -> str:
             f"{'taken off' if reading.offset < 0.0 else 'added'}"
         )
     else:
-        what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}: read so,"
+        what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}"
+    if math.isfinite(reading.gain):
+        return (
+            f"{what}, or {'their gauges have' if many else 'its gauge has'} another gain: beside "
+            f"parameters inside their tolerances the values times {reading.gain:.4f} +- "
+            f"{reading.std:.1g} fit best, and {reading.likely} over {reading.said} is "
+            f"{reading.factors[0]:.4f}"
+        )
     return (
-        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise "
+        f"{what}{'' if reading.offset else ': read so,'} the refitted model leaves {reading.after:.2g} times the variance of the noise "
         f"instead of {reading.before:.2g} times, and a free "
         f"{'offset' if reading.offset else 'factor'} would be the same"
     )
@@ -108,6 +115,8 @@ def _advice(reading: Reading) -> str:
         else "give the values as they are, as gauge pressures"
         if reading.offset
         else f"write {reading.likely}"
+        if math.isnan(reading.gain)
+        else f"write {reading.likely}, or with its calibration scale = {reading.gain:.4f},"
     )
     return (
         f"No physics was judged, since a wrong unit looks like missing physics: {how} for "

@@ -4,7 +4,8 @@ from their measured neighbours.
 Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `averaged_to_need`
 (long recordings), `overlap`, `without_copies`, `Overlap`
 (recordings that hold the same samples),
-`check_plausible`, `check_sense`, `implausible`, `without_impossible`, `without_rails`,
+`check_plausible`, `check_sense`, `implausible`, `without_dead_commands`, `without_impossible`,
+`without_rails`,
 `suspected_units` (what recordings cannot be), `prepare`, `Prepared`, `binned`, `noise_level`,
 `smoothed`, `thermometers_of`, `warm_chambers` (signals), `Block`, `Residual`,
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
@@ -36,6 +37,7 @@ from pamrs.diagnosis.prepare._plausible import (
     check_plausible,
     check_sense,
     implausible,
+    without_dead_commands,
     without_impossible,
 )
 from pamrs.diagnosis.prepare._rails import without_rails
@@ -93,6 +95,7 @@ __all__ = [
     "unread_tanks",
     "warm_chambers",
     "without_copies",
+    "without_dead_commands",
     "without_impossible",
     "without_poor_thermometers",
     "without_rails",

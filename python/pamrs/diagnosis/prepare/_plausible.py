@@ -22,13 +22,20 @@ from pamrs import _core
 from pamrs._stretches import stretches
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._blocks import Block, predicted
-from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import PlausibilitySettings
 from pamrs.errors import DiagnosisError, SimulationError, joined
+from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 
-__all__ = ["check_plausible", "check_sense", "implausible", "without_impossible"]
+__all__ = [
+    "check_plausible",
+    "check_sense",
+    "implausible",
+    "without_dead_commands",
+    "without_impossible",
+]
 
 Array = NDArray[np.float64]
 
@@ -102,6 +109,10 @@ def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) 
         *_order(recording, rig, settings),
         *_motion(recording, rig, settings),
         *_valves(recording, rig, settings),
+        *(
+            f"{told}: a command that was not logged; map the right column, or leave this one out"
+            for told in _dead(recording, rig, settings).values()
+        ),
     ]
 
 
@@ -498,8 +509,6 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         if both.sum() < 32:
             continue
         if np.ptp(recording.channels[name][both]) == 0.0:
-            ambient = float(rig.model["gas"]["ambient_pressure"])
-            yield from _dead(recording, name, pressure, ambient, settings)
             continue
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
         beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
@@ -545,33 +554,112 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
             )
 
 
-def _dead(
-    recording: Recording,
-    command: str,
-    pressure: str,
-    ambient: float,
-    settings: PlausibilitySettings,
-) -> Iterator[str]:
-    """A command of one value beside a pressure that stands still and then is filled or vented: at
-    one opening a pressure comes to rest once, and what moves changes it by less.
+def _commanded(rig: Rig) -> Iterator[tuple[str, str]]:
+    """Commands of valves and regulators, each with a pressure that it sets."""
+    lines = rig.ports("line")
+    inlets = {dotted("line", name): ends["to"] for name, ends in lines.items()}
+
+    def filled(end: str) -> str:
+        return dotted("muscle_pressure", inlets.get(end, end).partition(".")[2])
+
+    for valve, ends in rig.ports("valve").items():
+        yield dotted("valve_command", valve), filled(ends["to"])
+    for supply, table in rig.tables("supply").items():
+        if table["kind"] == "regulator":
+            command = dotted("supply_command", supply)
+            yield command, dotted("supply_pressure", supply)
+            direct = [e["to"] for e in lines.values() if e["from"] == dotted("supply", supply)]
+            yield from ((command, filled(end)) for end in direct)
+
+
+def _dead(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> dict[str, str]:
+    """Commands of one value beside a pressure that stands still and then is filled or vented, with
+    the evidence. At one opening, or one set pressure, it comes to rest once, and what moves changes
+    it by less.
     """
-    mask = recording.mask[pressure]
-    absolute = np.where(mask, recording.channels[pressure] + ambient, np.nan)
-    width = max(2, round(settings.dead_command_time / recording.sample_time))
-    if absolute.size <= 3 * width:
-        return
-    before, now, later = absolute[: -2 * width], absolute[width:-width], absolute[2 * width :]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        still = np.abs(now / before - 1.0) < settings.dead_command_still
-        change = np.exp(np.abs(np.log(later / now)))
-    largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
-    if largest > settings.dead_command_ratio:
-        yield (
-            f"{command} has one value throughout while {pressure} stands still and then changes "
-            f"{largest:.3g}-fold (absolute) within {settings.dead_command_time:g} s; at most "
-            f"{settings.dead_command_ratio:g}-fold is allowed: a command that was not logged; map "
-            "the right column, or leave this one out"
-        )
+    ambient = float(rig.model["gas"]["ambient_pressure"])
+    found: dict[str, str] = {}
+    for command, pressure in _commanded(rig):
+        if command not in recording.channels or pressure not in recording.channels:
+            continue
+        there = recording.valid(command, pressure)
+        values = recording.channels[command][there]
+        width = max(2, round(settings.dead_command_time / recording.sample_time))
+        if values.size < 32 or np.ptp(values) > 0.0 or len(recording) <= 3 * width:
+            continue
+        mask = recording.mask[pressure]
+        absolute = np.where(mask, recording.channels[pressure] + ambient, np.nan)
+        before, now, later = absolute[: -2 * width], absolute[width:-width], absolute[2 * width :]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            still = np.abs(now / before - 1.0) < settings.dead_command_still
+            change = np.exp(np.abs(np.log(later / now)))
+        largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
+        if largest > settings.dead_command_ratio:
+            found[command] = (
+                f"{command} has one value throughout ({values[0]:g} "
+                f"{recording.units.get(command) or 'SI'}) while {pressure} stands still and then "
+                f"changes {largest:.3g}-fold (absolute) within {settings.dead_command_time:g} s; "
+                f"at most {settings.dead_command_ratio:g}-fold can be of one command"
+            )
+    return found
+
+
+def without_dead_commands(
+    recordings: Sequence[Recording], rig: Rig, settings: PlausibilitySettings
+) -> tuple[list[Recording], list[Faulty]]:
+    """Recordings without commands of one value that the pressures behind them contradict.
+
+    The channel is left out, where what moves can be judged by its gauges alone; a recording with
+    such a command beside others without one is left out instead, so that these keep their valve.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        SI values with masks.
+    rig : Rig
+        The nominal model.
+    settings : PlausibilitySettings
+        What is allowed.
+
+    Returns
+    -------
+    recordings : list of Recording
+        As they were where nothing could be judged otherwise, for :func:`check_plausible`.
+    said : list of Faulty
+        Each command that was not logged.
+    """
+    if not all(moves_by_gauges(recording, rig) for recording in recordings):
+        return list(recordings), []
+    kept, said = list(recordings), list[Faulty]()
+    for command in dict.fromkeys(command for command, _ in _commanded(rig)):
+        found = {r.name: _dead(r, rig, settings).get(command) for r in kept}
+        dead = {name: text for name, text in found.items() if text}
+        # what has that one value elsewhere was not logged there either
+        live = [r for r in kept if r.name not in dead and _moves(r, command)]
+        if not dead:
+            continue
+        if any(r.role == "fit" for r in live):
+            gone = [r.name for r in kept if all(r is not one for one in live)]
+            kept, done = live, f"{', '.join(gone)} cannot be judged beside the others without it"
+        else:
+            kept = [_without(r, command) for r in kept]
+            done = "what it drives is not judged"
+        text = f"{next(iter(dead.values()))}: it was not logged; {done}"
+        said.append(Faulty(command, "not_logged", text))
+    return kept, said
+
+
+def _moves(recording: Recording, channel: str) -> bool:
+    """Whether a channel has more than one value."""
+    values = _values(recording, channel)
+    return bool(values.size) and float(np.ptp(values)) > 0.0
+
+
+def _without(recording: Recording, channel: str) -> Recording:
+    """A recording without a channel."""
+    channels, mask = dict(recording.channels), dict(recording.mask)
+    del channels[channel], mask[channel]
+    return replace(recording, channels=channels, mask=mask)
 
 
 def check_sense(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
 from pamrs.diagnosis.settings import PlausibilitySettings
+from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.units import parse_unit
 
@@ -20,7 +21,7 @@ Array = NDArray[np.float64]
 
 def without_rails(
     recordings: Sequence[Recording], settings: PlausibilitySettings
-) -> tuple[list[Recording], list[str]]:
+) -> tuple[list[Recording], list[Faulty]]:
     """Recordings without the samples that a sensor reads at the end of its range.
 
     A sensor ends where it ends: the end that one recording shows, by staying there for long, is
@@ -37,15 +38,15 @@ def without_rails(
     Returns
     -------
     recordings : list of Recording
-    said : list of str
-        A line for each channel with such an end.
+    said : list of Faulty
+        Each channel with such an end.
     """
     ends: dict[str, set[float]] = {}
     for recording in recordings:
         for issue in recording.issues:
             if issue.rail is not None:
                 ends.setdefault(issue.channel, set()).add(issue.rail)
-    found, said = list(recordings), []
+    found, said = list(recordings), list[Faulty]()
     for channel, rails in ends.items():
         for rail in sorted(rails):
             counts: dict[str, int] = {}
@@ -60,7 +61,7 @@ def without_rails(
                 if bad.any():
                     counts[recording.name] = int(bad.sum())
                     found[k] = _masked(recording, channel, bad)
-            said.append(_told(found, channel, rail, counts))
+            said.append(Faulty(channel, "clipped", _told(found, channel, rail, counts)))
     return found, said
 
 
@@ -104,8 +105,14 @@ def _told(
         value = f"{(rail - parsed.offset) / parsed.scale:.6g} {unit}"
     else:
         value = f"{rail:.6g} {next(r.units.get(channel, 'SI') for r in recordings)}"
-    told = ", ".join(f"{count} in {name}" for name, count in counts.items())
+    counted = [f"{count} in {name}" for name, count in counts.items()]
+    more = len(counted) - _TOLD
+    told = ", ".join(counted[:_TOLD]) + f" and more in {more} others" * (more > 0)
     return (
         f"{channel} is clipped: its sensor's range ends at {value}; samples there, and "
         f"their neighbours, were masked in all recordings ({told})"
     )
+
+
+_TOLD = 6
+"""Recordings whose samples are counted."""

@@ -26,6 +26,7 @@ __all__ = [
     "binned",
     "few_usable",
     "held",
+    "moves_by_gauges",
     "noise_level",
     "prepare",
     "smoothed",
@@ -551,11 +552,10 @@ def thermometers_of(rig: Rig) -> dict[str, str]:
     return {name: dotted("temperature", name) for full, name in warm.items() if full not in joined}
 
 
-def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
-    """Refuse a recording without a command, unless what moves a joint or load was measured past the
-    valves.
+def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
+    """Whether what moves a rig's joints or load was measured past its valves, so that they can be
+    judged without a command.
     """
-    missing = [name for name in inputs if name not in recording.channels]
     joints = (
         ["length"]
         if rig.model["load"]
@@ -565,7 +565,15 @@ def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
         dotted("muscle_pressure", ends["chamber"].partition(".")[2])
         for ends in rig.ports("muscle").values()
     ]
-    if missing and not (joints and {*joints, *pulling} <= set(recording.channels)):
+    return bool(joints) and {*joints, *pulling} <= set(recording.channels)
+
+
+def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
+    """Refuse a recording without a command, unless what moves a joint or load was measured past the
+    valves.
+    """
+    missing = [name for name in inputs if name not in recording.channels]
+    if missing and not moves_by_gauges(recording, rig):
         what = "valve" if channel_of(missing[0]) == "valve_command" else "regulator"
         raise DiagnosisError(
             f"recording {recording.name!r} has no channel {missing[0]}, and the rig has a {what}; "

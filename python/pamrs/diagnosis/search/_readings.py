@@ -5,7 +5,10 @@ A wrong unit is a factor of a short list, a wrong zero of a pressure is one atmo
 a wrong parameter has no reason to look like either. Each way to read each channel, and all channels
 of a kind at once, is judged by what the refitted baseline then leaves in all blocks together. It
 is believed where it takes nearly all that is above the noise, and where a factor (or an offset)
-that is free would be the one of the list.
+that is free would be the one of the list. Of factors of a few per cent parameters inside their
+tolerances take up most: such a one is believed where the sum of squares clearly falls to no more
+than noise, and a free factor is the one of the list within its standard error. The gain of a sensor
+would look the same.
 """
 
 from __future__ import annotations
@@ -28,10 +31,12 @@ from pamrs.diagnosis.fit import (
     residuals,
     stacked,
 )
+from pamrs.diagnosis.noise import excess, noise_levels
 from pamrs.diagnosis.prepare import Prepared, implausible
-from pamrs.diagnosis.search._baseline import refitted
+from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
+from pamrs.simulation import core_rig
 from pamrs.units import measured_from, parse_unit
 
 __all__ = ["Reading", "misread"]
@@ -64,6 +69,8 @@ class Reading:
         By which the SI values of each channel are multiplied.
     offset : float
         What is added to them then, SI.
+    gain, std : float
+        Of a factor of a few per cent: the one that is free, and its standard error; NaN of others.
     before, after : float
         What the refitted baseline leaves, in variances of the noise, as the log is said to be and
         read so: the mean square of bin means over all blocks.
@@ -76,6 +83,8 @@ class Reading:
     likely: str
     factors: tuple[float, ...]
     offset: float = 0.0
+    gain: float = math.nan
+    std: float = math.nan
     before: float = math.nan
     after: float = math.nan
     fit: Fit | None = None
@@ -143,44 +152,100 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
         None where the baseline leaves little more than noise, and where no unit of the list takes
         nearly all of what it leaves.
     """
+    every = list(_readings(problem, nominal))
+    settings = problem.settings.readings
+    small = [r for r in every if not r.offset and r.size < settings.small_step]
+    large = _promising(problem, nominal, [r for r in every if r not in small])
+    # what is no more than a gauge's slope may be off by tells nothing
+    small = [r for r in small if r.size >= settings.stds * settings.gauge_error]
+    if not (small or large):
+        return None
+    try:
+        was = refitted(problem, nominal, _white(problem))
+    except SimulationError:
+        return None
+    found = [_fitted(problem, nominal, was, reading) for reading in large]
+    if _power(problem, was) <= settings.suspect:
+        found += [_told_by_gain(problem, nominal, was, reading) for reading in small]
+    believed = [r for r in found if r is not None and r.fit is not None]
+    return min(believed, key=lambda r: r.fit.cost if r.fit else math.inf, default=None)
+
+
+def _promising(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
+    """Those that take most of what one step of the parameters leaves, where that is much."""
     settings = problem.settings.readings
     names = free_baseline(problem, nominal)
     left = _linear(problem, nominal, names)
     if left <= settings.suspect:
-        return None
+        return []
     tried: list[tuple[float, Reading]] = []
-    for reading in _readings(problem, nominal):
+    for reading in readings:
         own = reading.read(problem)
         if _possible(own, nominal):
             with suppress(SimulationError):
                 tried.append((_linear(own, nominal, names), reading))
     tried.sort(key=lambda item: item[0])
     worth = [r for power, r in tried if power - 1.0 <= settings.promising * (left - 1.0)]
-    if not worth:
-        return None
-    try:
-        was = refitted(problem, nominal, _white(problem))
-    except SimulationError:
-        return None
-    found = [_fitted(problem, nominal, was, r) for r in worth[: settings.fitted]]
-    believed = [reading for reading in found if reading is not None]
-    return min(believed, key=lambda r: r.after, default=None)
+    return worth[: settings.fitted]
 
 
 def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
     """A reading with its fit, where the recordings ask for it."""
-    settings = problem.settings.readings
     own = reading.read(problem)
     try:
         now = refitted(own, nominal, _white(problem))
     except SimulationError:
         return None
     before, after = _power(problem, was), _power(own, now)
-    small = not reading.offset and reading.size < settings.small_step
-    most = settings.small_left if small else settings.left
+    most = problem.settings.readings.left
     if after - 1.0 > most * (before - 1.0) or not _free_is_listed(own, now, reading):
         return None
     return replace(reading, before=before, after=after, fit=now, was=was)
+
+
+def _told_by_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
+    """A reading by a factor of a few per cent, where the recordings ask for it.
+
+    Parameters inside their tolerances take up most of what it misses, and what it takes is less
+    than noise from bin to bin: asked is the sum of squares, priors included, as the parameters
+    follow the factor. Beside physics that is missing it is not told.
+    """
+    settings = problem.settings.readings
+    own = reading.read(problem)
+    beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
+    try:
+        now = thorough(own, nominal, _white(problem), was)
+        after = _power(own, now)
+        least = settings.clear_stds**2 * max(1.0, after)
+        if 2.0 * (was.cost - now.cost) < least or not _is_noise(own, now):
+            return None
+        far = thorough(beyond, nominal, _white(problem), now)
+    except SimulationError:
+        return None
+    # a parabola through none, the factor and its square, in steps of the factor
+    bend = was.cost - 2.0 * now.cost + far.cost
+    if bend <= 0.0:
+        return None
+    best = 0.5 + (was.cost - now.cost) / bend
+    std = math.sqrt(max(1.0, after) / (2.0 * bend))
+    step = math.log(reading.factors[0])
+    gain = math.exp(step * best)
+    clear = abs(gain - 1.0) >= settings.stds * settings.gauge_error
+    if not clear or abs(best - 1.0) > settings.stds * std:
+        return None
+    before = _power(problem, was)
+    fits = replace(reading, before=before, after=after, fit=now, was=was)
+    return replace(fits, gain=gain, std=gain * abs(step) * std)
+
+
+def _is_noise(problem: Problem, found: Fit) -> bool:
+    """Whether a fit leaves no more than noise in any block."""
+    levels = noise_levels(problem, core_rig(found.rig))
+    own = [
+        excess(b, problem.recordings, found.residuals, levels, problem.settings.noise)
+        for b in problem.blocks
+    ]
+    return all(one.ratio <= one.limit for one in own)
 
 
 def _white(problem: Problem) -> dict[str, float]:

@@ -50,17 +50,18 @@ class ReadingSettings(SettingsGroup):
         0.1,
         unit="1",
         least=0.0,
-        reason="logarithm of a factor up to which (bar, atmosphere, kgf/cm2) a wrong parameter or "
-        "an effect may come near to it",
+        reason="logarithm of a factor up to which (bar, atmosphere, kgf/cm2) parameters inside "
+        "their tolerances take up most of what it misses, so that a free factor has to tell",
         origin="atmosphere over kgf/cm2 is 1.033",
     )
-    small_left: float = setting(
-        0.02,
+    clear_stds: float = setting(
+        5.0,
         unit="1",
         above=0.0,
-        most=1.0,
-        reason="share of the excess that such a factor may leave",
-        origin="judgement",
+        reason="standard errors by which such a factor has to be better than none: what it takes "
+        "off the sum of squares, priors included, is the square of that",
+        origin="judgement: some ten factors of a few sets of channels are tried, in noise that is "
+        "not white",
     )
     gauge_error: float = setting(
         0.005,
