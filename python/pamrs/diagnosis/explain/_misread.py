@@ -95,13 +95,14 @@ def _told(reading: Reading) -> str:
         what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}"
     if math.isfinite(reading.gain):
         return (
-            f"{what}, or {'their gauges have' if many else 'its gauge has'} another gain: beside "
-            f"parameters inside their tolerances the values times {reading.gain:.4f} +- "
+            f"{what}, or {'their gauges have' if many else 'its gauge has'} another gain: with "
+            f"parameters that move inside their tolerances the values times {reading.gain:.4f} +- "
             f"{reading.std:.1g} fit best, and {reading.likely} over {reading.said} is "
             f"{reading.factors[0]:.4f}"
         )
+    what += "" if reading.offset else ": read so,"
     return (
-        f"{what}{'' if reading.offset else ': read so,'} the refitted model leaves {reading.after:.2g} times the variance of the noise "
+        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise "
         f"instead of {reading.before:.2g} times, and a free "
         f"{'offset' if reading.offset else 'factor'} would be the same"
     )

@@ -640,7 +640,7 @@ def without_dead_commands(
             continue
         if any(r.role == "fit" for r in live):
             gone = [r.name for r in kept if all(r is not one for one in live)]
-            kept, done = live, f"{', '.join(gone)} cannot be judged beside the others without it"
+            kept, done = live, f"{', '.join(gone)} cannot be judged with the others without it"
         else:
             kept = [_without(r, command) for r in kept]
             done = "what it drives is not judged"
