@@ -10,7 +10,7 @@ import pytest
 
 import pamrs
 from pamrs.errors import CaseError, MissingPackageError, RecordingError
-from pamrs.recordings import load_case, load_recordings
+from pamrs.recordings import _gate, load_case, load_recordings
 from pamrs.recordings import logs as logs_package
 from tests.recordings.written import DT, N, mapping, signals, written
 
@@ -315,6 +315,41 @@ def test_a_case_takes_parts_of_a_log(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert [item.name for item in found.fit] == ["run_1", "run_2"]
     assert [item.name for item in found.held_out] == ["run_3"]
     assert len(reads) == 1
+
+
+def test_what_was_not_logged_is_a_value_in_the_case(tmp_path: Path) -> None:
+    """A length that a frame held, a set pressure that somebody turned by hand."""
+    data = signals()
+    file = npz(tmp_path, t=data["t"], p1=data["p1"])
+    toml = """schema = "pamrs.case/1"
+[[recording]]
+file = "{file}"
+time = "t"
+[recording.channels]
+muscle_pressure = {{ column = "p1", unit = "bar" }}
+length = {{ value = 0.25, unit = "m" }}
+supply_command = {{ value = 6.0, unit = "bar" }}
+"""
+    (only,) = load_case(case(tmp_path, file, toml)).recordings
+    assert set(only.channels) == {"muscle_pressure", "length", "supply_command"}
+    for channel, value in (("length", 0.25), ("supply_command", 6e5)):
+        np.testing.assert_allclose(only.channels[channel], value)
+        assert only.valid(channel).all()
+    assert not [issue for issue in only.issues if issue.channel in ("length", "supply_command")]
+
+
+def test_parts_of_a_bag_are_limited_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    import zstandard
+
+    packed = zstandard.compress(bytes(1000))
+    monkeypatch.setattr(_gate, "MOST_BYTES", 2500)
+    unpacked = _gate.Unpacking(Path("run.bag"), 0)
+    assert unpacked(b"as it is") == b"as it is"
+    assert [len(unpacked(packed)) for _ in range(2)] == [1000, 1000]
+    with pytest.raises(RecordingError, match="unpacks to too much with the rest"):
+        unpacked(packed)
+    with pytest.raises(RecordingError, match="unpacks to more than 0 MB"):
+        _gate.Unpacking(Path("run.bag"), 0)(packed, 999)
 
 
 @pytest.mark.parametrize(

@@ -255,15 +255,16 @@ class Unpacking:
         opened = _unpacked(data)
         if opened is None:
             return data
-        most = min(most, self._left)
-        content = bytes(opened.read(most + 1))
-        if len(content) > most:
-            raise RecordingError(
-                f"{self._path}: a part of {len(data)} bytes unpacks to more than {most >> 20} MB, "
-                "and at most that is read; write it again in smaller parts, or only the topics "
-                "that are needed"
-            )
+        content = bytes(opened.read(min(most, self._left) + 1))
         self._left -= len(content)
+        if len(content) > most or self._left < 0:
+            limit = (
+                f"more than {most >> 20} MB" if len(content) > most else "too much with the rest"
+            )
+            raise RecordingError(
+                f"{self._path}: a part of {len(data)} bytes unpacks to {limit}, which is not read; "
+                "write it again in smaller parts, or only the topics that are needed"
+            )
         return content
 
 
