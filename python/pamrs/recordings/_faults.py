@@ -12,6 +12,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import rank_filter
 
 __all__ = ["Fault", "find_faults"]
 
@@ -151,13 +152,10 @@ def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     n = len(data)
     if n < _LEAST:
         return []
-    padded = np.pad(data, 3, mode="edge")
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 7)
-    off = data - np.median(windows, axis=1)
+    low, middle, high = (rank_filter(data, rank, 7, mode="nearest") for rank in (2, 3, 4))
+    off, local = data - middle, high - low
     quantum = _quantum(data)
     ordinary = np.quantile(np.abs(off), 0.99)
-    around = np.sort(windows, axis=1)
-    local = around[:, 4] - around[:, 2]
     limit = np.maximum(np.maximum(12.0 * quantum, 7.0 * ordinary), 6.0 * local)
     rows = np.flatnonzero(np.abs(off) > limit)
     if len(rows) > n // 50:

@@ -8,12 +8,13 @@ noise. Where the steps of a converter are far wider than the noise, its flips st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
@@ -21,7 +22,7 @@ from pamrs.channels import channel_of
 from pamrs.diagnosis.settings import OverlapSettings
 from pamrs.recordings import Recording
 
-__all__ = ["Alignment", "Told", "is_set", "told"]
+__all__ = ["Alignment", "Channels", "Told", "is_set", "told"]
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -86,10 +87,27 @@ class _Channel(NamedTuple):
         return _Channel(self.values[rows], self.known[rows], self.deviations[rows], self.step)
 
 
-def told(
-    slow: Recording, fast: Recording, names: list[str], settings: OverlapSettings
-) -> Iterator[Told]:
+class Channels:
+    """Channels of recordings with their deviations, each found once."""
+
+    def __init__(self, settings: OverlapSettings) -> None:
+        self.settings = settings
+        self._found: dict[tuple[Recording, str], _Channel] = {}
+
+    def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Channel]:
+        """Those of a recording, by name."""
+        for name in names:
+            if (recording, name) not in self._found:
+                values, known = recording.channels[name], recording.mask[name]
+                self._found[recording, name] = _channel(values, known, self.settings)
+        return {name: self._found[recording, name] for name in names}
+
+
+def told(slow: Recording, fast: Recording, names: list[str], channels: Channels) -> Iterator[Told]:
     """Every alignment at which deviations of some channel are the same.
+
+    Of two recordings of a million samples each it takes some seconds, most of them for correlations
+    over all lags; the search for another rate of the clock looks at the beginnings alone.
 
     Parameters
     ----------
@@ -97,16 +115,14 @@ def told(
         By sample time.
     names : list of str
         Channels that both have measured.
-    settings : OverlapSettings
+    channels : Channels
+        What was found of recordings before.
 
     Yields
     ------
     Told
     """
-    own, there = (
-        {name: _channel(one.channels[name], one.mask[name], settings) for name in names}
-        for one in (slow, fast)
-    )
+    settings, own, there = channels.settings, channels.of(slow, names), channels.of(fast, names)
     ratio = slow.sample_time / fast.sample_time
     some = False
     for rate, start in _clocks(slow, fast, own, there, settings):
@@ -132,7 +148,7 @@ def _channel(values: Array, known: Mask, settings: OverlapSettings) -> _Channel:
     nothing = np.zeros(values.size)
     if known.sum() < 4 * beside or not np.ptp(values[known]) > 0.0:
         return _Channel(nothing, known, nothing, 0.0)
-    filled = np.interp(index, index[known], values[known])
+    filled = values if known.all() else np.interp(index, index[known], values[known])
     centred, own = filled - filled.mean(), np.r_[-beside:0, 1 : beside + 1]
     inner = known & (index >= beside) & (index < values.size - beside)
     flat = np.diff(centred) == 0.0
@@ -190,7 +206,8 @@ def _moved(
 ) -> _Channel:
     """A channel at times [s], which may be its own, from either end."""
     for way in (1, -1):
-        if np.array_equal(at, fast.time[::way]):
+        apart = at - fast.time[::way] if at.size == len(fast) else np.inf
+        if np.max(np.abs(apart)) < 1e-6 * fast.sample_time:  # but for rounding
             return one.at(np.arange(len(fast))[::way])
     return _seen(fast, name, at, width, settings)._replace(step=one.step)
 
@@ -259,15 +276,15 @@ def _rate(
     best, found = settings.least_peak, None
     for name, channel in own.items():
         other = there[name].deviations[: 2 * settings.most_searched]
-        length = 1 << int(np.ceil(np.log2(other.size + 2 * size)))
-        spectrum = np.fft.rfft(other, length)
+        length = next_fast_len(other.size + 2 * size, real=True)
+        spectrum = rfft(_single(other), length)
         for rate in (*rates, *(2.0 - rates)):
             rows = np.arange(0.0, size - 1.0, ratio / rate)
             peaks, places = [], []
             for start in starts:
                 part = channel.deviations[start : start + size]
                 block = np.interp(rows, np.arange(size), part)
-                cross = np.fft.irfft(spectrum * np.conj(np.fft.rfft(block, length)), length)
+                cross = irfft(spectrum * np.conj(rfft(_single(block), length)), length)
                 place = int(np.argmax(np.abs(cross)))
                 peaks.append(abs(float(cross[place])) / (float(np.linalg.norm(block)) + _TINY))
                 places.append(place if place < other.size else place - length)
@@ -316,6 +333,11 @@ def _at(
             yield Told(here, inside, same, others & ~same)
 
 
+def _single(values: Array) -> NDArray[np.float32]:
+    """Numbers of which seven digits are enough: what they tell of noise is far less certain."""
+    return values.astype(np.float32)
+
+
 def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, float]:
     """Rows by which one channel may run behind in the other one, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
@@ -326,9 +348,9 @@ def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, floa
     if a.step or b.step:  # flips of a converter tell more than what neighbours leave of them
         pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), settings.lags))
     for one, other, most in pairs:
-        length = 1 << int(np.ceil(np.log2(max(one.size + other.size, 2))))
+        length = next_fast_len(max(one.size + other.size, 2), real=True)
         cross, power = (
-            np.fft.irfft(np.fft.rfft(y, length) * np.conj(np.fft.rfft(x, length)), length)
+            irfft(rfft(_single(y), length) * np.conj(rfft(_single(x), length)), length)
             for x, y in ((one, other), (one * one, other * other))
         )
         peaks = np.abs(cross) / np.sqrt(np.maximum(power, 1.0))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.prepare._deviations import Alignment, Told, is_set, told
+from pamrs.diagnosis.prepare._deviations import Alignment, Channels, Told, is_set, told
 from pamrs.diagnosis.settings import OverlapSettings
 from pamrs.recordings import Recording
 
@@ -69,20 +69,21 @@ def without_copies(
     """
     places = range(len(recordings))
     kept: dict[int, list[Recording]] = {}  # by place: one recording may be listed twice
-    said: list[str] = []
+    said, channels = list[str](), Channels(settings)
     for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept.values() for one in parts]
-        kept[place], told = _new_in(recordings[place], before, settings)
+        kept[place], told = _new_in(recordings[place], before, channels)
         said += told
     return [one for place in places for one in kept[place]], said
 
 
 def _new_in(
-    recording: Recording, before: Sequence[Recording], settings: OverlapSettings
+    recording: Recording, before: Sequence[Recording], channels: Channels
 ) -> tuple[list[Recording], list[str]]:
     """What of a recording is not in others, and a sentence where that is not all of it."""
+    settings = channels.settings
     for other in before:
-        found = overlap(recording, other, settings)
+        found = overlap(recording, other, settings, channels)
         across = recording.role != other.role
         if found is None or not (across or found.share > settings.copy_share):
             continue
@@ -93,7 +94,7 @@ def _new_in(
         )
         if not across:
             return [], [same + "it says nothing more and was left out"]
-        left = _left_of(recording, found.free, before, settings)
+        left = _left_of(recording, found.free, before, channels)
         if not left:
             spent = max((stop - start for start, stop in found.free), default=0.0)
             short = f"; the longest stretch that it does not share, {spent:.3g} s, is too short"
@@ -107,7 +108,7 @@ def _new_in(
                 for one, part in zip(cut, left, strict=True)
             ]
         said = [same + f"of it {parts} are held out, the rest is no proof"]
-        once = [_new_in(one, before, settings) for one in cut]
+        once = [_new_in(one, before, channels) for one in cut]
         return [one for kept, _ in once for one in kept], [
             *said,
             *(s for _, told in once for s in told),
@@ -119,22 +120,24 @@ def _left_of(
     recording: Recording,
     free: Sequence[tuple[float, float]],
     before: Sequence[Recording],
-    settings: OverlapSettings,
+    channels: Channels,
 ) -> list[tuple[float, float]]:
     """Stretches that share nothing with any recording of another role, long enough for a proof."""
+    settings = channels.settings
     least = max(settings.least_left, settings.least_samples * recording.sample_time)
     found: list[tuple[float, float]] = []
     for start, stop in free:
         if stop - start < least:
             continue
         part = recording.between(start, stop)
-        shared = (overlap(part, o, settings) for o in before if o.role != recording.role)
+        others = (o for o in before if o.role != recording.role)
+        shared = (overlap(part, other, settings, channels) for other in others)
         again = next((one for one in shared if one is not None), None)
         if again is None:
             found.append((start, stop))
         elif again.free != ((0.0, part.duration),):  # shorter than before: this comes to an end
             inner = [(start + a, start + b) for a, b in again.free if b - a < stop - start]
-            found += _left_of(recording, inner, before, settings)
+            found += _left_of(recording, inner, before, channels)
     return found
 
 
@@ -142,7 +145,12 @@ def _called(recording: Recording) -> str:
     return recording.name + (f" ({recording.source})" if recording.source else "")
 
 
-def overlap(one: Recording, other: Recording, settings: OverlapSettings) -> Overlap | None:
+def overlap(
+    one: Recording,
+    other: Recording,
+    settings: OverlapSettings,
+    channels: Channels | None = None,
+) -> Overlap | None:
     """The stretch that two recordings share, noise included; None where there is none.
 
     Shifted and resampled copies are found, windows of one recording too.
@@ -153,6 +161,8 @@ def overlap(one: Recording, other: Recording, settings: OverlapSettings) -> Over
         In any order.
     settings : OverlapSettings
         What counts as the same.
+    channels : Channels, optional
+        What was found of the recordings before.
 
     Returns
     -------
@@ -163,9 +173,8 @@ def overlap(one: Recording, other: Recording, settings: OverlapSettings) -> Over
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
     if not names or slow.sample_time > settings.most_rate_ratio * fast.sample_time:
         return None
-    found = max(
-        told(slow, fast, names, settings), key=lambda each: int(each.same.sum()), default=None
-    )
+    each = told(slow, fast, names, channels or Channels(settings))
+    found = max(each, key=lambda one: int(one.same.sum()), default=None)
     if found is None:
         return None
     runs = [
