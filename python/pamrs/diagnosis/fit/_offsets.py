@@ -7,6 +7,7 @@ it is a nuisance of the recording, as the start of a window is.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -141,11 +142,14 @@ def _later(prepared: Prepared, shares: Array) -> Prepared:
     size = next(iter(prepared.held.values())).size
     own = prepared.settings.fit
     seldom = at.size * own.offset_few_parts < size
-    parts = own.offset_parts if seldom else own.offset_few_parts
+    most = own.offset_parts if seldom else own.offset_few_parts
+    each = prepared.dt * prepared.n / size
+    parts = min(most, 2 * math.ceil(0.5 * each / own.least_offset_part))  # half of them is whole
     moved = np.maximum.accumulate(np.maximum(1, parts * at + np.rint(parts * shares).astype(int)))
-    now = np.searchsorted(moved, np.arange(size * parts), side="right")
-    rows = np.concatenate([[0], at])[now]
-    return replace(prepared, held={name: values[rows] for name, values in prepared.held.items()})
+    counts = np.diff(np.minimum(moved, size * parts), prepend=0, append=size * parts)
+    rows = np.concatenate([[0], at])
+    held = {name: np.repeat(values[rows], counts) for name, values in prepared.held.items()}
+    return replace(prepared, held=held)
 
 
 def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], dict[int, float]]:

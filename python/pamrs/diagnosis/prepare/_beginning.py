@@ -47,44 +47,46 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
     -------
     Prepared
         With `unsettled`, the samples by the channel that each such block predicts, and
-        `temperatures` of gases that were not at rest.
+        `temperatures` at which gases began.
     """
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
     prepared = replace(prepared, unsettled=unsettled) if unsettled else prepared
-    warm = [block for block in blocks if block.warm is not None]
-    began = {block.channel: _began_at(block, core, prepared) for block in warm}
-    known = {channel: found for channel, found in began.items() if found is not None}
-    return replace(prepared, temperatures=known) if known else prepared
+    began = {
+        block.channel: _began_at(block, block.warm[1], core, prepared)
+        for block in blocks
+        if block.warm is not None
+    }
+    return replace(prepared, temperatures=began) if began else prepared
 
 
-def _began_at(block: Block, core: _core.Rig, prepared: Prepared) -> float | None:
-    """Temperature at which a gas began [K], as its pressure tells by the nominal model; None where
-    it is seen to stand still, or began as warm as the room.
+def _began_at(block: Block, rest: float, core: _core.Rig, prepared: Prepared) -> float:
+    """Temperature at which a gas began [K], as a transient of its pressure tells by the nominal
+    model; that of the room where it stands still, or began about as warm.
 
-    A log that begins in a transient has a gas that was compressed or let out before: its start is
-    free, and what it does is not linear, so that the first windows begin where they tell.
+    A log that begins in a transient has a gas that was compressed or let out before. What that does
+    is not linear, so that the first windows begin where they tell, and are freed of the rest: a
+    pressure stands still on warm gas too, behind an open valve.
     """
     settings = prepared.settings.prepare
-    rest = block.warm[1] if block.warm is not None else 0.0
     early = 2 * settings.window_samples_per_state
     rows = np.flatnonzero(prepared.recording.mask[block.channel][:early])
     if rows.size < settings.window_samples_per_state:
-        return None
+        return rest
     if abs(_trend(prepared, block.channel, rows)) <= settings.still_deviations:
-        return None
+        return rest
     found = rest
     for _ in range(settings.begun_steps):
         there = replace(prepared, temperatures={block.channel: found})
         try:
             first = residual(block, core, there, [])
         except SimulationError:
-            return None
+            return rest
         if not first.begun or first.starts[0][0] > 0 or first.begun[0].size < 2:
-            return None  # nothing of it is seen
+            return rest  # nothing of it is seen
         found = float(np.clip(found + first.begun[0][-1], 0.5 * rest, 2.0 * rest))
-    return found if abs(found - rest) > settings.begun_temperature_error else None
+    return found if abs(found - rest) > settings.begun_temperature_error else rest
 
 
 def _trend(prepared: Prepared, channel: str, rows: NDArray[np.intp]) -> float:
@@ -250,12 +252,10 @@ def said_of_beginnings(blocks: Sequence[Block], recordings: Sequence[Prepared]) 
             said.append(
                 f"block {block.name}: the first {told} were not judged: {_unmeasured(block)}"
             )
-        warm = [p for p in each if block.channel in p.temperatures]
-        if block.warm is not None and warm:
-            told = ", ".join(
-                f"{p.temperatures[block.channel] - block.warm[1]:+.0f} K in {p.recording.name}"
-                for p in warm
-            )
+        rest = block.warm[1] if block.warm is not None else math.nan
+        warm = {p.recording.name: p.temperatures.get(block.channel, rest) - rest for p in each}
+        told = ", ".join(f"{away:+.0f} K in {name}" for name, away in warm.items() if away)
+        if block.warm is not None and told:
             said.append(
                 f"block {block.name}: recordings begin in a transient; the temperature of the gas "
                 f"there is fitted, and differs from the room's by about {told}"

@@ -847,8 +847,8 @@ def _anchors(block: Block, prepared: Prepared, starts: list[int], lead: int = 0)
 
 def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     """What the start of a window can do, (n, k): of a pressure without the temperature at which its
-    gas began, once that is forgotten, or where it began at rest; of a temperature without where a
-    thermometer stood that is not late.
+    gas began, once that is forgotten, or where it is known to have begun at rest; of a temperature
+    without where a thermometer stood that is not late.
     """
     noise, settings = prepared.noise[block.channel], prepared.settings.prepare
     if block.warm is not None:

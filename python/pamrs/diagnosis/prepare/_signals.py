@@ -78,8 +78,9 @@ class Prepared:
         First samples of a channel that are not judged, since they show where something that nobody
         measured began.
     temperatures : dict of str to float
-        Temperature at which a gas without a thermometer began [K], by the channel of its pressure,
-        where the recording begins in a transient; the first windows are freed of it.
+        Temperature at which a gas without a thermometer began [K], by the channel of its pressure:
+        that of the room but where the recording begins in a transient. The first windows are freed
+        of it.
     simulated : tuple of str
         Channels among the signals that nobody measured: pressures of tanks without a gauge.
     """

@@ -72,6 +72,14 @@ class FitSettings(SettingsGroup):
         "a step of the integration",
         origin="judgement",
     )
+    least_offset_part: float = setting(
+        1.6e-4,
+        unit="s",
+        above=0.0,
+        reason="time that such a part lasts at the least: finer ones are parts of what no pressure "
+        "tells, and a million samples have as many numbers in each",
+        origin="offset_parts at 100 Hz",
+    )
     most_offset: float = setting(
         1.0,
         unit="samples",
