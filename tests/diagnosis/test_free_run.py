@@ -15,15 +15,18 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain import _free_run
 from pamrs.diagnosis.fit import Events, Problem, residuals
-from pamrs.diagnosis.prepare import available_blocks, averaged, prepare
+from pamrs.diagnosis.prepare import available_blocks, averaged, begun_alike, prepare
 from pamrs.diagnosis.prove import valid_result
 from pamrs.diagnosis.result import schema
 from pamrs.errors import SimulationError
 from pamrs.recordings import Recording
-from pamrs.rig import Rig
+from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis import synthetic
 from tests.diagnosis.test_assemble import NAMES, recorded
+from tests.diagnosis.test_gas_law import NOISE as PRESSURES
+from tests.diagnosis.test_gas_law import TEXT as WARM
+from tests.diagnosis.test_gas_law import recorded as filled
 from trial.marks import result_of as scored
 
 SETTINGS = DiagnosisSettings()
@@ -71,6 +74,36 @@ def test_without_a_command_there_is_no_free_run_and_it_is_said_why() -> None:
     runs, note = _free_run.free_run(both, found, rig, rig, None)
     assert [r.recording for r in runs or []] == ["whole"]
     assert "silent" in note
+
+
+@pytest.mark.parametrize(("seed", "skipped", "told"), [(2, 0.0, 0), (0, 0.6, 28), (2, 0.6, 0)])
+def test_a_gas_with_a_temperature_is_judged_as_others(
+    seed: int, skipped: float, told: float
+) -> None:
+    """Begun at rest, in a transient, or 17 K above the room, which no pressure tells: a true model
+    explains it, one that lacks a leak does not.
+    """
+    rig = parse_rig(WARM)
+    known = [(n, p.value, p.tol) for n, p in rig.parameters.items() if 0.0 < p.tol < math.inf]
+    names, values, tolerances = zip(*known, strict=True)
+    file = _free_run.Known(names, np.array(values), np.diag(tolerances))
+    off, errors = {}, {}
+    for leak in (0.0, 3e-8):
+        true = rig.with_effect("leak_muscle", {"conductance": leak}) if leak else rig
+        records = [filled(true, "held_out", seed, PRESSURES, skipped)]
+        problem = problem_of(rig, records)
+        recordings = [begun_alike(problem.blocks, problem.core, p) for p in problem.recordings]
+        problem = replace(problem, recordings=recordings)
+        begun = recordings[0].temperatures.get("muscle_pressure", 293.15)
+        assert leak or begun == pytest.approx(293.15 + told, abs=1.0)
+        found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
+        runs, _ = _free_run.free_run(problem, found, rig, rig, None, file)
+        assert runs is not None
+        off[leak] = {name for name, error in runs[0].channels.items() if error.off}
+        errors[leak] = runs[0].channels["muscle_pressure"].after
+    assert not off[0.0]
+    assert off[3e-8] == {"muscle_pressure"}
+    assert errors[0.0] < 500.0 or (skipped and not told)  # 400 Pa are noise
 
 
 def test_means_run_freely_under_the_commands_of_their_log() -> None:

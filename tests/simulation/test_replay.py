@@ -11,6 +11,9 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.channels import unit_of
+from pamrs.errors import ParameterError
+from pamrs.recordings import Recording
+from pamrs.rig import parse_rig
 from pamrs.simulation import differences, replay
 
 
@@ -52,6 +55,44 @@ def test_a_recording_of_named_blocks_is_replayed(tmp_path: Path) -> None:
     assert found["joint_angle.elbow"] < 1e-4
     other = replay(rig.with_parameters({"link.hand.payload": 20.0}), recording)
     assert differences(other, recording)["joint_angle.elbow"] > 0.01
+
+
+@pytest.mark.parametrize("alike", [True, False])
+def test_a_gas_may_begin_warm_or_cold(alike: bool) -> None:
+    """The second half of a run of two gases, from their pressures and temperatures alone."""
+    chamber = """
+[chamber.{name}]
+gas = "energy_balance"
+dead_volume = {{ value = {volume}, unit = "l" }}
+initial_pressure = {{ value = 5, unit = "bar" }}
+heat_transfer_coefficient = {{ value = 20, unit = "W/(m2 K)" }}
+[line.{name}]
+kind = "orifice"
+from = "chamber.{name}"
+to = "ambient"
+discharge_area = {{ value = 0.5, unit = "mm2" }}
+"""
+    tables = [chamber.format(name=n, volume=v) for n, v in (("a", 0.5), ("b", 0.5 if alike else 2))]
+    rig = parse_rig("".join(['schema = "pamrs.rig/1"\nname = "two"\n[gas]', *tables]))
+    run = pamrs.simulate(rig, sample_time=0.01, duration=2.0)
+    channels = {name: run[name][100:] for name in ("muscle_pressure.a", "muscle_pressure.b")}
+    mask = {name: np.ones(101, dtype=bool) for name in channels}
+    cut = Recording("cut", "fit", run.time[:101], 0.01, channels, mask)
+    begin = {name: float(run[f"temperature.{name}"][100]) for name in ("b", "a")}
+    assert max(begin.values()) < 290.0
+    again = replay(rig, cut, temperatures=begin)
+    assert set(again) == set(replay(rig, cut))
+    for name in (*channels, "temperature.a", "temperature.b"):
+        np.testing.assert_allclose(again[name], run[name][100:], rtol=1e-9)
+    assert differences(replay(rig, cut), cut)["muscle_pressure.b"] > 100.0
+    room = dict.fromkeys(("a", "b"), 293.15)
+    np.testing.assert_array_equal(
+        replay(rig, cut, temperatures=room)["muscle_pressure.a"],
+        replay(rig, cut)["muscle_pressure.a"],
+    )
+    for wrong in ({"c": 300.0}, {"a": 0.0}, {"a": float("nan")}):
+        with pytest.raises(ParameterError, match="energy_balance"):
+            replay(rig, cut, temperatures=wrong)
 
 
 def test_what_a_replay_needs_is_named(tmp_path: Path) -> None:

@@ -8,13 +8,14 @@ import contextlib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.stats import chi2
 
-from pamrs.channels import channel_of, recorded_as, unit_of
+from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
@@ -68,7 +69,8 @@ def free_run(
 ) -> tuple[list[FreeRun] | None, str]:
     """Errors of free-running simulations of every recording.
 
-    A simulation begins at the recording's first usable values and then knows its commands only. It
+    A simulation begins at the recording's first usable values, its gases as warm as the room or as
+    their thermometers or first transients say, and then knows its commands only. It
     costs a few hundredths of a second for each recording and model, and raises nothing: a model
     that leaves its range has no number and a note that says so.
 
@@ -97,9 +99,7 @@ def free_run(
         try:
             there = _with(final, events, recording)
             run = _of(prepared, problem, found, nominal, there)
-            # a run begins at rest, and a gas that nobody knows to have begun so is no fault
-            certain = known if all(b.warm is None for b in problem.blocks) else None
-            runs.append(_judged(run, prepared, there, certain, problem.settings))
+            runs.append(_judged(run, prepared, there, known, problem.settings))
         except RecordingError as error:  # it lacks a command
             missing.append(str(error))
     if not runs:
@@ -115,8 +115,8 @@ def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
 def _of(prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final: Rig) -> FreeRun:
     """The free run of one recording."""
     recording = prepared.recording
-    before, why = _errors(nominal, recording)
-    after, why_after = (before, why) if final is nominal else _errors(final, recording)
+    before, why = _errors(nominal, prepared)
+    after, why_after = (before, why) if final is nominal else _errors(final, prepared)
     notes = [f"nominal model: {why}"] if why else []
     notes += [f"with what was found: {why_after}"] if why_after and final is not nominal else []
     covering = {b.channel: b.name for b in problem.blocks}
@@ -173,19 +173,23 @@ def _left(
     prepared: Prepared, final: Rig, known: Known, settings: WarningSettings
 ) -> dict[str, float]:
     """What a free run misses of each channel [noise levels], at the least, where the values of the
-    rig are as far from what is known of them as is likely, and its commands come up to a sample
-    earlier or later.
+    rig are as far from what is known of them as is likely, its commands come up to a sample earlier
+    or later, and its gases begin warmer or colder.
 
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
-    logged = _as_logged(prepared.recording)
+    logged, count = _as_logged(prepared.recording), len(known.names)
+    begun = _begun(final, prepared)
 
     def run(moved: Array) -> dict[str, Array]:
-        values = dict(zip(known.names, known.values + known.root @ moved[:-1], strict=True))
-        late = _late(logged, settings.off_late * float(moved[-1]))
-        return _misses(with_known(final, values), late, logged, prepared.noise, settings.off_rows)
+        values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
+        late = _late(logged, settings.off_late * float(moved[count]))
+        warm = zip(begun.items(), moved[count + 1 :].tolist(), strict=True)
+        begins = {name: there.kelvin + there.unsure * away for (name, there), away in warm}
+        there = with_known(final, values)
+        return _misses(there, late, begins, logged, prepared.noise, settings.off_rows)
 
-    at, least = np.zeros(len(known.names) + 1), dict[str, float]()
+    at, least = np.zeros(count + 1 + len(begun)), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
         for _ in range(settings.off_steps + 1):
             now = run(at)
@@ -230,13 +234,44 @@ def _moved(
     return np.asarray(right.T @ far(math.exp(low)))
 
 
+class _Begins(NamedTuple):
+    """Temperature at which a gas begins, and its standard deviation [K]."""
+
+    kelvin: float
+    unsure: float
+
+
+def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
+    """Where each gas with a balance of energy begins, by its chamber: as warm as the room, but
+    where its thermometer or its pressure says clearly that it does not.
+    """
+    own, off = prepared.settings.prepare, prepared.settings.warnings
+    room, found = float(rig.tables("gas")[""]["temperature"]), {}
+    for name, table in rig.tables("chamber").items():
+        if table["gas"] != "energy_balance":
+            continue
+        read = prepared.signals.get(dotted("temperature", name))
+        told = prepared.temperatures.get(dotted("muscle_pressure", name), room)
+        begins = told if read is None else float(read[0][0])
+        away = abs(begins - room) > own.begun_temperature_error
+        # a pressure that stands still does not tell
+        unsure = own.begun_temperature_error if away or read is not None else off.off_warm
+        found[name] = _Begins(begins if away else room, unsure)
+    return found
+
+
 def _misses(
-    rig: Rig, driving: Recording, logged: Recording, noise: Mapping[str, float], most: int
+    rig: Rig,
+    driving: Recording,
+    begins: Mapping[str, float],
+    logged: Recording,
+    noise: Mapping[str, float],
+    most: int,
 ) -> dict[str, Array]:
     """What a free run misses of each measured channel, in units of its noise, at about so many
     samples at the most.
     """
-    result = replay(rig, driving)
+    result = replay(rig, driving, temperatures=begins)
     out = {}
     for name in differences(result, logged):
         channel = recorded_as(name)
@@ -318,11 +353,13 @@ def _as_logged(recording: Recording) -> Recording:
     )
 
 
-def _errors(rig: Rig, recording: Recording) -> tuple[dict[str, float], str]:
+def _errors(rig: Rig, prepared: Prepared) -> tuple[dict[str, float], str]:
     """Root mean square error of each measured channel, and why there is none."""
-    logged = _as_logged(recording)
+    logged = _as_logged(prepared.recording)
     try:
-        return differences(replay(rig, logged), logged), ""
+        begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
+        run = replay(rig, logged, temperatures=begins)
+        return differences(run, logged), ""
     except RecordingError:
         raise
     except (PamrsError, ArithmeticError) as error:

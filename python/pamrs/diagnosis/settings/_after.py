@@ -343,6 +343,14 @@ class WarningSettings(SettingsGroup):
         reason="standard deviation of when a command takes effect, within its sample",
         origin="judgement",
     )
+    off_warm: float = setting(
+        20.0,
+        unit="K",
+        above=0.0,
+        reason="standard deviation of the temperature at which a gas with an energy balance begins "
+        "where neither a thermometer nor a transient of its pressure tells it",
+        origin="judgement: filled and vented in steps of seconds it is 4 to 28 K off the room's",
+    )
     off_rows: int = setting(
         2000,
         unit="count",
