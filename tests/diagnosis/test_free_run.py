@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import numpy as np
@@ -135,10 +136,10 @@ def test_a_model_that_leaves_its_range_has_no_number_and_stops_nothing(
     found = {"before": residuals(problem, rig), "after": residuals(problem, worse)}
     honest = _free_run.replay
 
-    def left(model: Rig, recording: Recording) -> pamrs.Simulation:
+    def left(model: Rig, recording: Recording, **options: Any) -> pamrs.Simulation:
         if model.effects:
             raise SimulationError("contraction left the table")
-        return honest(model, recording)
+        return honest(model, recording, **options)
 
     monkeypatch.setattr(_free_run, "replay", left)
     runs, _ = _free_run.free_run(problem, found, rig, worse, None)

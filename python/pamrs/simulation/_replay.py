@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,7 +34,11 @@ _STATES = {
 
 
 def replay(
-    rig: Rig, recording: Recording, *, temperatures: Mapping[str, float] | None = None
+    rig: Rig,
+    recording: Recording,
+    *,
+    temperatures: Mapping[str, float] | None = None,
+    record: Sequence[str] | None = None,
 ) -> Simulation:
     """Simulate a rig from a recording's first values under its inputs.
 
@@ -53,6 +57,8 @@ def replay(
     temperatures : mapping of str to float, optional
         Temperature at which the gas of a chamber with an energy balance begins [K], by the name of
         the chamber; that of the room by default.
+    record : sequence of str, optional
+        Channels to keep; all by default.
 
     Returns
     -------
@@ -84,10 +90,11 @@ def replay(
     if temperatures:
         simulator = Simulator(rig, sample_time=recording.sample_time, initial=initial)
         _begin_at(simulator, temperatures)
-        return _run_from(simulator, drive, len(recording))
+        return _run_from(simulator, drive, len(recording), record)
     if not drive:
         drive["duration"] = float(recording.time[-1])
-    return simulate(rig, sample_time=recording.sample_time, initial=initial, **drive)
+    step = recording.sample_time
+    return simulate(rig, sample_time=step, initial=initial, record=record, **drive)
 
 
 def _begin_at(simulator: Simulator, temperatures: Mapping[str, float]) -> None:
@@ -112,7 +119,9 @@ def _begin_at(simulator: Simulator, temperatures: Mapping[str, float]) -> None:
     simulator.restore(begun)
 
 
-def _run_from(simulator: Simulator, drive: Mapping[str, Any], rows: int) -> Simulation:
+def _run_from(
+    simulator: Simulator, drive: Mapping[str, Any], rows: int, record: Sequence[str] | None
+) -> Simulation:
     """A run of so many rows under signals, as :func:`pamrs.simulate` has them, from where a
     simulator stands.
     """
@@ -128,7 +137,8 @@ def _run_from(simulator: Simulator, drive: Mapping[str, Any], rows: int) -> Simu
         samples=None if drive else rows - 1,
         **{k: each(v, slice(None, -1) if k in held else slice(1, None)) for k, v in drive.items()},
     )
-    channels = {name: np.concatenate([[first[name]], values]) for name, values in then.items()}
+    kept = then if record is None else record
+    channels = {name: np.concatenate([[first[name]], then[name]]) for name in kept}
     commands = {
         dotted(kind, name): values for kind in held for name, values in drive.get(kind, {}).items()
     }

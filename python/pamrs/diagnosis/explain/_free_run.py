@@ -24,7 +24,7 @@ from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
-from pamrs.simulation import differences, replay
+from pamrs.simulation import core_rig, differences, replay
 
 __all__ = ["Known", "free_run", "said_of_constants"]
 
@@ -260,6 +260,11 @@ def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
     return found
 
 
+def _measured(rig: Rig, recording: Recording) -> list[str]:
+    """Channels of a run that a recording has as well."""
+    return [name for name in core_rig(rig).channels if recorded_as(name) in recording.channels]
+
+
 def _misses(
     rig: Rig,
     driving: Recording,
@@ -271,7 +276,7 @@ def _misses(
     """What a free run misses of each measured channel, in units of its noise, at about so many
     samples at the most.
     """
-    result = replay(rig, driving, temperatures=begins)
+    result = replay(rig, driving, temperatures=begins, record=_measured(rig, logged))
     out = {}
     for name in differences(result, logged):
         channel = recorded_as(name)
@@ -358,7 +363,7 @@ def _errors(rig: Rig, prepared: Prepared) -> tuple[dict[str, float], str]:
     logged = _as_logged(prepared.recording)
     try:
         begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
-        run = replay(rig, logged, temperatures=begins)
+        run = replay(rig, logged, temperatures=begins, record=_measured(rig, logged))
         return differences(run, logged), ""
     except RecordingError:
         raise
