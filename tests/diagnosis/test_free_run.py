@@ -107,6 +107,25 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
     assert errors[0.0] < 500.0 or (skipped and not told)  # 400 Pa are noise
 
 
+def test_of_a_long_log_the_first_part_is_asked_and_said() -> None:
+    rig = parse_rig(WARM)
+    true = rig.with_effect("leak_muscle", {"conductance": 3e-8})
+    told = _free_run.Known(("chamber.dead_volume",), np.array([5e-4]), np.array([[5e-6]]))
+    warnings = replace(SETTINGS.warnings, off_samples=1000)
+    problem = problem_of(rig, [filled(true, "held_out", 2, PRESSURES)])
+    found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
+    runs = []
+    for settings in (SETTINGS, replace(SETTINGS, warnings=warnings)):
+        (run,), _ = _free_run.free_run(
+            replace(problem, settings=settings), found, rig, rig, None, told
+        )
+        assert run.channels["muscle_pressure"].off
+        runs.append(run)
+    whole, part = runs
+    assert (whole.note, part.note) == ("", "whether it is off was asked of its first 5 s")
+    assert part.channels == whole.channels
+
+
 def test_means_run_freely_under_the_commands_of_their_log() -> None:
     rig = pamrs.rigs.shoulder()
     whole = recorded(rig, "whole", "held_out")

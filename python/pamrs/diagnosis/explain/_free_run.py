@@ -156,21 +156,27 @@ def _judged(
     settings: DiagnosisSettings,
 ) -> FreeRun:
     """A free run with what it misses by more than noise and what is known of the values explain."""
-    far = settings.warnings.off_noises
-    doubtful = [name for name, e in run.channels.items() if e.noises > far]
+    far, most = settings.warnings.off_noises, settings.warnings.off_samples
+    doubtful = [
+        name
+        for name, e in run.channels.items()
+        if e.noises > far and channel_of(name) not in _FREED
+    ]
     if known is None or not doubtful:
         return run
-    left = _left(prepared, final, known, settings.warnings)
-    off = {
-        name
-        for name in doubtful
-        if left.get(name, math.inf) > far and channel_of(name) not in _FREED
-    }
-    return replace(run, channels={n: replace(e, off=n in off) for n, e in run.channels.items()})
+    logged, note = _as_logged(prepared.recording), run.note
+    if len(logged) > most:
+        logged = logged.between(stop=float(logged.time[most]))
+        part = f"whether it is off was asked of its first {logged.duration:.4g} s"
+        note = f"{note}; {part}" if note else part
+    left = _left(prepared, logged, final, known, settings.warnings)
+    off = {name for name in doubtful if left.get(name, math.inf) > far}
+    channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
+    return replace(run, channels=channels, note=note)
 
 
 def _left(
-    prepared: Prepared, final: Rig, known: Known, settings: WarningSettings
+    prepared: Prepared, logged: Recording, final: Rig, known: Known, settings: WarningSettings
 ) -> dict[str, float]:
     """What a free run misses of each channel [noise levels], at the least, where the values of the
     rig are as far from what is known of them as is likely, its commands come up to a sample earlier
@@ -178,8 +184,7 @@ def _left(
 
     Steps of Gauss and Newton inside that distance, each tried by a simulation.
     """
-    logged, count = _as_logged(prepared.recording), len(known.names)
-    begun = _begun(final, prepared)
+    begun, count = _begun(final, prepared), len(known.names)
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))

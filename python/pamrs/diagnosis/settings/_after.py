@@ -358,6 +358,14 @@ class WarningSettings(SettingsGroup):
         reason="samples of a channel by which what the whole rig misses is compared",
         origin="judgement: as many as tell a course of some seconds",
     )
+    off_samples: int = setting(
+        200_000,
+        unit="count",
+        least=1000,
+        reason="samples of a log, from its beginning, by which it is asked whether what is known "
+        "of the values explains what the whole rig misses: each value takes two runs",
+        origin="judgement: some ten seconds; a million samples took a minute and more",
+    )
     off_steps: int = setting(
         2,
         unit="1",
