@@ -14,7 +14,7 @@ from typing import Final
 
 from reproduction import store
 from reproduction.page import Section
-from reproduction.symbols import symbols
+from reproduction.statements import symbols
 
 __all__ = ["CHAPTERS", "every", "section"]
 
@@ -55,11 +55,11 @@ def section(
             progress(f"{name}: pictures")
         drawn = importlib.import_module(f"reproduction.{CHAPTERS[name]}_figures").pictures()
     return Section(
-        title=chapter.TITLE,
+        title=chapter.say.title,
         rows=rows,
-        headings=chapter.headings(),
+        headings=chapter.headings() if hasattr(chapter, "headings") else {},
         in_short=chapter.in_short(rows),
-        chosen=chapter.chosen(),
+        chosen=chapter.chosen() if hasattr(chapter, "chosen") else chapter.say.chosen(),
         pictures=drawn,
         symbols=symbols(name),
         tables=chapter.tables() if hasattr(chapter, "tables") else {},

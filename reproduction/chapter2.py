@@ -23,7 +23,6 @@ from pamrs.library.evaluate import free_contraction
 from pamrs.library.published import compare_entry
 from pamrs.rig import Muscle
 from pamrs.units import parse_unit
-from reproduction.score import OTHER, OWN, SAME, Apart, scored
 from reproduction.stand_in import (
     COUNT,
     EXTENSION,
@@ -35,55 +34,16 @@ from reproduction.stand_in import (
     fits,
     hysteresis,
 )
+from reproduction.statements import Statements
 
-__all__ = ["GROUPS", "TITLE", "chosen", "ends", "facts", "headings", "in_short", "over", "sample"]
+__all__ = ["chosen", "ends", "facts", "headings", "in_short", "over", "sample", "say"]
+
+#: The statements of the chapter.
+say: Final = Statements("chapter2")
 
 Array = NDArray[np.float64]
 
-TITLE: Final = "Chapter 2: quasi-static model of a muscle"
 NAME: Final = "ch2_075in"
-#: The groups by the name under which figures find them.
-GROUPS: Final = {
-    "muscle": NAME,
-    "shape": "shape of the muscle (2.2.3 to 2.2.5, Figs. 2.6 to 2.9)",
-    "blocked": "blocked force and braid angle (2.2.2, Fig. 2.5)",
-    "free": "moduli free at each pressure (2.2, Figs. 2.3, 2.4 and 2.10)",
-    "linear": "moduli linear in pressure, by order (2.3, Figs. 2.12 to 2.15)",
-    "three": "three of eight pressures (2.3, Figs. 2.16 and 2.17)",
-    "loops": "hysteresis (2.36), Fig. 2.11",
-}
-#: Lines of the library that are no part of this score.
-APART: Final[tuple[Apart, ...]] = (
-    (NAME, "wall from that extension", SAME),
-    (NAME, "least radius in extension", OTHER),
-    (NAME, "friction coefficient at 0.4 MPa", OWN),
-)
-CHOSEN: Final = (
-    (
-        "measured forces",
-        f"{COUNT} stand-ins",
-        (
-            "the muscle's are in figures only; rubber linear by itself (2.3), stiffened by the "
-            "pressure on the braid and softening where the hoop strain is about 2, as the text says"
-        ),
-    ),
-    (
-        "rubber, bond, contact, width",
-        "0.9 to 1.15 MPa, 2.2 to 3, 0.03 to 0.12 MPa, 1.45 to 1.75",
-        "drawn evenly; free contraction and activation as in the text, the rest a reading of it",
-    ),
-    (
-        "braid angle, wall, k0, floor of a stand-in",
-        "0.2 deg, 3 %, 3 %, 0.01 off at the most",
-        "what a person measures; the fits take the captions' numbers",
-    ),
-    ("noise of a force", "0.2 % of the level's largest", "none is published"),
-    (
-        "agreement over stand-ins",
-        "nine of ten",
-        "the median is shown; with fewer on either side the line cannot tell",
-    ),
-)
 _UNSURE: Final = 10  # one of so many stand-ins may be of another mind
 _LOW, _HIGH = (0, 1, 2), (5, 6, 7)  # levels of 10 to 30 and of 80 to 120 psi
 
@@ -109,7 +69,7 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     rows = compare_entry(entry(NAME)) + _shape() + _blocked()
     tell(f"chapter 2: fits of {COUNT} stand-ins")
     rows += _free() + _linear() + _three() + _loops()
-    return scored(rows, APART)
+    return say.scored(rows)
 
 
 def headings() -> dict[str, str]:
@@ -129,7 +89,7 @@ def chosen() -> list[tuple[str, str, str]]:
             else ", ".join(f"{x:.4g}" for x in value) + (" Pa" if name.endswith("set") else "")
         )
         numbers.append((f"muscle.{name}", shown, str(own.origins[name])))
-    return numbers + list(CHOSEN)
+    return numbers + say.chosen(COUNT)
 
 
 # --------------------------------------------------------------------------- the shape
@@ -172,7 +132,7 @@ def ends(muscle: Muscle, contraction: Array) -> tuple[Array, Array, Array]:
 
 
 def _shape() -> list[Comparison]:
-    group, muscle = GROUPS["shape"], _muscle()
+    muscle = _muscle()
     rest = 0.5 * float(muscle.parameters["rest_diameter"])
     inch = parse_unit("in").scale
     low = muscle.replace(neck_floor=0.3)
@@ -184,92 +144,25 @@ def _shape() -> list[Comparison]:
     apart = (cylinder.radius(step) - muscle.radius(step)) / rest
     printed = float(muscle.replace(geometry="elliptic_published").radius(at)[0])
     return [
-        judge(
-            group,
-            "least radius in extension, without a floor of our own",
-            "2.2.5: 'remains above 0.76 cm (0.3 in)'",
-            0.3,
-            least / inch,
-            "in",
-            relation="above",
-            note=(
-                "the equations neck on until the bladder fills the braid; the package stops at "
-                "0.80 of the radius at rest because of this sentence"
-            ),
-        ),
-        judge(
-            group,
-            "the same by (2.27), (2.28) and (2.30) as printed",
-            "2.2.5: 'remains above 0.76 cm (0.3 in)'",
-            0.3,
-            printed / inch,
-            "in",
-            relation="above",
-            note="as printed it does not neck at all (docs/decisions/0008)",
-            apart=OTHER,
-        ),
-        judge(
-            group,
-            "bladder at 2.75 % extension over that at rest",
-            "2.2.5: 'This allows the bladder thicken'",
-            1.0,
-            thick,
-            relation="above",
-        ),
+        say("least_radius_extension", least / inch),
+        say("radius_as_printed", printed / inch),
+        say("bladder_2_75", thick),
         *_on_ends(),
-        judge(
-            group,
-            "radius of the cylinder over that of the elliptic ends, less 1, largest",
-            "2.2.5: 'matches with the elliptic ends model more accurately'",
-            math.nan,
-            float(np.abs(apart).max()),
-            cannot_tell=(
-                "the measured radii are in Fig. 2.8 only; over the radius at rest the two models "
-                f"differ by {apart[0]:+.3f} at 0.5 % extension, {apart[1]:+.3f} at 10 % and "
-                f"{apart[2]:+.3f} at 25 % contraction"
-            ),
-        ),
+        say("radius_cylinder_elliptic", float(np.abs(apart).max()), apart[0], apart[1], apart[2]),
     ]
 
 
 def _on_ends() -> list[Comparison]:
-    group, muscle = GROUPS["shape"], _muscle()
+    muscle = _muscle()
     last = free_contraction(muscle, 120.0 * PSI)
     k = ends(muscle, np.array([0.0, last]))[0]
     wider, narrower = _braids()
     return [
-        judge(
-            group,
-            "axis ratio of the ends at free contraction, 120 psi, off a circle's 1",
-            "2.2.5: 'with the ends becoming more hemispherical as the PAM radius expands'",
-            abs(float(k[0]) - 1.0),
-            abs(float(k[1]) - 1.0),
-            relation="below",
-            note=(
-                f"published: at rest; {k[1]:.2f} at a contraction of {last:.3f}. The slopes of "
-                "(2.35) have no unit; only per centimetre of this muscle do the ends become round"
-            ),
+        say(
+            "axis_ratio_ends", abs(float(k[1]) - 1.0), k[1], last, published=abs(float(k[0]) - 1.0)
         ),
-        judge(
-            group,
-            "braid on an end at the radius at rest, over the fibre",
-            "2.2.5: 'zero at resting radius (0.95 cm [0.375 in])'",
-            0.0,
-            float(ends(muscle, np.array([0.0]))[2][0]) / muscle.fibre_length,
-            tolerance=1e-6,
-        ),
-        judge(
-            group,
-            "braid on an end, radius 10 % wider over 10 % narrower",
-            "2.2.5: 'higher during radius expansion than radius contraction of an equal amount'",
-            1.0,
-            wider / narrower,
-            relation="above",
-            note=(
-                "0.98 at 5 %, 0.95 at 15 %: k rises in extension, so that a narrow end is longer; "
-                "by (2.27) as printed the muscle does not become narrower, and nothing can be asked"
-            ),
-        ),
+        say("braid_end_radius", float(ends(muscle, np.array([0.0]))[2][0]) / muscle.fibre_length),
+        say("braid_end_radius_10", wider / narrower),
     ]
 
 
@@ -295,7 +188,6 @@ def _braids() -> tuple[float, float]:
 
 
 def _blocked() -> list[Comparison]:
-    group = GROUPS["blocked"]
     pressure = 60.0 * PSI
     own = _muscle().replace(model="kothera", friction_coefficient=0.0, friction_pressure_slope=0.0)
 
@@ -307,85 +199,43 @@ def _blocked() -> list[Comparison]:
     constant, other = (abs(of(model, 74.0) / measured - 1.0) for model in ("ferraresi", "kothera"))
     degree = of("kothera", 75.5) / measured - 1.0
     return [
-        judge(
-            group,
-            "blocked force, constant over non-constant thickness",
-            "2.2.1: 'the blocked force is overestimated at each pressure'",
-            1.0,
-            of("ferraresi", 76.5) / measured,
-            relation="above",
-            note="the same at every pressure: both are straight lines through zero (2.8), (2.16)",
-        ),
-        judge(
-            group,
-            "off by at 74 deg: constant over non-constant thickness",
-            (
-                "2.2.2: 'the constant-thickness model would be more accurate than the "
-                "non-constant thickness model'"
-            ),
-            1.0,
-            constant / other,
-            relation="below",
-            note=(
-                f"{100 * constant:.1f} and {100 * other:.0f} % off, where the non-constant one at "
-                "76.5 deg stands for the measured force, which the text says it fits 'more closely'"
-            ),
-        ),
-        judge(
-            group,
-            "blocked force at 75.5 deg over 76.5 deg, less 1",
-            "2.2.2: 'Even small variations in braid angle can produce large changes'",
-            math.nan,
-            degree,
-            cannot_tell="no number is printed for small or large",
-        ),
+        say("blocked_force_constant", of("ferraresi", 76.5) / measured),
+        say("off_74_deg", constant / other, 100 * constant, 100 * other),
+        say("blocked_force_75", degree),
     ]
 
 
 # -------------------------------------------------------------------- the stand-ins
 
 
-def over(
-    group: str,
-    fact: str,
-    where: str,
-    published: float,
-    values: Sequence[float],
-    unit: str = "",
-    *,
-    note: str = "",
-    **more: Any,
-) -> Comparison:
+def over(key: str, values: Sequence[float], *said: Any) -> Comparison:
     """A statement put to every stand-in: the median, and a verdict where nine of ten have it.
 
     Parameters
     ----------
-    group, fact, where, published, unit, note
-        As for :func:`pamrs.comparison.judge`.
+    key : str
+        Its id.
     values : sequence of float
         Ours, one for each stand-in.
-    **more
-        ``relation``, ``tolerance``, ``used`` and ``apart`` of the same.
+    *said
+        What stands in the places of its texts.
 
     Returns
     -------
     Comparison
     """
-    rows = [judge(group, fact, where, published, value, unit, **more) for value in values]
+    entry = say.entry(key, *said)
+    note = entry.pop("note", "")
+    rows = [judge(ours=value, **entry) for value in values]
     having = sum(row.verdict == "agree" for row in rows)
     share = having / len(rows)
     mixed = _UNSURE * min(having, len(rows) - having) > len(rows)
     words = f"{min(values):.3g} to {max(values):.3g} over {len(rows)} stand-ins"
     return judge(
-        group,
-        fact,
-        where,
-        published,
-        float(np.median(values)),
-        unit,
+        ours=float(np.median(values)),
         cannot_tell=f"{100 * share:.0f} % of the stand-ins agree" if mixed else "",
         note="; ".join(part for part in (words, note) if part),
-        **more,
+        **entry,
     )
 
 
@@ -395,70 +245,22 @@ def sample() -> list[Fits]:
 
 
 def _free() -> list[Comparison]:
-    group, every = GROUPS["free"], sample()
+    every = sample()
     shapes = ("constant", "cylinder", "elliptic")
     longer = {s: np.array([f.part(f.free[s], extended=True) for f in every]) for s in shapes}
     shorter = {s: np.array([f.part(f.free[s], extended=False) for f in every]) for s in shapes}
     above = [_departure(f) for f in every]
     return [
         over(
-            group,
-            "constant thickness: least of the eight blocked forces over the measured one",
-            "2.2.1, Fig. 2.3: 'the blocked force is overestimated at each pressure'",
-            1.0,
-            [float(f.blocked(f.free["constant"]).min()) for f in every],
-            relation="above",
-            used=True,
-            note="the stand-ins have the other model's wall; the line above has it without them",
-            apart=SAME,
+            "constant_thickness_least", [float(f.blocked(f.free["constant"]).min()) for f in every]
         ),
+        over("constant_thickness_error", (longer["constant"] / shorter["constant"]).tolist()),
+        over("non_constant_thickness", (shorter["cylinder"] / shorter["constant"]).tolist()),
+        over("elliptic_ends_error", (longer["elliptic"] / longer["cylinder"]).tolist()),
         over(
-            group,
-            "constant thickness: error in extension over that in contraction",
-            "2.2.1, Fig. 2.3: 'cannot accurately capture the extensile behavior'",
-            1.0,
-            (longer["constant"] / shorter["constant"]).tolist(),
-            relation="above",
-            note="rms, order 4, moduli free at each pressure",
+            "elliptic_ends_error_contraction", (shorter["elliptic"] / shorter["cylinder"]).tolist()
         ),
-        over(
-            group,
-            "non-constant thickness: error over that of constant thickness, contraction",
-            "2.2.2, Fig. 2.5: 'clearly fits experimental data more closely'",
-            1.0,
-            (shorter["cylinder"] / shorter["constant"]).tolist(),
-            relation="below",
-        ),
-        over(
-            group,
-            "elliptic ends: error in extension over that of the cylinder",
-            "2.2.5, Fig. 2.10: 'much more accurate in both extension and contraction'",
-            1.0,
-            (longer["elliptic"] / longer["cylinder"]).tolist(),
-            relation="below",
-            note="the stand-ins have such ends, with other k0, floor, braid and wall",
-        ),
-        over(
-            group,
-            "elliptic ends: error in contraction over that of the cylinder",
-            "2.2.5, Fig. 2.10: 'much more accurate in both extension and contraction'",
-            1.0,
-            (shorter["elliptic"] / shorter["cylinder"]).tolist(),
-            relation="below",
-            apart=SAME,
-        ),
-        over(
-            group,
-            "departure of E1 from a line: all eight pressures over those above 30 psi",
-            (
-                "2.2.1, Fig. 2.4: 'a clear linear trend between the pressure and the modulus "
-                "values at pressures greater than 0.2 MPa (30 psi)'"
-            ),
-            1.0,
-            above,
-            relation="above",
-            note="rms over the spread of E1; elliptic ends",
-        ),
+        over("departure_E1_line", above),
     ]
 
 
@@ -479,140 +281,46 @@ def _departure(found: Fits) -> float:
 
 
 def _linear() -> list[Comparison]:
-    group, every = GROUPS["linear"], sample()
+    every = sample()
     errors = [np.array([f.error(f.linear[m]) for m in ORDERS]) for f in every]  # orders, levels
     best = [int(np.sum(error.argmin(axis=0) == len(ORDERS) - 1)) for error in errors]
     drops = [float(np.mean(np.diff(error, axis=0) < 0.0)) for error in errors]
     whole = [np.sqrt(np.mean(f.linear[4].all_residuals ** 2)) for f in every]
     free = [np.sqrt(np.mean(f.free["elliptic"].all_residuals ** 2)) for f in every]
     return [
-        over(
-            group,
-            "share of pressures and steps of the order in which the error decreases",
-            "2.3, Fig. 2.13: 'In nearly all cases, increasing polynomial order decreases error'",
-            0.8,
-            drops,
-            relation="above",
-            note=(
-                "'nearly all' read as four of five; over all points together each order must be "
-                "at least as good, level by level it need not"
-            ),
-        ),
-        over(
-            group,
-            "pressures at which order 4 has the least error",
-            (
-                "2.3, Fig. 2.13: 'the fourth-order polynomial error is the lowest for each tested "
-                "pressure except 30 psi'"
-            ),
-            7.0,
-            best,
-            tolerance=1.0,
-            note="of eight; which one is left out is the data's",
-        ),
+        over("share_pressures_steps", drops),
+        over("pressures_which_order", best),
         *_by_pressure(errors),
-        over(
-            group,
-            "linear over free moduli: error of all points, order 4",
-            "2.2.6: 'results were found to retain most of their accuracy'",
-            2.0,
-            [float(a / b) for a, b in zip(whole, free, strict=True)],
-            relation="below",
-            note="read as less than twice the error",
-        ),
+        over("linear_free_moduli", [float(a / b) for a, b in zip(whole, free, strict=True)]),
         *_stresses(),
     ]
 
 
 def _by_pressure(errors: list[Array]) -> list[Comparison]:
     """Errors of the orders at high and at low pressures; (orders, levels) for each stand-in."""
-    group = GROUPS["linear"]
     high = [error[:, list(_HIGH)].mean(axis=1) for error in errors]
     low = [error[:, list(_LOW)].mean(axis=1) for error in errors]
     return [
-        over(
-            group,
-            "order 1: error at 80 to 120 psi over 10 to 30 psi",
-            ("2.3: 'the first- and second-order functions exhibit higher error at high pressures'"),
-            1.0,
-            [float(h[0] / x[0]) for h, x in zip(high, low, strict=True)],
-            relation="above",
-        ),
-        over(
-            group,
-            "order 2: the same",
-            ("2.3: 'the first- and second-order functions exhibit higher error at high pressures'"),
-            1.0,
-            [float(h[1] / x[1]) for h, x in zip(high, low, strict=True)],
-            relation="above",
-            note="a fit in newtons leaves more of a low pressure's small force",
-        ),
-        over(
-            group,
-            "order 4: the same",
-            "2.3: 'the fourth-order model exhibits higher model error at low pressures'",
-            1.0,
-            [float(h[3] / x[3]) for h, x in zip(high, low, strict=True)],
-            relation="below",
-        ),
-        over(
-            group,
-            "order 4 over order 1: error at 80 to 120 psi",
-            (
-                "2.3: 'a fourth-order polynomial is much better at capturing PAM "
-                "force-contraction behavior at high pressure'"
-            ),
-            0.5,
-            [float(h[3] / h[0]) for h in high],
-            relation="below",
-            note="'much better' read as half",
-        ),
+        over("order_1_error", [float(h[0] / x[0]) for h, x in zip(high, low, strict=True)]),
+        over("order_2_error", [float(h[1] / x[1]) for h, x in zip(high, low, strict=True)]),
+        over("order_4_error", [float(h[3] / x[3]) for h, x in zip(high, low, strict=True)]),
+        over("order_4_over_1", [float(h[3] / h[0]) for h in high]),
     ]
 
 
 def _stresses() -> list[Comparison]:
-    group, every = GROUPS["linear"], sample()
+    every = sample()
     first = [_first_order(f) for f in every]
     slopes = [float(f.linear[4].x[0]) for f in every]
     bend = [_softening(f, 120.0 * PSI) for f in every]
     return [
         over(
-            group,
-            "slope and offset of E1: largest spread over the orders",
-            (
-                "2.3, Fig. 2.14: 'The E1 term has a fairly consistent slope and y-intercept in "
-                "each of the plots'"
-            ),
-            0.25,
+            "slope_offset_E1",
             [spread for spread, _ in first],
-            relation="below",
-            note=(
-                "standard deviation over the mean, orders 1 to 4; over 2 to 4 "
-                f"{float(np.median([rest for _, rest in first])):.2f}; 'fairly consistent' read as "
-                "a quarter"
-            ),
+            float(np.median([rest for _, rest in first])),
         ),
-        over(
-            group,
-            "rise of E1 with pressure, order 4",
-            (
-                "2.3, Fig. 2.15: 'increasing pressure increases the slope of the curve for low "
-                "strains'"
-            ),
-            0.0,
-            slopes,
-            relation="above",
-            used=True,
-        ),
-        over(
-            group,
-            "least slope of the stress above a hoop strain of 2, 120 psi, over E1",
-            "2.3, Fig. 2.15: 'including a negative stiffness at high pressure'",
-            0.0,
-            bend,
-            relation="below",
-            used=True,
-        ),
+        over("rise_E1_pressure", slopes),
+        over("least_slope_stress", bend),
     ]
 
 
@@ -637,81 +345,25 @@ def _softening(found: Fits, pressure: float) -> float:
 
 
 def _three() -> list[Comparison]:
-    group, every = GROUPS["three"], sample()
+    every = sample()
     ratio = np.array([f.error(f.three) / f.error(f.linear[4]) for f in every])
     error = np.array([f.error(f.three) for f in every])
     predicted = [k for k, psi in enumerate(LEVELS) if psi not in THREE]
     others = [k for k in predicted if k > 0]
     names = ", ".join(f"{psi:g}" for psi in THREE)
     return [
-        over(
-            group,
-            "error at 10 psi: three pressures over all eight",
-            "2.3, Fig. 2.17: 'error only increases significantly at 0.07 MPa (10 psi)'",
-            1.2,
-            ratio[:, 0].tolist(),
-            relation="above",
-            note=f"fit of {names} psi; 'significantly' read as a fifth",
-        ),
-        over(
-            group,
-            "the same, largest of the other seven",
-            "2.3, Fig. 2.17: 'shows little change at the other tested pressure levels'",
-            1.2,
-            ratio[:, 1:].max(axis=1).tolist(),
-            relation="below",
-            note="'little change' read as less than a fifth more",
-        ),
-        over(
-            group,
-            "largest error of the pressures between the three",
-            "2.3, Fig. 2.16: 'the force is still predicted extremely well for all pressures'",
-            5.0,
-            (100.0 * error[:, others].max(axis=1)).tolist(),
-            "%",
-            relation="below",
-            note="30, 40, 80 and 100 psi; 'extremely well' read as 5 % of the level's largest",
-        ),
-        over(
-            group,
-            "largest error of all predicted pressures",
-            "2.3, Fig. 2.16: 'the force is still predicted extremely well for all pressures'",
-            5.0,
-            (100.0 * error[:, predicted].max(axis=1)).tolist(),
-            "%",
-            relation="below",
-            note="with 10 psi, which is extrapolated",
-            apart=OTHER,
-        ),
+        over("error_10_psi", ratio[:, 0].tolist(), names),
+        over("largest_other_seven", ratio[:, 1:].max(axis=1).tolist()),
+        over("largest_error_pressures", (100.0 * error[:, others].max(axis=1)).tolist()),
+        over("largest_error_all", (100.0 * error[:, predicted].max(axis=1)).tolist()),
     ]
 
 
 def _loops() -> list[Comparison]:
-    group = GROUPS["loops"]
     found = np.array([hysteresis(number) for number in range(COUNT)])
     return [
-        over(
-            group,
-            "error of a loop without (2.36) over that with it",
-            (
-                "2.2.5, Fig. 2.11: 'can easily capture this hysteresis with the addition of a "
-                "friction term'"
-            ),
-            1.0,
-            found[:, 2].tolist(),
-            relation="above",
-            note="loops whose friction slips in over 0.4 % of contraction after each reversal",
-        ),
-        over(
-            group,
-            "c_F at 0.4 MPa from such loops",
-            "2.2.5: 'cF = 0.16 − 0.145P , P in MPa'",
-            0.16 - 0.145 * 0.4,
-            (found[:, 0] + 0.4 * found[:, 1]).tolist(),
-            tolerance=0.005,
-            used=True,
-            apart=OWN,
-        ),
+        over("error_loop_without", found[:, 2].tolist()),
+        over("friction_coefficient", (found[:, 0] + 0.4 * found[:, 1]).tolist()),
     ]
 
 
@@ -720,49 +372,26 @@ def _loops() -> list[Comparison]:
 
 def in_short(rows: list[Comparison]) -> list[str]:
     """A few sentences about the statements."""
-    told = Told(rows, GROUPS, 2)
+    told = Told(rows, say.groups, 2)
     fitted = [row for row in rows if "stand-ins" in row.note and not row.apart]
-    return [
+    return say.short(
+        (COUNT, len(fitted), verdicts(fitted)),
+        (told.row("blocked", _AT_74).note.split(" and ")[0],),
+        (),
         (
-            "The measured forces are in figures only. What the text says of its fits is asked of "
-            f"{COUNT} muscles that stand in for its own: rubber that is linear by itself, "
-            "stiffened by the pressure on the braid and soft beyond a hoop strain of 2, with "
-            "shape, braid and wall a little off what the fit believes. A stand-in can show that "
-            "the statements go together, not that they are true of the muscle. Of "
-            f"{len(fitted)} such statements: {verdicts(fitted)}."
+            told.ours("three", "largest error of the pressures between the three", 1),
+            told.ours("three", "error at 10 psi: three pressures over all eight", 1),
         ),
         (
-            "At 74 deg the model of constant thickness gives the force that the other one gives at "
-            f"76.5 deg, within {told.row('blocked', _AT_74).note.split(' and ')[0]} %: the text's "
-            "remark on the braid angle holds, and with it the wall of 1/8 in, which no caption "
-            "prints."
-        ),
-        (
-            "The blocked force has no deadband in any of these models: at rest length every strain "
-            "is zero, so 'Both models account for the fact that the PAM begins to produce force at "
-            "non-zero pressure' is not what (2.8) and (2.16) say."
-        ),
-        (
-            "From 20, 60 and 120 psi those between are predicted to "
-            f"{told.ours('three', 'largest error of the pressures between the three', 1)} % of "
-            "the level's largest force, and 10 psi, which is extrapolated, is "
-            f"{told.ours('three', 'error at 10 psi: three pressures over all eight', 1)} times as "
-            "wrong as with all eight."
-        ),
-        (
-            f"Order 2 errs {told.ours('linear', 'order 2: the same')} times as much at high "
-            "pressures as at low ones"
-            + {
+            told.ours("linear", "order 2: the same"),
+            {
                 "agree": ".",
                 "cannot tell": "; the stand-ins are not of one mind there.",
                 "differs": ", where the text has more.",
-            }[told.row("linear", "order 2: the same").verdict]
+            }[told.row("linear", "order 2: the same").verdict],
         ),
-        (
-            "There is no Table 2.1 in the text; the geometry is that of the captions, of which one "
-            "prints 1.5 cm beside 7.3 in."
-        ),
-    ]
+        (),
+    )
 
 
 _AT_74: Final = "off by at 74 deg: constant over non-constant thickness"

@@ -4,7 +4,6 @@ fits (the source's figures are not digitised).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -16,7 +15,7 @@ from pamrs.fit import MuscleFit
 from pamrs.library import ch2_075in
 from pamrs.report.figures import COLOURS
 from reproduction import drawing
-from reproduction.chapter2 import GROUPS, ends, sample
+from reproduction.chapter2 import ends, sample, say
 from reproduction.page import Picture
 from reproduction.stand_in import EXTENSION, LEVELS, ORDERS, PSI, THREE, Fits, stand_in
 
@@ -24,7 +23,6 @@ __all__ = ["pictures"]
 
 Array = NDArray[np.float64]
 
-_KEPT: Final = 64
 _MM: Final = 1e3
 _SHOWN: Final = 0  # the stand-in of the pictures
 _ORDER_COLOUR: Final = ("#9ca3af", "#56b4e9", "#0072b2", "#1f1f1f")
@@ -32,91 +30,25 @@ _DOTS: Final[dict[str, Any]] = {"ls": "", "marker": ".", "ms": 2.5, "color": "#9
 
 
 def pictures() -> list[Picture]:
-    """Every picture of the chapter, in the order of its figures.
-
-    Returns
-    -------
-    list of Picture
-    """
-    one = "one stand-in, 10 to 120 psi; grey: its forces"
-    drawn: list[tuple[str, str, Callable[[], Figure], str]] = [
-        (
-            "shape",
-            "shape",
-            _shape,
-            "Fig. 2.8: radius and wall of the cylinder, of the elliptic ends and of (2.27) and "
-            "(2.28) as printed, which does not neck.",
-        ),
-        ("ends", "shape", _ends, "Fig. 2.9: axis ratio (2.35), and the braid on one end."),
-        (
-            "blocked",
-            "blocked",
-            _blocked,
-            "Fig. 2.5: blocked force with constant (2.8) and non-constant (2.16) thickness, for "
-            "two braid angles.",
-        ),
-        (
-            "free",
-            "free",
-            _free,
-            f"Figs. 2.3 and 2.10: {one}; lines: order 4 with moduli free at each pressure, "
-            "constant thickness and elliptic ends.",
-        ),
-        (
-            "moduli",
-            "free",
-            _moduli,
-            "Figs. 2.4 and 2.14: moduli of one stand-in, free at each pressure (dots) and linear "
-            "in it (lines).",
-        ),
-        ("orders", "linear", _orders, f"Fig. 2.12: {one}; lines: moduli linear in pressure."),
-        (
-            "errors",
-            "linear",
-            _errors,
-            "Fig. 2.13: error (2.37) by order, median and range of all stand-ins.",
-        ),
-        (
-            "stress",
-            "linear",
-            _stress,
-            "Fig. 2.15: stress of one stand-in (grey) and of its fit of order 4, 10 to 120 psi; "
-            "beyond the strains that were measured the fit is not drawn.",
-        ),
-        (
-            "three",
-            "three",
-            _three,
-            "Fig. 2.16: one stand-in; black: the three pressures of the fit, red: those predicted.",
-        ),
-        (
-            "three_errors",
-            "three",
-            _three_errors,
-            "Fig. 2.17: error (2.37) with three and with eight pressures, median and range of all "
-            "stand-ins.",
-        ),
-        (
-            "loops",
-            "loops",
-            _loops,
-            "Fig. 2.11: loops of one stand-in (grey) and the fit of order 4 with the friction of "
-            "(2.36).",
-        ),
-    ]
-    return [
-        Picture(f"ch2_{name}", GROUPS[group], caption, drawing.png(draw, _KEPT))
-        for name, group, draw, caption in drawn
-    ]
-
-
-def _axes(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, list[Axes]]:
-    figure, cells = drawing.figure(rows, columns, height, squeeze=False, **more)
-    return figure, list(cells.ravel())
+    """Every picture of the chapter, in the order of its figures."""
+    drawn = {
+        "ch2_shape": _shape,
+        "ch2_ends": _ends,
+        "ch2_blocked": _blocked,
+        "ch2_free": _free,
+        "ch2_moduli": _moduli,
+        "ch2_orders": _orders,
+        "ch2_errors": _errors,
+        "ch2_stress": _stress,
+        "ch2_three": _three,
+        "ch2_three_errors": _three_errors,
+        "ch2_loops": _loops,
+    }
+    return drawing.pictures(say, drawn)
 
 
 def _shape() -> Figure:
-    figure, (left, right) = _axes(1, 2, 3.3)
+    figure, (left, right) = drawing.axes(1, 2, 3.3)
     muscle = ch2_075in()
     e = np.linspace(EXTENSION, 0.25, 400)
     for name, label, colour, style in (
@@ -137,25 +69,23 @@ def _shape() -> Figure:
 
 
 def _ends() -> Figure:
-    figure, (left, right) = _axes(1, 2, 3.0)
+    figure, (left, right) = drawing.axes(1, 2, 3.0)
     muscle = ch2_075in()
     e = np.linspace(-0.0065, 0.38, 600)
     k, _, braid = ends(muscle, e)
     left.plot(100.0 * e, k, color=COLOURS["after"])
     left.axhline(1.0, color="#9ca3af", lw=0.8, ls=":")
-    left.set_xlabel("contraction [%]")
-    left.set_ylabel("axis ratio k [1]")
+    left.set(xlabel="contraction [%]", ylabel="axis ratio k [1]")
     rest = 0.5 * float(muscle.parameters["rest_diameter"])
     near = e < 0.2
     right.plot(_MM * muscle.radius(e[near]), _MM * braid[near], color=COLOURS["after"])
     right.axvline(_MM * rest, color="#9ca3af", lw=0.8, ls=":")
-    right.set_xlabel("radius [mm]")
-    right.set_ylabel("braid on one end [mm]")
+    right.set(xlabel="radius [mm]", ylabel="braid on one end [mm]")
     return figure
 
 
 def _blocked() -> Figure:
-    figure, cells = _axes(1, 2, 3.0, sharey=True)
+    figure, cells = drawing.axes(1, 2, 3.0, sharey=True)
     pressure = np.linspace(0.0, 120.0, 25) * PSI
     own = ch2_075in().replace(friction_coefficient=0.0, friction_pressure_slope=0.0)
     measured = own.replace(model="kothera").force(pressure, 0.0)
@@ -173,8 +103,7 @@ def _blocked() -> Figure:
             ls=":",
             label="(2.16) at 76.5 deg",
         )
-        cell.set_title(f"braid of {degrees:g} deg")
-        cell.set_xlabel("pressure [MPa]")
+        cell.set(title=f"braid of {degrees:g} deg", xlabel="pressure [MPa]")
     cells[0].set_ylabel("blocked force [kN]")
     cells[0].legend(fontsize=7.5, frameon=False)
     return figure
@@ -198,7 +127,7 @@ def _levels(cell: Axes, fit: MuscleFit, colours: dict[float, str] | str) -> None
 
 
 def _free() -> Figure:
-    figure, cells = _axes(1, 2, 3.8, sharey=True)
+    figure, cells = drawing.axes(1, 2, 3.8, sharey=True)
     found = sample()[_SHOWN]
     for cell, name, title, colour in (
         (cells[0], "constant", "constant thickness, cylinder", COLOURS["before"]),
@@ -212,7 +141,7 @@ def _free() -> Figure:
 
 
 def _moduli() -> Figure:
-    figure, cells = _axes(1, 4, 2.8)
+    figure, cells = drawing.axes(1, 4, 2.8)
     found = sample()[_SHOWN]
     pressure = np.asarray(found.table.levels)
     free = np.array(
@@ -228,8 +157,7 @@ def _moduli() -> Figure:
             line = x[k] * pressure + x[order + k]
             reach.append(line[2:] / 1e6)
             cell.plot(pressure / 1e6, line / 1e6, color=colour, lw=1.2, label=f"order {order}")
-        cell.set_title(f"E{k + 1}")
-        cell.set_xlabel("pressure [MPa]")
+        cell.set(title=f"E{k + 1}", xlabel="pressure [MPa]")
         values = np.concatenate(reach)
         room = 0.25 * float(np.ptp(values))
         cell.set_ylim(float(values.min()) - room, float(values.max()) + room)
@@ -239,7 +167,7 @@ def _moduli() -> Figure:
 
 
 def _orders() -> Figure:
-    figure, cells = _axes(2, 2, 5.6, sharex=True, sharey=True)
+    figure, cells = drawing.axes(2, 2, 5.6, sharex=True, sharey=True)
     found = sample()[_SHOWN]
     for order, cell in zip(ORDERS, cells, strict=True):
         _levels(cell, found.linear[order], COLOURS["after"])
@@ -262,14 +190,13 @@ def _bands(cell: Axes, sets: list[tuple[str, str, Array]]) -> None:
             at, 100.0 * middle, yerr=100.0 * reach, fmt="o", ms=4, lw=1.0, color=colour, label=label
         )
     cell.set_xticks(places, [f"{psi:g}" for psi in LEVELS])
-    cell.set_xlabel("pressure [psi]")
-    cell.set_ylabel("error (2.37) [%]")
+    cell.set(xlabel="pressure [psi]", ylabel="error (2.37) [%]")
     cell.set_ylim(bottom=0.0)
     cell.legend(fontsize=7.5, frameon=False)
 
 
 def _errors() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.2)
+    figure, (cell,) = drawing.axes(1, 1, 3.2)
     every = sample()
     _bands(
         cell,
@@ -282,7 +209,7 @@ def _errors() -> Figure:
 
 
 def _stress() -> Figure:
-    figure, (left, right) = _axes(1, 2, 3.0)
+    figure, (left, right) = drawing.axes(1, 2, 3.0)
     own, found = stand_in(_SHOWN), sample()[_SHOWN]
     colours = _shades()
     for psi in LEVELS:
@@ -310,7 +237,7 @@ def _shades() -> dict[float, str]:
 
 
 def _three() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.8)
+    figure, (cell,) = drawing.axes(1, 1, 3.8)
     colours = {psi: "#1f1f1f" if psi in THREE else COLOURS["before"] for psi in LEVELS}
     _levels(cell, sample()[_SHOWN].three, colours)
     cell.set_ylabel("force [kN]")
@@ -318,7 +245,7 @@ def _three() -> Figure:
 
 
 def _three_errors() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.0)
+    figure, (cell,) = drawing.axes(1, 1, 3.0)
     every: list[Fits] = sample()
     _bands(
         cell,
@@ -331,7 +258,7 @@ def _three_errors() -> Figure:
 
 
 def _loops() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.8)
+    figure, (cell,) = drawing.axes(1, 1, 3.8)
     own, fit = stand_in(_SHOWN), sample()[_SHOWN].linear[4]
     loops = own.loops()
     for psi in LEVELS:
@@ -347,6 +274,5 @@ def _loops() -> Figure:
             color=COLOURS["after"],
             lw=0.9,
         )
-    cell.set_xlabel("contraction [%]")
-    cell.set_ylabel("force [kN]")
+    cell.set(xlabel="contraction [%]", ylabel="force [kN]")
     return figure

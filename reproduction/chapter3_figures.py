@@ -5,7 +5,6 @@ digitised).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from functools import partial
 from typing import Any, Final
 
@@ -16,14 +15,12 @@ from matplotlib.figure import Figure
 from pamrs.design import lift
 from pamrs.report.figures import COLOURS, decimate
 from reproduction import drawing, elbow
-from reproduction.chapter3 import GROUPS, step_by_area
+from reproduction.chapter3 import say, step_by_area
 from reproduction.elbow import FOOT_POUND, PSI
 from reproduction.page import Picture
 
 __all__ = ["pictures"]
 
-#: Colours of a picture.
-_KEPT: Final = 64
 _COLOUR: Final = {"conserving": COLOURS["after"], "printed": COLOURS["before"]}
 _NAMES: Final = {
     "conserving": "torque that conserves power",
@@ -34,97 +31,19 @@ _ROTATION: Final = "rotation from the rest angle [deg]"
 
 
 def pictures() -> list[Picture]:
-    """Every picture of the chapter, in the order of its figures.
-
-    Returns
-    -------
-    list of Picture
-    """
-    return [
-        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
-        for name, group, draw, caption in _pictures()
-    ]
-
-
-def _pictures() -> list[tuple[str, str, Callable[[], Figure], str]]:
-    """Name, group, function and caption of each picture."""
-    return [
-        (
-            "fig3_07_torque",
-            "torque",
-            _torque,
-            (
-                "Fig. 3.7: torque of six muscles at 150 psi by torque law and muscle; the bar is "
-                "the published range."
-            ),
-        ),
-        (
-            "muscles",
-            "torque",
-            _muscles,
-            "Where the torque is above 200 ft lbf at 150 psi, by the number of muscles.",
-        ),
-        (
-            "fig3_08_step",
-            "step",
-            _step,
-            "Fig. 3.8: step of pressure with 100 lb at the tip, three valves; dashed: published.",
-        ),
-        (
-            "fig3_08_valve",
-            "step",
-            _valve,
-            (
-                "Peak and mean rate of that step by the valve's effective area; the mean jumps "
-                "where a swing first reaches 90 deg."
-            ),
-        ),
-        (
-            "fig3_12_triangle",
-            "triangle",
-            _triangle,
-            (
-                "Fig. 3.12: triangular pressure of 0.05 Hz with 135 lb, without hysteresis and "
-                "with that of the 0.75-in muscle."
-            ),
-        ),
-        (
-            "fig3_13_loop",
-            "triangle",
-            _loop,
-            (
-                "Fig. 3.13: torque of the payload by (3.24) over pressure in the same runs; arrows "
-                "show the way round."
-            ),
-        ),
-        (
-            "fig3_16_ramp",
-            "ramp",
-            _ramp,
-            (
-                "Fig. 3.16: ramp to 145 psi and hold with 100 lb; dashed: the published largest "
-                "torque and its rotation."
-            ),
-        ),
-        (
-            "eq3_24_payload",
-            "construction",
-            _payload,
-            (
-                "(3.24): torque of payloads at 20 in against that of the muscles at 150 psi; dots: "
-                "where the arm rests."
-            ),
-        ),
-        (
-            "lift",
-            "construction",
-            _lift,
-            (
-                "How far a payload is lifted at a pressure; dots: 83 deg with 100 lb at 145 psi "
-                "(3.4), 90 deg at 150 psi (3.2.4)."
-            ),
-        ),
-    ]
+    """Every picture of the chapter, in the order of its figures."""
+    drawn = {
+        "fig3_07_torque": _torque,
+        "muscles": _muscles,
+        "fig3_08_step": _step,
+        "fig3_08_valve": _valve,
+        "fig3_12_triangle": _triangle,
+        "fig3_13_loop": _loop,
+        "fig3_16_ramp": _ramp,
+        "eq3_24_payload": _payload,
+        "lift": _lift,
+    }
+    return drawing.pictures(say, drawn)
 
 
 def _feet(axes: Axes) -> None:

@@ -17,88 +17,24 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, Told, judge
+from pamrs.comparison import Comparison, Told
 from pamrs.control import metrics
 from reproduction import lift
-from reproduction.chapter4_statements import SERIES, statements
+from reproduction.chapter4_statements import SERIES, say, statements
 from reproduction.elbow import HYSTERESIS
 from reproduction.lift import Lifts, Map
-from reproduction.score import OTHER, OWN, TRIAL
+from reproduction.statements import OTHER, OWN, TRIAL, Lines
 
-__all__ = [
-    "CHOSEN",
-    "DAMPED",
-    "GROUPS",
-    "PRINTED",
-    "RUBBING",
-    "SMOOTH",
-    "TITLE",
-    "chosen",
-    "experiments",
-    "facts",
-    "headings",
-    "in_short",
-    "latest",
-]
+__all__ = ["DAMPED", "PRINTED", "RUBBING", "SMOOTH", "agreed", "experiments", "facts", "in_short"]
+__all__ += ["latest", "say"]
 
-TITLE: Final = "Chapter 4: control of manipulators"
+
 #: Names of the plants, see :data:`reproduction.lift.VARIANTS`: the one of the score, the
 #: library's muscle with hysteresis and without, and that with damping.
 PRINTED: Final = "as printed"
 RUBBING: Final = "smooth muscle, hysteresis (2.36)"
 SMOOTH: Final = "smooth muscle"
 DAMPED: Final = "smooth muscle, damping 6000 N s/m"
-#: The experiments by the name under which figures find their group.
-GROUPS: Final = {
-    "printed": "lift, hold, return of the plant that the chapter prints (4.4.2, 4.5)",
-    "rubbing": "the same statements with the library's muscle and hysteresis (2.36)",
-    "windup": "integrator wind-up with 34 kg (4.5.1.3)",
-    "printed maps": "gain maps of the plant that the chapter prints (4.4.1.2, 4.5.1.2)",
-    "rubbing maps": "gain maps with the library's muscle and hysteresis (2.36)",
-    "unit": "the unit of the curvature (4.16)",
-    "effects": "other plants and other readings: how many of the statements of 4.4.2 and 4.5 agree",
-    "diagnosis": "the diagnosis of closed-loop records, with the smooth muscle as the model",
-}
-#: Numbers that the dissertation does not give.
-CHOSEN: Final = (
-    (
-        "lift-hold-return",
-        "15, 80, 15 deg",
-        (
-            "angles are in figures only; 5 s at rest before and after make three 5 s segments a 25 "
-            "s record"
-        ),
-    ),
-    ("begin", "at rest at 15 deg", "with the pressure that holds the arm there"),
-    (
-        "E_R of (4.5), (4.6)",
-        "1.44 MPa",
-        "none is printed: from the free contraction of 3.2.2, 37 % at 150 psi",
-    ),
-    (
-        "gains by payload, Figs. 4.10 to 4.12 and 4.15",
-        "the smallest J of our maps",
-        "'experimentally-optimized' (4.5.1.3); printed in figures only, but for 23 kg",
-    ),
-    ("controller period", "5 ms", "none is published"),
-    ("output low-pass", "50 ms", "one is mentioned (4.3.1.1, 4.3.1.2), without a number"),
-    (
-        "rate filter",
-        "20 ms",
-        "of the fuzzy controller's and the feedforward's rate; none is published",
-    ),
-    ("fuzzy rules", "standard table", "Table 4.1 is an image; output set i + j"),
-    (
-        "plant against model",
-        "force -4.2 %, friction +3.6 %, inertia +4.9 %",
-        "'slightly different' (4.4.2), without numbers",
-    ),
-    (
-        "valve.discharge_area_max",
-        "8.4 mm2",
-        "the shoulder's; 4.2.2 has a lookup table and no number; the controllers know it",
-    ),
-)
 
 #: Values of the maps: kP, kI, g1, h and how many of each with and without the long search.
 _AXES: Final = {"kP": (0.2, 3.8), "kI": (0.0, 6.0), "g1": (0.15, 1.05), "h": (0.2, 2.0)}
@@ -239,22 +175,12 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     list of Comparison
     """
     done = experiments(search=search, progress=progress)
-    rows = statements(GROUPS["printed"], done.tuned[PRINTED]) + _pressures(done.lifts)
-    rows += apart(statements(GROUPS["rubbing"], done.tuned[RUBBING]), OTHER)
+    rows = statements(say.groups["printed"], done.tuned[PRINTED]) + _pressures(done.lifts)
+    rows += apart(statements(say.groups["rubbing"], done.tuned[RUBBING]), OTHER)
     rows += _windup(done)
-    rows += _maps(GROUPS["printed maps"], done, PRINTED) + _lines(done)
-    rows += apart(_maps(GROUPS["rubbing maps"], done, RUBBING), OTHER)
+    rows += _maps(say.groups["printed maps"], done, PRINTED) + _lines(done)
+    rows += apart(_maps(say.groups["rubbing maps"], done, RUBBING), OTHER)
     return rows + _unit(done) + _effects(done) + apart(_diagnoses(done), OWN)
-
-
-def headings() -> dict[str, str]:
-    """What is said above each group, where that is more than its name."""
-    return {}
-
-
-def chosen() -> list[tuple[str, str, str]]:
-    """Name, value and reason of each number that the chapter does not give."""
-    return list(CHOSEN)
 
 
 # ---------------------------------------------------------- pressures and lines of gains
@@ -264,7 +190,7 @@ def _pressures(found: Mapping[str, Mapping[str, Lifts]]) -> list[Comparison]:
     """4.4.2 and 4.5.2.2: what a higher source pressure does, and how the pressure follows the
     predicted one.
     """
-    group, runs = GROUPS["printed"], found[PRINTED]
+    runs = found[PRINTED]
     error = [found[name]["FF+fuzzy"].error("lift")[3] for name in ("supply 1.03 MPa", PRINTED)]
     wanted = lift.predicted(runs["series, kM 0"])[1]
     off = {
@@ -273,32 +199,17 @@ def _pressures(found: Mapping[str, Mapping[str, Lifts]]) -> list[Comparison]:
     }
     values = list(off.values())
     return [
-        judge(
-            group,
-            "FF+fuzzy, 45 kg: error in the lift, 1.03 MPa over 0.83 MPa",
-            "4.4.2: 'could be reduced with higher source pressure'",
-            1.0,
-            error[0] / error[1],
-            relation="below",
-            note=f"RMS {error[0]:.2f} and {error[1]:.2f} deg; 1.03 MPa: chapter 3's 150 psi",
-        ),
-        judge(
-            group,
-            "pressure off the predicted one, largest ratio of a kM to the next lower",
-            "4.5.2.2: 'follow the predicted pressure (dotted line) more closely'",
-            1.0,
-            max(high / low for low, high in pairwise(values)),
-            relation="below",
-            note="RMS over 25 s, 23 kg, "
-            + "; ".join(f"kM {km:g}: {value:.0f}" for km, value in off.items())
-            + " kPa",
+        say("FF_fuzzy_45", error[0] / error[1], error[0], error[1]),
+        say(
+            "pressure_off_predicted",
+            max((high / low for low, high in pairwise(values))),
+            "; ".join((f"kM {km:g}: {value:.0f}" for km, value in off.items())),
         ),
     ]
 
 
 def _lines(done: Experiments) -> list[Comparison]:
     """4.5.1.2: kD and g2, each varied last."""
-    group = GROUPS["printed maps"]
     kd, g2 = (
         [pair[0] for pair in done.lines[name].best(done.lines[name].j["rad"])]
         for name in ("kD", "g2")
@@ -306,28 +217,19 @@ def _lines(done: Experiments) -> list[Comparison]:
     kp = [pair[0] for pair in done.maps[PRINTED, "pid"].best(done.maps[PRINTED, "pid"].j["rad"])]
     by_payload = " ({}), ".join(("{:g}",) * 3) + " ({})"
     return [
-        judge(
-            group,
-            "PID: largest kD of the smallest J",
-            "4.5.1.2: 'zero or near zero at each payload'",
-            0.0,
+        say(
+            "PID_largest_kd",
             max(kd),
-            "V s/rad",
+            by_payload.format(*(x for pair in zip(kd, _KG, strict=True) for x in pair)),
+            min(kp),
+            max(kp),
             tolerance=_DERIVATIVE[1],
-            note="beside the best kP and kI, "
-            + by_payload.format(*(x for pair in zip(kd, _KG, strict=True) for x in pair))
-            + f"; near zero read as one step of the line; kP {min(kp):g} to {max(kp):g}",
         ),
-        judge(
-            group,
-            "fuzzy: largest g2 of the smallest J over the smallest",
-            "4.5.1.2: 'the values differ up to 2x'",
-            1.0,
+        say(
+            "fuzzy_largest_g2",
             max(g2) / min(g2),
-            tolerance=1.0,
-            cannot_tell=_at_an_end(g2),
-            note="beside the best g1 and h, "
-            + by_payload.format(*(x for pair in zip(g2, _KG, strict=True) for x in pair)),
+            by_payload.format(*(x for pair in zip(g2, _KG, strict=True) for x in pair)),
+            _at_an_end(g2),
         ),
     ]
 
@@ -344,42 +246,22 @@ def _at_an_end(g2: list[float]) -> str:
 
 def _windup(done: Experiments) -> list[Comparison]:
     """34 kg under the PID, without and with anti-windup."""
-    group, rows = GROUPS["windup"], []
+    rows = say.lines()
     for name in (PRINTED, RUBBING, _WEAK):
         plain, clamped = done.lifts[name]["PID"], done.clamped[name]["PID"]
         ours = float(clamped.undershoot[2])
         change = float(np.degrees(np.abs(plain.angle[2] - clamped.angle[2]).max()))
-        rows.append(
-            judge(
-                group,
-                f"{name}: overshoot below rest that clamping leaves",
-                "4.5.1.3: 'will not remove this overshoot phenomenon completely'",
-                0.0,
-                ours,
-                "deg",
-                relation="above",
-                apart="" if name == PRINTED else OTHER,
-                note=(
-                    f"without anti-windup {plain.undershoot[2]:.2f} deg, the stop being at 5.5; "
-                    f"the angles differ by {change:.2f} deg at most: kP 1.4 and kI 2.5 seldom ask "
-                    "for more than the valve's 5 V, so that a clamp at its limits has nothing to do"
-                ),
-            )
+        rows.say(
+            "overshoot_below_rest",
+            ours,
+            name,
+            plain.undershoot[2],
+            change,
+            apart="" if name == PRINTED else OTHER,
         )
     top = float(done.lifts[PRINTED]["PID"].between(5.0, 15.0).max(axis=1)[2])
     weak = float(done.lifts[_WEAK]["PID"].between(5.0, 15.0).max(axis=1)[2])
-    rows.append(
-        judge(
-            group,
-            "largest angle with 34 kg",
-            "4.5.1.3: 'the arm cannot produce required torque'",
-            lift.HIGH,
-            top,
-            "deg",
-            relation="below",
-            note=f"ours can at 0.83 MPa; with a supply of 0.45 MPa the arm stops at {weak:.1f} deg",
-        )
-    )
+    rows.say("largest_angle_34", top, weak, published=lift.HIGH)
     return rows
 
 
@@ -397,24 +279,17 @@ def _maps(group: str, done: Experiments, name: str) -> list[Comparison]:
     rows = _OfMaps(group, {**pid.axes, **fuzzy.axes})
     _pid_map(rows, pid)
     _fuzzy_map(rows, fuzzy)
-    return rows.found
+    return rows
 
 
-class _OfMaps:
+class _OfMaps(Lines):
     """Statements about maps, and what counts as the same gain in them."""
 
     def __init__(self, group: str, axes: Mapping[str, Any]) -> None:
-        self.group = group
-        self.found: list[Comparison] = []
+        super().__init__(say, group)
         self.step: dict[str, float] = {
             key: (_AXES[key][1] - _AXES[key][0]) / (axis.size - 1) for key, axis in axes.items()
         }
-
-    def say(
-        self, fact: str, where: str, published: float, ours: float, unit: str, **more: Any
-    ) -> None:
-        """One statement more."""
-        self.found.append(judge(self.group, fact, where, published, ours, unit, **more))
 
     def near(self, least: float, key: str) -> float:
         """What counts as the same gain: no less than a step of the map, on which rounding must not
@@ -428,131 +303,32 @@ def _pid_map(rows: _OfMaps, pid: Map) -> None:
     best = {unit: pid.best(j) for unit, j in pid.j.items()}
     other = "in degrees " + _told(best["deg"], ("kP", "kI"))
     told = _told(best["rad"], ("kP", "kI"))
-    rows.say(
-        ("PID: kP of the smallest J, 11 kg"),
-        ("4.5.1.2, Fig. 4.9: 'just above kP = 1'"),
-        1.0,
-        best["rad"][0][0],
-        ("V/rad"),
-        tolerance=rows.near(0.3, "kP"),
-        note=f"{told}; {other}",
-    )
-    rows.say(
-        ("PID: kI of the smallest J, 11 kg"),
-        ("4.5.1.2, Fig. 4.9: 'near kI = 4'"),
-        4.0,
-        best["rad"][0][1],
-        ("V/(rad s)"),
-        tolerance=rows.near(0.8, "kI"),
-    )
-    rows.say(
-        "PID: kP, 34 kg less 11 kg",
-        "4.5.1.2: 'decreases with increasing payload'",
-        0.0,
-        best["rad"][2][0] - best["rad"][0][0],
-        "V/rad",
-        relation="below",
-        cannot_tell=(
-            "the text against itself: 'just above kP = 1 at 11 kg' and decreasing, and the best at "
-            "23 kg is 'kP = 1.4'"
-        ),
-    )
-    rows.say(
-        ("PID: kP of the smallest J, 23 kg"),
-        ("4.5.1.2, experiment"),
-        1.4,
-        best["rad"][1][0],
-        ("V/rad"),
-        tolerance=rows.near(0.3, ("kP")),
-    )
-    rows.say(
-        ("PID: kI of the smallest J, 23 kg"),
-        ("4.5.1.2, experiment"),
-        2.5,
-        best["rad"][1][1],
-        ("V/(rad s)"),
-        tolerance=rows.near(0.6, "kI"),
-        note="3.0 was nearly as good there",
-    )
+    rows.say("PID_kp_smallest", best["rad"][0][0], told, other, tolerance=rows.near(0.3, "kP"))
+    rows.say("PID_ki_smallest", best["rad"][0][1], tolerance=rows.near(0.8, "kI"))
+    rows.say("PID_kp_34", best["rad"][2][0] - best["rad"][0][0])
+    rows.say("PID_kp_smallest_J", best["rad"][1][0], tolerance=rows.near(0.3, "kP"))
+    rows.say("PID_ki_smallest_J", best["rad"][1][1], tolerance=rows.near(0.6, "kI"))
     least, smooth = pid.best(pid.nu)[1], pid.best(pid.omega["rad"])[1]
     at = {
         label: _at(pid, pid.omega["rad"], 1, gains)
         for label, gains in (("nu", least), ("j", best["rad"][1]))
     }
-    rows.say(
-        ("PID, 23 kg: omega at the least nu over that at the least J"),
-        ("4.5.1.2: 'it also has the largest oscillations'"),
-        1.0,
-        at["nu"] / at["j"],
-        "",
-        relation="above",
-        note=(
-            f"least nu at kP {least[0]:.2f}, kI {least[1]:.2f}, least omega at kP {smooth[0]:.2f}, "
-            f"kI {smooth[1]:.2f}"
-        ),
-    )
+    rows.say("PID_23_kg_omega", at["nu"] / at["j"], least[0], least[1], smooth[0], smooth[1])
 
 
 def _fuzzy_map(rows: _OfMaps, fuzzy: Map) -> None:
     """4.4.1.2: the gains of fuzzy control, and the shape of J about them."""
     best = {unit: fuzzy.best(j) for unit, j in fuzzy.j.items()}
     told, other = _told(best["rad"], ("g1", "h")), "in degrees " + _told(best["deg"], ("g1", "h"))
-    where = "4.4.1.2, Fig. 4.5 (c)"
-    rows.say(
-        ("fuzzy: g1 of the smallest J, 23 kg"),
-        where,
-        0.45,
-        best["rad"][1][0],
-        ("rad"),
-        tolerance=rows.near(0.1, ("g1")),
-        note=f"{told}; {other}",
-    )
-    rows.say(
-        "fuzzy: h of the smallest J, 23 kg",
-        where,
-        0.65,
-        best["rad"][1][1],
-        "V",
-        tolerance=rows.near(0.13, "h"),
-    )
-    rows.say(
-        "fuzzy: h, 34 kg less 11 kg",
-        "4.5.1.2: 'an increasing trend with payload'",
-        0.0,
-        best["rad"][2][1] - best["rad"][0][1],
-        "V",
-        relation="above",
-    )
+    rows.say("fuzzy_g1_smallest", best["rad"][1][0], told, other, tolerance=rows.near(0.1, "g1"))
+    rows.say("fuzzy_h_smallest", best["rad"][1][1], tolerance=rows.near(0.13, "h"))
+    rows.say("fuzzy_h_34", best["rad"][2][1] - best["rad"][0][1])
     one, two = fuzzy.best(fuzzy.nu)[1], fuzzy.best(fuzzy.omega["rad"])[1]
     apart = max(abs(one[0] - two[0]) / rows.step["g1"], abs(one[1] - two[1]) / rows.step["h"])
-    rows.say(
-        ("fuzzy, 23 kg: optima of nu and omega apart, steps of the map"),
-        (f"{where}: 'different'"),
-        1.0,
-        apart,
-        (""),
-        relation=("above"),
-        note=(f"nu at g1 {one[0]:.2f}, h {one[1]:.2f}; omega at g1 {two[0]:.2f}, h {two[1]:.2f}"),
-    )
-    rows.say(
-        ("fuzzy, 23 kg: J beside its optimum over J there"),
-        (f"{where}: 'smooth'"),
-        1.25,
-        float(fuzzy.smooth("rad")[1]),
-        (""),
-        relation="below",
-        note="smooth read as within a quarter at the neighbours in the map",
-    )
+    rows.say("fuzzy_23_kg", apart, one[0], one[1], two[0], two[1])
+    rows.say("fuzzy_23_kg_J", float(fuzzy.smooth("rad")[1]))
     quoted = _at(fuzzy, fuzzy.j["rad"], 1, (0.45, 0.65)) / float(np.nanmin(fuzzy.j["rad"][1]))
-    rows.say(
-        ("fuzzy, 23 kg: J at the published gains over the smallest"),
-        where,
-        1.0,
-        quoted,
-        (""),
-        tolerance=0.25,
-        note="at the nearest gains of the map",
-    )
+    rows.say("fuzzy_23_kg_J_published", quoted)
 
 
 def _at(gains: Map, values: Any, payload: int, place: tuple[float, float]) -> float:
@@ -570,7 +346,7 @@ def _at(gains: Map, values: Any, payload: int, place: tuple[float, float]) -> fl
 
 def _unit(done: Experiments) -> list[Comparison]:
     """What hangs on the unit of the angle in the curvature."""
-    group, rows = GROUPS["unit"], []
+    rows = say.lines()
     run = done.lifts[PRINTED]["PID"]
     slope = {
         unit: metrics.total_curvature(run.time, run.angle, rate=run.rate, unit=unit)
@@ -579,24 +355,12 @@ def _unit(done: Experiments) -> list[Comparison]:
     rate = math.radians((lift.HIGH - lift.LOW) / 5.0)
     share = {"rad": (1.0 + rate**2) ** -1.5, "deg": (1.0 + math.degrees(rate) ** 2) ** -1.5}
     signed = np.diff(metrics.slope_sine(run.rate), axis=-1).sum(axis=-1)
-    why = (
-        "no magnitude of nu or omega is printed, only the figures' axes, which are not in the text"
-    )
-    rows.append(
-        judge(
-            group,
-            "omega of the PID with 23 kg, angle in radians",
-            "4.4.1.1 (4.16), (4.17)",
-            math.nan,
-            float(np.asarray(slope["rad"])[1]),
-            cannot_tell=why,
-            apart=OWN,
-            note=(
-                f"in degrees {float(np.asarray(slope['deg'])[1]):.2f}; a wiggle on the 13 deg/s "
-                f"ramp counts {100 * share['rad']:.0f} % of one at rest in radians and "
-                f"{100 * share['deg']:.2g} % in degrees"
-            ),
-        )
+    rows.say(
+        "omega_PID_23",
+        float(np.asarray(slope["rad"])[1]),
+        float(np.asarray(slope["deg"])[1]),
+        100 * share["rad"],
+        100 * share["deg"],
     )
     for name in (PRINTED, RUBBING):
         distance = {}
@@ -609,36 +373,14 @@ def _unit(done: Experiments) -> list[Comparison]:
                     for a, b in zip((*best, *gains), (0.45, 0.65, 1.4, 2.5), strict=True)
                 )
             )
-        rows.append(
-            judge(
-                group,
-                f"{name}: {_DISTANCE}",
-                "4.4.1.2, 4.5.1.2, 23 kg",
-                math.nan,
-                distance["deg"] - distance["rad"],
-                cannot_tell="it depends on the plant which unit has its optimum nearer",
-                apart=OWN,
-                note=(
-                    f"of g1, h, kP, kI together: radians {distance['rad']:.2f}, degrees "
-                    f"{distance['deg']:.2f}"
-                ),
-            )
+        rows.say(
+            "logarithmic_distance_published",
+            distance["deg"] - distance["rad"],
+            name,
+            distance["rad"],
+            distance["deg"],
         )
-    rows.append(
-        judge(
-            group,
-            "omega as printed, with the sign of y''",
-            "4.4.1.1 (4.16)",
-            0.0,
-            float(np.abs(signed[1])),
-            tolerance=0.05,
-            apart=OWN,
-            note=(
-                "it telescopes to the slope at the end less that at the begin, whatever lies "
-                "between: |y''| must be meant"
-            ),
-        )
-    )
+    rows.say("omega_printed_sign", float(np.abs(signed[1])))
     return rows
 
 
@@ -666,7 +408,7 @@ def _effects(done: Experiments) -> list[Comparison]:
         f"{name}, gains of its own maps": (runs, "the score" if name == PRINTED else OTHER)
         for name, runs in done.tuned.items()
     }
-    rows = []
+    rows = say.lines()
     for name, (runs, why) in tried.items():
         now = agreed(runs)
         gained, lost = sorted(now - before), sorted(before - now)
@@ -678,18 +420,7 @@ def _effects(done: Experiments) -> list[Comparison]:
         )
         told += f"; gained: {'; '.join(gained)}" if gained else ""
         told += f"; lost: {'; '.join(lost)}" if lost else ""
-        rows.append(
-            judge(
-                GROUPS["effects"],
-                name,
-                "4.4.2, 4.5",
-                math.nan,
-                len(now),
-                cannot_tell="counted",
-                note=told,
-                apart=why,
-            )
-        )
+        rows.say("plant_tried", len(now), name, told, apart=why)
     return rows
 
 
@@ -700,7 +431,7 @@ def agreed(runs: Mapping[str, Lifts]) -> set[str]:
 
 def _diagnoses(done: Experiments) -> list[Comparison]:
     """What the diagnosis says of each recorded plant."""
-    rows = []
+    rows = say.lines()
     for name, found in done.diagnoses.items():
         variant = lift.VARIANTS[name]
         hidden: dict[str, Mapping[str, float]] = dict(variant.effects)
@@ -716,15 +447,14 @@ def _diagnoses(done: Experiments) -> list[Comparison]:
             for effect in found.effects
         )
         rows += [
-            judge(
-                GROUPS["diagnosis"],
-                f"{name}: probability of {effect}",
-                "what the plant has",
-                0.5,
+            say(
+                "probability",
                 probability.get(effect, 0.0),
-                relation="above",
-                note=f"verdict {found.verdict}; {named or 'nothing named'}; it has "
-                + ", ".join(f"{key} {value:g}" for key, value in values.items()),
+                name,
+                effect,
+                found.verdict,
+                named or "nothing named",
+                ", ".join((f"{key} {value:g}" for key, value in values.items())),
             )
             for effect, values in hidden.items()
         ]
@@ -743,10 +473,10 @@ def in_short(rows: list[Comparison]) -> list[str]:
     -------
     list of str
     """
-    told = Told(rows, GROUPS, 1)
+    told = Told(rows, say.groups, 1)
     ours = told.ours
-    count = sum(row.group == GROUPS["rubbing"] for row in rows)
-    tried = {row.fact: f"{row.ours:.0f}" for row in rows if row.group == GROUPS["effects"]}
+    count = sum(row.group == say.groups["rubbing"] for row in rows)
+    tried = {row.fact: f"{row.ours:.0f}" for row in rows if row.group == say.groups["effects"]}
     own = ", gains of its own maps"
     nearer = [
         told.row("unit", f"{name}: {_DISTANCE}").note.partition("together: ")[2]
@@ -757,43 +487,34 @@ def in_short(rows: list[Comparison]) -> list[str]:
     fuzzy = told.row("printed maps", "fuzzy: g1 of the smallest J, 23 kg").note
     border = f"kP {_AXES['kP'][0]:.2f}"
     return [
-        "The score is of the plant that the chapter prints: two branches of the muscle's force, "
-        "(4.4)-(4.7), and a feedforward whose flow follows the commanded trajectory (4.3.2.1: "
-        "'samples the commanded trajectory', with the pressure as its only measurement). Of "
-        f"{count} statements about lift, hold and return {tried[PRINTED + own]} agree with the "
-        f"gains of our own maps by payload, as 4.5.1.3 has them, and {tried[PRINTED]} with the "
-        "gains that are printed (for 23 kg) at every payload.",
-        f"The library's smooth muscle with the hysteresis of (2.36), of another muscle, has "
-        f"{tried[RUBBING]} with the printed gains and {tried[RUBBING + own]} with its own maps', "
-        f"without hysteresis {tried[SMOOTH]}. With the measured motion in the "
-        f"feedforward: {tried[PRINTED + _MEASURED]}, {tried[RUBBING + _MEASURED]} and "
-        f"{tried[SMOOTH + _MEASURED]} of the same three.",
-        "A smooth muscle with a damping of 12000 N s/m (60 times the usual) and an activation "
-        f"pressure of 50 kPa, both chosen by their score, has {tried[strong]}, and "
-        f"{tried[strong + _MEASURED]} with the measured motion, the best of an earlier version of "
-        "this page, where the printed muscle was not tried. On top of the printed plant "
-        f"{tried['muscle damping 3000 N s/m']} agree with 3000 N s/m, {tried[_VALVE]} with a valve "
-        "of 4.2 mm2 and "
-        f"{tried['valve 2.44 mm2']} with the 2.44 mm2 that chapter 3's step asks for; the valve's "
-        "size is not published.",
-        "What stays: FF+PID with the printed kP = 5, kI = 2 overshoots by "
-        f"{ours('printed', 'FF+PID: largest overshoot of the hold')} deg and swings by "
-        f"{ours('printed', 'FF+PID: swing in the last 2 s of the hold')} deg; our RMS error is "
-        f"least at kM = {ours('printed', 'kM with the smallest RMS error, 23 kg')}, and our steady "
-        "error at rest from kM = 0.25 to 1 changes by "
-        f"{ours('printed', 'error at rest, kM 1 less kM 0.25')} deg, where the dissertation has "
-        "0.5 and a rise, with real muscles of which its model 'is inaccurate at low pressures' "
-        "(4.5.2.1).",
-        "4.5.1.2 contradicts itself: the best kP is 'just above kP = 1 at 11 kg' and 'decreases "
-        f"with increasing payload', and it is 1.4 at 23 kg. Ours: {best.partition('; in')[0]}"
-        f"{_BORDER if border in best else ''}.",
-        f"The fuzzy optimum of 23 kg: {fuzzy.split('; ')[1].removeprefix('23 kg: ')}; printed are "
-        "g1 0.45, h 0.65.",
-        "Clamping at the valve's limits does not change the PID's wind-up, as it does not reach "
-        "them.",
-        "No value of nu or omega is printed, so the unit of the curvature cannot be read off. By "
-        f"the place of the optima (distance from the published ones) it is {nearer[0]} on the "
-        f"printed plant and {nearer[1]} with the smooth muscle and (2.36).",
+        *say.short(
+            (count, tried[PRINTED + own], tried[PRINTED]),
+            (
+                tried[RUBBING],
+                tried[RUBBING + own],
+                tried[SMOOTH],
+                tried[PRINTED + _MEASURED],
+                tried[RUBBING + _MEASURED],
+                tried[SMOOTH + _MEASURED],
+            ),
+            (
+                tried[strong],
+                tried[strong + _MEASURED],
+                tried["muscle damping 3000 N s/m"],
+                tried[_VALVE],
+                tried["valve 2.44 mm2"],
+            ),
+            (
+                ours("printed", "FF+PID: largest overshoot of the hold"),
+                ours("printed", "FF+PID: swing in the last 2 s of the hold"),
+                ours("printed", "kM with the smallest RMS error, 23 kg"),
+                ours("printed", "error at rest, kM 1 less kM 0.25"),
+            ),
+            (best.partition("; in")[0], _BORDER if border in best else ""),
+            (fuzzy.split("; ")[1].removeprefix("23 kg: "),),
+            (),
+            (nearer[0], nearer[1]),
+        ),
         *_diagnosed(rows),
     ]
 
@@ -810,7 +531,7 @@ def _diagnosed(rows: list[Comparison]) -> list[str]:
     """What the diagnoses come to, where they ran."""
     words = []
     for row in rows:
-        if row.group != GROUPS["diagnosis"]:
+        if row.group != say.groups["diagnosis"]:
             continue
         verdict = row.note.partition(";")[0].removeprefix("verdict ")
         plant, _, effect = row.fact.partition(": probability of ")

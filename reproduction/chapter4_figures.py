@@ -15,15 +15,13 @@ from matplotlib.figure import Figure
 
 from pamrs.report.figures import COLOURS
 from reproduction import drawing, lift
-from reproduction.chapter4 import GROUPS, PRINTED, RUBBING, SMOOTH, agreed, latest
+from reproduction.chapter4 import PRINTED, RUBBING, SMOOTH, agreed, latest, say
 from reproduction.chapter4_statements import SERIES, statements
 from reproduction.lift import Lifts
 from reproduction.page import Picture
 
 __all__ = ["pictures"]
 
-#: Colours of a picture.
-_KEPT: Final = 64
 _PAYLOAD: Final = ("#56b4e9", "#0072b2", "#d55e00", "#1f1f1f")
 _NAMES: Final = ("11 kg", "23 kg", "34 kg", "45 kg")
 _REFERENCE: Final[dict[str, Any]] = {"color": "#9ca3af", "lw": 2.4, "zorder": 0}
@@ -34,65 +32,26 @@ _SHORT: Final = {
 }
 
 
+_MODEL: Final = ("FF+fuzzy", "FF+PID")
+_FEEDBACK: Final = ("PID", "fuzzy")
+
+
 def pictures() -> list[Picture]:
     """Every picture of the chapter, in the order of its figures, from the experiments that were run
     last.
-
-    Returns
-    -------
-    list of Picture
     """
-    return [
-        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
-        for name, group, draw, caption in _pictures()
-    ]
-
-
-Drawn = tuple[str, str, Callable[[], Figure], str]
-
-
-def _pictures() -> list[Drawn]:
-    """Name, group, function and caption of each picture."""
-    model, feedback = ("FF+fuzzy", "FF+PID"), ("PID", "fuzzy")
-    rubbing = "with the library's muscle and hysteresis (2.36)"
-    model_words = "feedforward with fuzzy and with PID feedback, angle and pressure"
-    map_words = "metrics over their least; circle: optimum, cross: published"
-    series_words = (
-        "Fig. 4.14: the series of kM with 23 kg, the plant as printed, with the library's muscle "
-        "and hysteresis (2.36), and with that muscle alone."
-    )
-    optima_words = (
-        "Fig. 4.9: gains of the smallest J by payload; grey: what the text prints, 'just above kP "
-        "= 1' and 'near kI = 4' at 11 kg."
-    )
-    effects_words = (
-        "How many of the statements agree, with the printed gains; dark: the plant as printed."
-    )
-
-    def lifts(plant: str, name: str, words: tuple[str, str]) -> list[Drawn]:
-        return [
-            (f"{name}_model", name, partial(_lifts, plant, model), words[0]),
-            (f"{name}_feedback", name, partial(_lifts, plant, feedback), words[1]),
-        ]
-
-    printed = (
-        f"Figs. 4.6 and 4.7, the plant as printed: {model_words}.",
-        "Figs. 4.10 and 4.11, the plant as printed: PID and fuzzy control.",
-    )
-    maps = f"Fig. 4.5 and its like for PID, the plant as printed, 23 kg: {map_words}."
-    return [
-        *lifts(PRINTED, "printed", printed),
-        ("series", "printed", _series, series_words),
-        *lifts(
-            RUBBING,
-            "rubbing",
-            (f"Figs. 4.6 and 4.7 {rubbing}.", f"Figs. 4.10 and 4.11 {rubbing}."),
-        ),
-        ("printed_maps", "printed maps", partial(_maps, PRINTED), maps),
-        ("optima", "printed maps", _optima, optima_words),
-        ("rubbing_maps", "rubbing maps", partial(_maps, RUBBING), f"The same {rubbing}."),
-        ("effects", "effects", _effects, effects_words),
-    ]
+    drawn: dict[str, Callable[[], Figure]] = {
+        "printed_model": partial(_lifts, PRINTED, _MODEL),
+        "printed_feedback": partial(_lifts, PRINTED, _FEEDBACK),
+        "series": _series,
+        "rubbing_model": partial(_lifts, RUBBING, _MODEL),
+        "rubbing_feedback": partial(_lifts, RUBBING, _FEEDBACK),
+        "printed_maps": partial(_maps, PRINTED),
+        "optima": _optima,
+        "rubbing_maps": partial(_maps, RUBBING),
+        "effects": _effects,
+    }
+    return drawing.pictures(say, drawn)
 
 
 def _reference(axes: Axes, run: Lifts) -> None:
@@ -149,8 +108,7 @@ def _series() -> Figure:
                 lw=1.0,
                 label=f"kM {km:g}: {rms:.1f} deg RMS",
             )
-        cell.set_title(_SHORT[plant])
-        cell.set_xlabel("time [s]")
+        cell.set(title=_SHORT[plant], xlabel="time [s]")
         cell.set_ylim(0.0, 185.0)
         cell.set_yticks(range(0, 121, 20))
         cell.legend(fontsize=7.0, frameon=False, loc="upper right")
@@ -184,8 +142,7 @@ def _maps(plant: str) -> Figure:
             best = gains.best(values)[1]
             cell.plot(*best, "o", color="white", mec="#1f1f1f", ms=6, clip_on=False)
             cell.plot(*published, "x", color="#d55e00", ms=7, mew=2)
-            cell.set_title(name)
-            cell.set_xlabel(first)
+            cell.set(title=name, xlabel=first)
         axes[line][0].set_ylabel(second)
         bar = figure.colorbar(field, ax=list(axes[line]), ticks=[1, 2, 5, 10], shrink=0.9)
         bar.ax.set_yticklabels(["1", "2", "5", "10 or more"])
@@ -228,8 +185,7 @@ def _optima() -> Figure:
             zorder=0,
             label="printed",
         )
-        cell.set_title(label)
-        cell.set_xlabel("payload [kg]")
+        cell.set(title=label, xlabel="payload [kg]")
         cell.margins(y=0.15)
         cell.set_ylim(bottom=0.0)
     handles, labels = axes[0][0].get_legend_handles_labels()

@@ -9,11 +9,15 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, judge
+from pamrs.comparison import Comparison
 from reproduction.elbow import PSI
 from reproduction.lift import Lifts
+from reproduction.statements import Statements
 
-__all__ = ["SERIES", "statements"]
+__all__ = ["SERIES", "say", "statements"]
+
+#: The statements of the chapter.
+say: Final = Statements("chapter4")
 
 #: kM of the series of Fig. 4.14 and the names of its runs.
 SERIES: Final = {
@@ -46,12 +50,13 @@ def statements(group: str, runs: Mapping[str, Lifts]) -> list[Comparison]:
     list of Comparison
     """
     return [
-        judge(group, *row[:5], **row[5])
+        say(*row, group=group)
         for row in (*_simulated(runs), *_feedback(runs), *_model(runs), *_compared(runs))
     ]
 
 
-Row = tuple[str, str, float, float, str, dict[str, Any]]
+#: Id, our number, and what stands in the places.
+Row = tuple[Any, ...]
 
 
 def _list(values: Any, digits: int = 1) -> str:
@@ -66,41 +71,23 @@ def _simulated(runs: Mapping[str, Lifts]) -> list[Row]:
         run, where = runs[name], f"4.4.2, {figure}"
         rows += [
             (
-                f"{name}: largest overshoot of the hold",
-                f"{where}: 'no overshoot is present'",
-                0.0,
+                "largest_overshoot_hold",
                 float(run.overshoot.max()),
-                "deg",
-                {"tolerance": _UNSEEN, "note": _list(run.overshoot)},
+                name,
+                where,
+                _list(run.overshoot),
             ),
+            ("swing_last_2", float(run.swing.max()), name, where, _list(run.swing)),
             (
-                f"{name}: swing in the last 2 s of the hold",
-                f"{where}: 'smooth and accurate'",
-                0.0,
-                float(run.swing.max()),
-                "deg",
-                {"tolerance": _UNSEEN, "note": _list(run.swing)},
-            ),
-            (
-                f"{name}: error in the lift, 45 kg over 11 kg",
-                f"{where}: increases with payload",
-                1.0,
+                "error_lift_45",
                 float(run.error("lift")[3] / run.error("lift")[0]),
-                "",
-                {"relation": "above", "note": "RMS " + _list(run.error("lift")) + " deg"},
+                name,
+                where,
+                _list(run.error("lift")),
             ),
         ]
     pid, fuzzy = runs["FF+PID"].error("return"), runs["FF+fuzzy"].error("return")
-    rows.append(
-        (
-            "error in the return, FF+PID over FF+fuzzy",
-            "4.4.2: 'slightly increased'",
-            1.0,
-            float(np.mean(pid) / np.mean(fuzzy)),
-            "",
-            {"relation": "above", "note": f"RMS with FF+PID {_list(pid)} deg"},
-        )
-    )
+    rows.append(("error_return_FF", float(np.mean(pid) / np.mean(fuzzy)), _list(pid)))
     return rows
 
 
@@ -115,38 +102,10 @@ def _fuzzy_alone(fuzzy: Lifts) -> list[Row]:
     lag = np.asarray(fuzzy.metrics.lag)[:3]
     settled = fuzzy.error("hold", "final")[:3]
     return [
-        (
-            "fuzzy: lag, mean of 11, 23, 34 kg",
-            "4.5.1.3",
-            0.75,
-            float(lag.mean()),
-            "s",
-            {"tolerance": 0.15, "note": _list(lag, 2)},
-        ),
-        (
-            "fuzzy: largest overshoot",
-            "4.5.1.3: 'no overshoot'",
-            0.0,
-            float(fuzzy.overshoot[:3].max()),
-            "deg",
-            {"tolerance": _UNSEEN, "note": _list(fuzzy.overshoot[:3])},
-        ),
-        (
-            "fuzzy: spread of the lag over payload",
-            "4.5.1.3: 'minimal change in lifting behavior'",
-            0.25,
-            float(np.ptp(lag)),
-            "s",
-            {"relation": "below", "note": "minimal read as a third of the lag"},
-        ),
-        (
-            "fuzzy: error at the end of the hold, least",
-            "4.5.1.3: 'does not quite reach' it",
-            0.0,
-            float(settled.min()),
-            "deg",
-            {"relation": "above", "note": _list(settled, 2), "cannot_tell": _hidden(settled.min())},
-        ),
+        ("fuzzy_lag_mean", float(lag.mean()), _list(lag, 2)),
+        ("fuzzy_largest_overshoot", float(fuzzy.overshoot[:3].max()), _list(fuzzy.overshoot[:3])),
+        ("fuzzy_spread_lag", float(np.ptp(lag))),
+        ("fuzzy_error_end", float(settled.min()), _list(settled, 2), _hidden(settled.min())),
     ]
 
 
@@ -161,47 +120,10 @@ def _pid_alone(pid: Lifts) -> list[Row]:
     """PID control: delay, and what grows with payload."""
     nu = np.asarray(pid.metrics.squared_error)
     return [
-        (
-            "PID, 23 kg: delay until the arm moves",
-            "4.5.1.3: 'about 1 s'",
-            1.0,
-            float(pid.delay[1]),
-            "s",
-            {
-                "tolerance": 0.3,
-                ("note"): (
-                    "until 1 deg from where it was; ours begins at rest, with the pressure that "
-                    "holds the arm"
-                ),
-            },
-        ),
-        (
-            "PID: nu of 34 kg over nu of 11 kg",
-            "4.5.1.3: increases with payload",
-            1.0,
-            float(nu[2] / nu[0]),
-            "",
-            {"relation": "above"},
-        ),
-        (
-            "PID, 34 kg: overshoot below the rest position",
-            "4.5.1.3: 'considerable'",
-            _UNSEEN,
-            float(pid.undershoot[2]),
-            "deg",
-            {
-                "relation": "above",
-                "note": f"from {_UNSEEN:.0f} deg on, a stop at 5.5; {_list(pid.undershoot)}",
-            },
-        ),
-        (
-            "PID, 34 kg: error in the return over the lift",
-            "4.5.1.3: 'undesirably large'",
-            1.0,
-            float(pid.error("return")[2] / pid.error("lift")[2]),
-            "",
-            {"relation": "above"},
-        ),
+        ("PID_23_kg", float(pid.delay[1])),
+        ("PID_nu_34", float(nu[2] / nu[0])),
+        ("PID_34_kg", float(pid.undershoot[2]), _list(pid.undershoot)),
+        ("PID_34_kg_error", float(pid.error("return")[2] / pid.error("lift")[2])),
     ]
 
 
@@ -212,30 +134,9 @@ def _beside(pid: Lifts, fuzzy: Lifts) -> list[Row]:
     lifting = slice(round(5.0 / 0.01), round(10.0 / 0.01) + 1)
     reversals = [int((np.diff(np.sign(run.rate[1, lifting])) != 0).sum()) for run in (fuzzy, pid)]
     return [
-        (
-            "lift, 23 kg: mean error, fuzzy over PID",
-            "4.5.1.3, Fig. 4.12: lags more",
-            1.0,
-            float(early),
-            "",
-            {"relation": "above"},
-        ),
-        (
-            "return, 23 kg: mean error, PID over fuzzy",
-            "4.5.1.3, Fig. 4.12: reacts more slowly",
-            1.0,
-            float(late),
-            "",
-            {"relation": "above"},
-        ),
-        (
-            "lift, 23 kg: reversals of the rate, fuzzy less PID",
-            "4.5.1.3, Fig. 4.12: more oscillation",
-            0.0,
-            float(reversals[0] - reversals[1]),
-            "",
-            {"relation": "above", "note": f"{reversals[0]} and {reversals[1]}"},
-        ),
+        ("lift_23_kg", float(early)),
+        ("return_23_kg", float(late)),
+        ("lift_23_kg_reversals", float(reversals[0] - reversals[1]), reversals[0], reversals[1]),
     ]
 
 
@@ -251,31 +152,8 @@ def _heavy(run: Lifts) -> list[Row]:
         run.between(*span, run.pressure)[3].mean() / PSI for span in ((4.0, 5.0), (14.0, 15.0))
     )
     return [
-        (
-            "pressure at rest, 45 kg",
-            "4.5.2.1: below 40 psi at the final angle",
-            40.0,
-            float(low),
-            "psi",
-            {
-                "relation": "below",
-                "note": f"at the hold {high:.0f} psi; 'low angles (i.e., low pressures)' (4.5.2.2)",
-            },
-        ),
-        (
-            "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return",
-            "4.5.2.1, Fig. 4.13: 'maintains' one",
-            1.0,
-            abs(float(heavy[3])),
-            "deg",
-            {
-                "relation": "above",
-                ("note"): (
-                    "from 1 deg on; the text's reason is its model below 40 psi, with friction and "
-                    "hysteresis"
-                ),
-            },
-        ),
+        ("pressure_rest_45", float(low), high),
+        ("FF_fuzzy_km", abs(float(heavy[3]))),
     ]
 
 
@@ -289,40 +167,13 @@ def _series(runs: Mapping[str, Lifts]) -> list[Row]:
     told = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in total.items())
     settled = "; ".join(f"kM {km:g}: {value:.2f}" for km, value in rest.items())
     return [
+        ("km_smallest_RMS", min(total, key=total.__getitem__), told),
+        ("error_rest_km", rest[0.0] - min(rest[0.25], rest[0.5], rest[1.0]), settled),
+        ("error_rest_km_1", rest[1.0] - rest[0.25]),
         (
-            "kM with the smallest RMS error, 23 kg",
-            "4.5.2.2",
-            0.5,
-            min(total, key=total.__getitem__),
-            "1/s",
-            {"tolerance": 0.0, "note": told + " deg"},
-        ),
-        (
-            "error at rest, kM 0 less the smallest of the others",
-            "4.5.2.2: lowest with kM 0",
-            0.0,
-            rest[0.0] - min(rest[0.25], rest[0.5], rest[1.0]),
-            "deg",
-            {"relation": "below", "note": settled + " deg"},
-        ),
-        (
-            "error at rest, kM 1 less kM 0.25",
-            "4.5.2.2: increases with kM",
-            0.0,
-            rest[1.0] - rest[0.25],
-            "deg",
-            {"relation": "above"},
-        ),
-        (
-            "lag, kM 0 less the largest of the others",
-            "4.5.2.2: slowest with kM 0",
-            0.0,
+            "lag_km_0",
             lag[0.0] - max(lag[0.25], lag[0.5], lag[1.0]),
-            "s",
-            {
-                "relation": "above",
-                "note": "; ".join(f"kM {km:g}: {value:.2f}" for km, value in lag.items()) + " s",
-            },
+            "; ".join((f"kM {km:g}: {value:.2f}" for km, value in lag.items())),
         ),
     ]
 
@@ -337,30 +188,13 @@ def _compared(runs: Mapping[str, Lifts]) -> list[Row]:
         }
         rows.append(
             (
-                f"11 kg: error with feedforward, worst stage over {plain} alone",
-                "4.5.3, Fig. 4.15: smaller in all stages",
-                1.0,
+                "error_with_feedforward",
                 max(shares.values()),
-                "",
-                {
-                    "relation": "below",
-                    "note": "; ".join(f"{phase} {share:.2f}" for phase, share in shares.items()),
-                },
+                plain,
+                "; ".join((f"{phase} {share:.2f}" for phase, share in shares.items())),
             )
         )
     names = ("PID", "FF+PID, PID's gains", "FF+PID, kM 0.5")
     alone, beside, quoted = (float(np.asarray(runs[name].metrics.curvature)[0]) for name in names)
-    rows.append(
-        (
-            "11 kg: omega, FF+PID over PID",
-            "4.5.3: less oscillation",
-            1.0,
-            beside / alone,
-            "",
-            {
-                "relation": "below",
-                "note": f"the same kP and kI; with the simulation's 5 and 2: {quoted / alone:.1f}",
-            },
-        )
-    )
+    rows.append(("omega_with_feedforward", beside / alone, quoted / alone))
     return rows

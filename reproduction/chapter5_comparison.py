@@ -11,9 +11,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, judge
+from pamrs.comparison import Comparison
 from reproduction import tracking_runs
-from reproduction.chapter5_statements import Group
+from reproduction.chapter5_statements import say
 from reproduction.tracking import KINDS, SETTLED, Track
 from reproduction.tracking_runs import MIDDLE, Plan
 
@@ -70,7 +70,7 @@ def _middle(plan: Plan) -> int:
 
 def compound(plan: Plan) -> list[Comparison]:
     """The controllers on the compound trajectory."""
-    group, k = Group("compound"), _middle(plan)
+    rows, k = say.lines(), _middle(plan)
     runs = {kind: plan.compared(kind, "compound") for kind in KINDS}
     for fact, ratio in orders(plan, k).items():
         if not fact.startswith("compound"):
@@ -81,60 +81,38 @@ def compound(plan: Plan) -> list[Comparison]:
             if case[1] == "" and row != k
         }
         note = "; ".join(f"{payload:g} lb {value:.2f}" for payload, value in others.items())
-        group.smaller(fact.removeprefix("compound: ") + f", {MIDDLE:g} lb", _CURVE, ratio, note)
+        rows.say("compound_order", ratio, fact.removeprefix("compound: "), note)
     end = float(runs["neural"].time[-1])
-    group.smaller(
-        f"neural over sliding in the last half of the record, {MIDDLE:g} lb",
-        _CURVE,
+    rows.say(
+        "neural_sliding_last",
         float((runs["neural"].rms(0.5 * end) / runs["sliding"].rms(0.5 * end))[k]),
-        (
-            "the record begins with a move from rest at 15 deg to 95 deg, in which the networks "
-            "unlearn what they knew of high angles"
-        ),
     )
     training = plan.trained("neural")
     if training is not None:
         last = training.rms(0.9 * float(training.time[-1]))[k]
-        group.smaller(
-            f"neural at the end of its training over sliding, {MIDDLE:g} lb",
-            _CURVE,
-            float(last / runs["sliding"].rms()[k]),
-            (
-                f"last tenth of {plan.training:g} s, {last:.2f} deg: the order of the chapter, but "
-                "for that move"
-            ),
-        )
+        rows.say("neural_end_training", float(last / runs["sliding"].rms()[k]), plan.training, last)
     mean = {kind: float(runs[kind].rms()[k]) for kind in ("neural", "adaptive sliding")}
-    group.say(
-        f"neural over adaptive sliding, {MIDDLE:g} lb",
-        "5.5: 'nearly as accurate as the adaptive sliding mode controller'",
-        1.0,
+    rows.say(
+        "neural_adaptive_sliding",
         mean["neural"] / mean["adaptive sliding"],
-        tolerance=0.25,
-        note=(
-            f"rms {mean['neural']:.2f} and {mean['adaptive sliding']:.2f} deg; 'nearly' read as a "
-            "quarter"
-        ),
+        mean["neural"],
+        mean["adaptive sliding"],
     )
     ripple = {kind: float(run.ripple()[k]) for kind, run in runs.items()}
     for kind in ("sliding", "adaptive sliding"):
-        group.say(
-            (f"error above 1.5 Hz, {kind} over neural"),
-            ("5.5: 'low-amplitude, high-frequency content'"),
-            1.0,
+        rows.say(
+            "error_above_1_5",
             ripple[kind] / ripple["neural"],
-            relation="above",
-            note=(
-                f"{ripple[kind]:.3f} and {ripple['neural']:.3f} deg; the three have one KD here, "
-                "and the networks relearn high angles"
-            ),
+            kind,
+            ripple[kind],
+            ripple["neural"],
         )
-    return group.rows + _table_of(group.title, runs, plan, SETTLED)
+    return rows + _table_of("compound", runs, plan, SETTLED)
 
 
-def _table_of(title: str, runs: dict[str, Track], plan: Plan, begin: float) -> list[Comparison]:
+def _table_of(group: str, runs: dict[str, Track], plan: Plan, begin: float) -> list[Comparison]:
     """Every number of a comparison, one statement for each controller and payload."""
-    rows = []
+    rows = say.lines(group)
     for kind, run in runs.items():
         for k, (payload, effect) in enumerate(plan.cases):
             if effect:
@@ -147,29 +125,23 @@ def _table_of(title: str, runs: dict[str, Track], plan: Plan, begin: float) -> l
                     f"{run.mean(20.0, 25.0)[k]:+.3f} deg"
                 )
             )
-            rows.append(
-                judge(
-                    title,
-                    (f"{kind}, {payload:g} lb: rms"),
-                    ("figure only"),
-                    math.nan,
-                    float(run.rms(begin)[k]),
-                    ("deg"),
-                    cannot_tell="curves without numbers",
-                    note=(
-                        f"nu {run.nu(begin)[k]:.1f} deg2 s, omega {run.omega(begin)[k]:.1f} (rad), "
-                        f"largest {run.largest(begin)[k]:.2f} deg"
-                    )
-                    + more
-                    + ((f", with the approach {run.rms(0.0)[k]:.2f} deg rms") if begin else ("")),
-                )
+            rows.say(
+                "rms_by_payload",
+                float(run.rms(begin)[k]),
+                kind,
+                payload,
+                run.nu(begin)[k],
+                run.omega(begin)[k],
+                run.largest(begin)[k],
+                more,
+                f", with the approach {run.rms(0.0)[k]:.2f} deg rms" if begin else "",
             )
     return rows
 
 
 def lift(plan: Plan) -> list[Comparison]:
     """The controllers on lift, hold and return."""
-    group, k = Group("lift"), _middle(plan)
+    rows, k = say.lines(), _middle(plan)
     runs = {kind: plan.compared(kind, "lift") for kind in KINDS}
     numbers: dict[str, Callable[[Track], Array]] = {
         "curvature": lambda run: run.omega(),
@@ -194,13 +166,13 @@ def lift(plan: Plan) -> list[Comparison]:
                 "; the networks lose most at the begin, in the chapter too: from 2 s on "
                 f"{later['sliding'] / later['neural']:.2f}"
             )
-        group.smaller(fact.removeprefix("lift: ") + f", {MIDDLE:g} lb", _LIFT, ratio, note)
-    return group.rows + _table_of(group.title, runs, plan, 0.0)
+        rows.say("lift_order", ratio, fact.removeprefix("lift: "), note)
+    return rows + _table_of("lift", runs, plan, 0.0)
 
 
 def effects(plan: Plan) -> list[Comparison]:
     """The orders with one effect more in the plant, of which the controllers know nothing."""
-    group, rows = Group("effects"), []
+    rows = say.lines("effects")
     base = orders(plan, _middle(plan))
     for k, (payload, effect) in enumerate(plan.cases):
         if payload != MIDDLE:
@@ -231,15 +203,12 @@ def effects(plan: Plan) -> list[Comparison]:
             + (f"; restored: {'; '.join(restored)}" if restored else "")
             + (f"; lost: {'; '.join(lost)}" if lost else "")
         )
-        rows.append(
-            judge(
-                group.title,
-                (f"orders of 5.5 that hold, {effect or 'nothing left out'}"),
-                ("5.5"),
-                len(base),
-                len(right),
-                note=note,
-            )
+        rows.say(
+            "orders_that_hold",
+            len(right),
+            effect or "nothing left out",
+            note,
+            published=len(base),
         )
     return rows
 
@@ -248,7 +217,7 @@ def hysteresis(plan: Plan, search: bool) -> list[Comparison]:
     """The diagnosis of a plant with hysteresis, where asked for, and what its compensation
     brings.
     """
-    group = Group("hysteresis")
+    rows = say.lines()
     if search:
         found = plan.diagnosis()
         named = next(
@@ -258,30 +227,24 @@ def hysteresis(plan: Plan, search: bool) -> list[Comparison]:
         text = ", ".join(
             f"{name} {value['value']:.3g} ({_true(name):.3g})" for name, value in parameters.items()
         )
-        group.say(
-            "probability that the diagnosis gives to muscle_hysteresis",
-            "5.5: 'A key example of one such nonlinearity'",
-            0.9,
+        rows.say(
+            "probability_diagnosis_gives",
             math.nan if named is None else named["probability"],
-            relation="above",
-            note=(
-                "the plant with it recorded under the PID, the rig without it diagnosed: "
-                f"{found.verdict}; found (put in): {text}"
-            ),
+            found.verdict,
+            text,
         )
     before, after = plan.compensated(False), plan.compensated(True)
-    group.smaller(
-        "sliding error with compensation over without, plant with hysteresis",
-        "5.5: 'are expected if hysteresis can be properly compensated'",
+    rows.say(
+        "sliding_error_compensation",
         float(after.rms()[0] / before.rms()[0]),
-        (
-            f"{before.rms()[0]:.2f} to {after.rms()[0]:.2f} deg rms, largest "
-            f"{before.largest()[0]:.2f} to {after.largest()[0]:.2f}; "
-        )
-        + ("the diagnosed parameters" if search else "the true parameters")
-        + f"; without hysteresis {plan.compared('sliding', 'compound').rms()[_middle(plan)]:.2f}",
+        before.rms()[0],
+        after.rms()[0],
+        before.largest()[0],
+        after.largest()[0],
+        "the diagnosed parameters" if search else "the true parameters",
+        plan.compared("sliding", "compound").rms()[_middle(plan)],
     )
-    return group.rows
+    return rows
 
 
 def _true(name: str) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 from typing import Final
 
 import matplotlib as mpl
@@ -13,15 +14,13 @@ from matplotlib.figure import Figure
 from pamrs.report.figures import decimate
 from reproduction import drawing, tracking
 from reproduction.chapter5_comparison import orders
-from reproduction.chapter5_statements import GROUPS
+from reproduction.chapter5_statements import say
 from reproduction.page import Picture
 from reproduction.tracking import KINDS, PAYLOADS, Track
 from reproduction.tracking_runs import FULL, LATER, MIDDLE, STARTS, TRIALS, WRONG, Plan
 
 __all__ = ["pictures"]
 
-#: Colours of a picture.
-_KEPT: Final = 160
 _INK: Final = "#1f1f1f"
 _COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#8c6d1f")
 _BY_KIND: Final = dict(zip(KINDS, ("#8c6d1f", "#0072b2", "#009e73", "#d55e00"), strict=True))
@@ -30,114 +29,20 @@ Curve = tuple[Track, int, str, str]
 
 
 def pictures(plan: Plan = FULL) -> list[Picture]:
-    """Every picture of the chapter, in the order of its figures.
-
-    Parameters
-    ----------
-    plan : Plan
-        The experiments.
-
-    Returns
-    -------
-    list of Picture
-    """
-    return [
-        Picture(name, GROUPS[group], caption, drawing.png(draw, _KEPT))
-        for name, group, draw, caption in _pictures(plan)
-    ]
-
-
-def _pictures(plan: Plan) -> list[tuple[str, str, Callable[[], Figure], str]]:
-    """Name, group, function and caption of each picture."""
-    return [
-        (
-            "fig5_08_sliding",
-            "sliding",
-            lambda: _sliding(plan),
-            (
-                "Fig. 5.8: sliding with right and wrong estimates: angle and error without "
-                "payload, squared error with each."
-            ),
-        ),
-        (
-            "fig5_10_estimates",
-            "adaptive",
-            lambda: _estimates(plan),
-            (
-                "Fig. 5.10: estimates with the gains of Table 5.2 (SI, radians) and with ours, 25 "
-                "lb; dashed: the arm's."
-            ),
-        ),
-        (
-            "fig5_11_start",
-            "neural",
-            lambda: _start(plan),
-            (
-                "Figs. 5.11 and 5.17: networks with 50 lb that know nothing, the model, or what 15 "
-                "lb taught."
-            ),
-        ),
-        (
-            "fig5_12_networks",
-            "neural",
-            lambda: _networks(plan),
-            (
-                "Figs. 5.12, 5.13, 5.16: the three networks with 50 lb, from light (begin) to dark "
-                "(end)."
-            ),
-        ),
-        (
-            "fig5_14_payloads",
-            "neural",
-            lambda: _payloads(plan),
-            (
-                "Figs. 5.14 and 5.21: networks from zero with 0, 25 and 50 lb, and from Gaylord's "
-                "estimate with 0 lb."
-            ),
-        ),
-        (
-            "training",
-            "compound",
-            lambda: _training(plan),
-            (
-                "Error of each 20 s of the training: without payload adaptive sliding drifts away, "
-                "networks fall back now and then."
-            ),
-        ),
-        (
-            "fig5_19_compound",
-            "compound",
-            lambda: _compared(plan, "compound"),
-            (
-                "Fig. 5.19: the four controllers with 25 lb on the compound trajectory, the "
-                "adaptive ones after their training."
-            ),
-        ),
-        (
-            "fig5_20_lift",
-            "lift",
-            lambda: _compared(plan, "lift"),
-            "Fig. 5.20: the same on lift, hold and return.",
-        ),
-        (
-            "orders",
-            "effects",
-            lambda: _orders(plan),
-            (
-                "The orders of 5.5 as ratios that the chapter has below one, by what the plant has "
-                "and no controller knows."
-            ),
-        ),
-        (
-            "hysteresis",
-            "hysteresis",
-            lambda: _hysteresis(plan),
-            (
-                "Sliding on a plant with hysteresis, without and with compensation: error over "
-                "time and over the angle."
-            ),
-        ),
-    ]
+    """Every picture of the chapter, in the order of its figures, from the experiments of a plan."""
+    drawn = {
+        "fig5_08_sliding": partial(_sliding, plan),
+        "fig5_10_estimates": partial(_estimates, plan),
+        "fig5_11_start": partial(_start, plan),
+        "fig5_12_networks": partial(_networks, plan),
+        "fig5_14_payloads": partial(_payloads, plan),
+        "training": partial(_training, plan),
+        "fig5_19_compound": partial(_compared, plan, "compound"),
+        "fig5_20_lift": partial(_compared, plan, "lift"),
+        "orders": partial(_orders, plan),
+        "hysteresis": partial(_hysteresis, plan),
+    }
+    return drawing.pictures(say, drawn, 160)
 
 
 def _angles(axes: Axes, curves: Sequence[Curve]) -> None:

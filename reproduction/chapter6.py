@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, Told, judge
+from pamrs.comparison import Comparison, Told
 from pamrs.design import lift
 from pamrs.library import entry
 from pamrs.library.evaluate import free_contraction
@@ -26,95 +26,16 @@ from pamrs.rig import Muscle
 from reproduction import recruiting as rec
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Case, Cycles
 from reproduction.rigs import with_struts
-from reproduction.score import OTHER, OWN, Apart, scored
+from reproduction.statements import Statements
 
-__all__ = [
-    "CHOSEN",
-    "GROUPS",
-    "TITLE",
-    "chosen",
-    "experiments",
-    "facts",
-    "headings",
-    "in_short",
-    "latest",
-    "tables",
-]
+__all__ = ["experiments", "facts", "headings", "in_short", "latest", "say", "tables"]
+
+#: The statements of the chapter.
+say: Final = Statements("chapter6")
 
 Array = NDArray[np.float64]
 
-TITLE: Final = "Chapter 6: variable recruitment"
 BAR: Final = 1e5
-#: The experiments by the name under which figures find their group.
-GROUPS: Final = {
-    "pair": "one muscle at full pressure against two at half (6.2, Figs. 6.1 and 6.2)",
-    "silicone": "pam_b_075in",
-    "joint": "what the shoulder lifts (6.3)",
-    "cycles": "lifting cycles (6.4, Figs. 6.7 and 6.8)",
-    "best": "the best number of muscles up to 63 kg (Fig. 6.9)",
-    "rubber": "with and without elasticity of the bladder (Fig. 6.10)",
-    "readings": "what else could be meant: efficiency over Table 6.3, with and without elasticity",
-    "tests": "experiments (6.5, Figs. 6.11 to 6.15)",
-    "suspects": "what could make the experiments' input larger (6.5.2)",
-    "idle": "muscles that are not recruited (6.6)",
-}
-CHOSEN: Final = (
-    (
-        "gains of the cascade",
-        "400 kPa/rad, 600 kPa/(rad s), 50 kPa s/rad for six muscles",
-        (
-            "'set to ensure that the arm would reach the maximum desired angle smoothly' (6.4.2), "
-            "none printed; fewer muscles in proportion more. The text's angle loop is PI; without "
-            "the rate it swings, or, a quarter as fast, ends some degrees short"
-        ),
-    ),
-    ("controller period", "5 ms", "none is published"),
-    (
-        "muscles that are not recruited",
-        "taken off",
-        "'by manually adjusting the tubing connections' (6.3); with them, see 6.6",
-    ),
-    (
-        "chamber.dead_volume",
-        "25 ml for each muscle",
-        "a sixth of the shoulder's; neither fittings nor tubing are published",
-    ),
-    (
-        "arm.first_moment",
-        "1.8 kg m",
-        "the shoulder's; chapter 6 omits the arm's weight and contradicts itself about it (6.3)",
-    ),
-    (
-        "torque of (6.7)",
-        "of the muscles",
-        "as the text estimates it in its experiments, from pressure and angle",
-    ),
-    (
-        "leakage",
-        (
-            "`leak_muscle` 5e-12, `supply_leak` 1e-11, `valve_centre_leakage` 3e-11 m3/(s Pa) at "
-            "its null"
-        ),
-        "sonic conductances that the catalogue calls typical; the text names no size",
-    ),
-    (
-        "tubing",
-        "`tube_flow_restriction` 1.2e-8 m3/(s Pa), or 0.1 l more of dead volume",
-        "typical in the catalogue; 5 m of 5 mm bore hold 0.1 l",
-    ),
-    (
-        "temperature",
-        "`heat_transfer` 50 W/(m2 K)",
-        "typical in the catalogue; it replaces the coefficients of (6.4) by an energy balance",
-    ),
-)
-#: Lines of the library's muscle B that are no part of this score.
-APART: Final[tuple[Apart, ...]] = (
-    ("pam_b_075in", "one at (4|8) bar less two at (2|4) bar, e = 0.10", OWN),
-    ("pam_b_075in", "offsets that would hide.*", OWN),
-    ("pam_b_075in", "the same, B's rubber in A's muscle", OTHER),
-    ("pam_b_075in", "free contraction, .*", OWN),
-)
 #: Largest pressure of a muscle for which the source still has 2 bar to spare (6.6) [Pa].
 _SPARE: Final = 2.0 * BAR
 
@@ -224,7 +145,7 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     """
     done = experiments(search=search, progress=progress)
     silicone = [row for row in compare_entry(entry("pam_b_075in")) if row.where.startswith("6.")]
-    rows = _pair() + scored(silicone, APART) + _silicone() + _joint()
+    rows = _pair() + say.scored(silicone) + _silicone() + _joint()
     rows += _cycles(done) + _best(done) + _rubber(done) + _readings(done)
     return rows + _tests(done) + _suspects(done) + _idle(done)
 
@@ -232,11 +153,6 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
 def headings() -> dict[str, str]:
     """What is said above each group, where that is more than its name."""
     return {"pam_b_075in": f"one against two of silicone: {entry('pam_b_075in').title}"}
-
-
-def chosen() -> list[tuple[str, str, str]]:
-    """Name, value and reason of each number that the chapter does not give."""
-    return list(CHOSEN)
 
 
 # ------------------------------------------------------- 6.2: one at 2P, two at P
@@ -250,7 +166,7 @@ def _loss(muscle: Muscle, pressure: float, contraction: Array | float) -> Array:
 
 
 def _pair() -> list[Comparison]:
-    group, muscle = GROUPS["pair"], entry("pam_a_1in").muscle
+    muscle = entry("pam_a_1in").muscle
     levels = (2.0 * BAR, 4.0 * BAR)
     free = [free_contraction(muscle, p) for p in levels]
     full = [free_contraction(muscle, 2.0 * p) for p in levels]
@@ -262,50 +178,17 @@ def _pair() -> list[Comparison]:
     ambient = 101325.0
     air = [2.0 * (p + ambient) / (2.0 * p + ambient) for p in levels]
     return [
-        judge(
-            group,
-            "A: one less two over the blocked force, least from 2 % contraction on",
-            (
-                "6.2, Fig. 6.1: 'For any substantial amount of contraction, the force from a "
-                "single PAM is greater than the force of two PAMs (at half pressure)'"
-            ),
-            0.0,
-            100.0 * min(least),
-            "%",
-            relation="above",
-            note=f"2 and 4 bar; at 10 % contraction {100 * low:.1f} and {100 * high:.1f} %",
+        say("one_two_blocked", 100.0 * min(least), 100 * low, 100 * high),
+        say(
+            "free_contraction_one",
+            min((a - b for a, b in zip(full, free, strict=True))),
+            full[0],
+            free[0],
+            full[1],
+            free[1],
         ),
-        judge(
-            group,
-            "A: free contraction of one less that of two, least",
-            "6.2, Fig. 6.1: 'Free contraction of the single PAM is also greater'",
-            0.0,
-            min(a - b for a, b in zip(full, free, strict=True)),
-            relation="above",
-            note=f"{full[0]:.3f} and {free[0]:.3f}; {full[1]:.3f} and {free[1]:.3f}",
-        ),
-        judge(
-            group,
-            "A: share lost to the rubber, 2 bar over 4 bar",
-            "6.2: 'as pressure increases, this proportion decreases'",
-            1.0,
-            low / high,
-            relation="above",
-            note="one less two over the blocked force, 10 % contraction",
-        ),
-        judge(
-            group,
-            "air in two muscles at half the pressure over that in one, 4 and 8 bar",
-            "6.2: 'both configurations hold the same air mass for the same contraction'",
-            1.0,
-            air[1],
-            tolerance=0.02,
-            note=(
-                f"{air[0]:.3f} at 2 and 4 bar. The ideal gas law takes absolute pressures; with "
-                "the bars of the figures put into it, it is 1, as though the chapter counted its "
-                "air in gauge pressures"
-            ),
-        ),
+        say("share_lost_rubber", low / high),
+        say("air_two_muscles", air[1], air[0]),
     ]
 
 
@@ -314,23 +197,14 @@ def _silicone() -> list[Comparison]:
     own, other = entry("pam_b_075in").muscle, entry("pam_a_1in").muscle
     same = own.replace(**{k: other.parameters[k] for k in ("modulus_slope", "modulus_offset")})
     ratio = float(_loss(same, 2.0 * BAR, 0.10)) / float(_loss(other, 2.0 * BAR, 0.10))
-    return [
-        judge(
-            GROUPS["silicone"],
-            "loss of B with A's rubber / loss of A, 2 bar, e = 0.10",
-            "6.2: 'to incur more losses if both PAMs used the same bladder material'",
-            1.0,
-            ratio,
-            relation="above",
-        )
-    ]
+    return [say("loss_B_s", ratio)]
 
 
 # --------------------------------------------------------------- 6.3: the shoulder
 
 
 def _joint() -> list[Comparison]:
-    group, rig = GROUPS["joint"], with_struts("shoulder")
+    rig = with_struts("shoulder")
     end = math.radians(90.0)
     full = lift(rig.with_parameters({"arm.payload": 95.0}), pressure=13.0 * BAR, to=end)
     weight = rig.parameter("arm.gravity").value
@@ -338,41 +212,9 @@ def _joint() -> list[Comparison]:
     left = 850.0 / weight - 95.0 * length
     least, most = _moments()
     return [
-        judge(
-            group,
-            "least torque of six muscles from 15 to 90 deg, 13 bar",
-            "6.3: 'capable of 850 Nm (630 ft-lb) of torque up to 90 deg'",
-            850.0,
-            float(full.torque.min()),
-            "N m",
-            tolerance=0.05 * 850.0,
-            used=True,
-            note="the shoulder's moduli were chosen from it",
-        ),
-        judge(
-            group,
-            "most that is lifted to 90 deg, 13 bar",
-            "6.3: 'enough to lift a 95 kg (210 lb) tip payload'",
-            95.0,
-            full.payload_limit or 0.0,
-            "kg",
-            tolerance=0.05 * 95.0,
-        ),
-        judge(
-            group,
-            "first moment of the arm: least by the test matrix, against that of 6.3",
-            "Tables 6.2 and 6.3 against 6.3",
-            left,
-            least,
-            "kg m",
-            tolerance=1.0,
-            cannot_tell=(
-                "the dissertation against itself: 850 N m and 95 kg at 0.9 m leave the empty arm "
-                f"{left:.1f} kg m; that two muscles are not tested with 18 kg at 90 deg, with "
-                f"2 bar to spare, needs {least:.1f} at least (that they are with 9 kg, {most:.1f} "
-                "at the most)"
-            ),
-        ),
+        say("least_torque_six", float(full.torque.min())),
+        say("most_lifted_90", full.payload_limit or 0.0),
+        say("first_moment_arm", least, left, least, most, published=left),
     ]
 
 
@@ -405,47 +247,22 @@ def _of(done: Cycles, cases: tuple[Case, ...]) -> Array:
 
 def _trends(found: Cycles) -> list[Comparison]:
     """What 6.4.3 says about payload and number of muscles, up to one angle."""
-    group = GROUPS["cycles"]
     deg = f"{found.high:.0f} deg"
     grid = 100.0 * _grid(found, PAYLOADS)
     gain = grid[:, 0] / grid[:, 2]
     below = grid[:, 1] / grid[:, 2]
     return [
-        judge(
-            group,
-            f"{deg}: least gain of efficiency from a payload to the next",
-            (
-                "6.4.3: 'For each level of recruitment, system efficiency increases with "
-                "payload mass'"
-            ),
-            0.0,
-            float(np.nanmin(np.diff(grid, axis=0))),
-            "%",
-            relation="above",
-        ),
-        judge(
-            group,
-            f"{deg}: least gain of efficiency from a number of muscles to the next lower",
-            "6.4.3: 'using fewer PAMs (when possible) increases system efficiency'",
-            0.0,
-            float(np.nanmin(-np.diff(grid, axis=1))),
-            "%",
-            relation="above",
-        ),
-        judge(
-            group,
-            f"{deg}: gain of two or four muscles over six, 0 kg over the largest payload",
-            "6.4.3: 'most beneficial at the lowest payloads'",
-            1.0,
+        say("least_gain_efficiency", float(np.nanmin(np.diff(grid, axis=0))), deg),
+        say("least_gain_efficiency_number", float(np.nanmin(-np.diff(grid, axis=1))), deg),
+        say(
+            "gain_two_four",
             float(gain[0] / gain[-1] if math.isfinite(gain[-1]) else below[0] / below[-1]),
-            relation="above",
-            note="ratio of efficiencies; two muscles where the matrix has them with 27 kg",
+            deg,
         ),
     ]
 
 
 def _cycles(done: Experiments) -> list[Comparison]:
-    group = GROUPS["cycles"]
     over = max(float(np.degrees(c.angle.max()) - c.high) for c in (done.flat, done.steep))
     assert done.plain is not None
     slow = done.plain.efficiency / _of(done.readings["as it is"][0], MATRIX[90.0])
@@ -453,42 +270,16 @@ def _cycles(done: Experiments) -> list[Comparison]:
     return [
         *_trends(done.flat),
         *_trends(done.steep),
-        judge(
-            group,
-            "largest overshoot of the angle",
-            "6.4.2: 'with negligible overshoot'",
-            1.0,
-            over,
-            "deg",
-            relation="below",
-            note="'negligible' read as one degree; the gains were set so",
-            apart=OWN,
-        ),
-        judge(
-            group,
-            "efficiency with a slow PI loop over that with the rate, furthest off 1",
-            "6.4.2: 'cascaded proportional-integral (PI) controller'",
-            1.0,
+        say("largest_overshoot_angle", over),
+        say(
+            "efficiency_slow_PI",
             float(slow[np.argmax(np.abs(np.log(slow)))]),
-            tolerance=0.05,
-            note=(
-                f"{slow.min():.2f} to {slow.max():.2f}; without the rate the loop is a quarter as "
-                f"fast, and ends {short.min():.1f} to {short.max():.1f} deg below the angle wanted"
-            ),
-            apart=OWN,
+            slow.min(),
+            slow.max(),
+            short.min(),
+            short.max(),
         ),
-        judge(
-            group,
-            "length of eight cycles",
-            "6.4.2 against 6.5.1: 'completed after 200 s'",
-            200.0,
-            8.0 * rec.CYCLE,
-            "s",
-            tolerance=2.0,
-            cannot_tell=(
-                "the dissertation against itself: eight cycles of 6, 5, 6 and 5 s take 176 s"
-            ),
-        ),
+        say("length_eight_cycles", 8.0 * rec.CYCLE),
     ]
 
 
@@ -504,7 +295,7 @@ def best_number(found: Cycles, payload: float) -> tuple[int, int]:
 
 
 def _best(done: Experiments) -> list[Comparison]:
-    group, found = GROUPS["best"], done.steep
+    found = done.steep
     loads = (*PAYLOADS, *EXTENDED)
     best = {load: best_number(found, load) for load in loads}
     words = ", ".join(
@@ -513,159 +304,61 @@ def _best(done: Experiments) -> list[Comparison]:
     )
     numbers = [n for n, _ in best.values()]
     return [
-        judge(
-            group,
-            "number of muscles at 0 kg",
-            (
-                "6.4.3: 'At the lowest payloads, the fewest number of PAMs (a single motor unit) "
-                "should be recruited'"
-            ),
-            2.0,
-            float(numbers[0]),
-            tolerance=0.0,
-        ),
-        judge(
-            group,
-            "least step of the best number from a payload to the next",
-            (
-                "6.4.3: 'an additional motor unit can be recruited, and so on as torque "
-                "requirements continue to increase'"
-            ),
-            0.0,
-            float(np.diff(numbers).min()),
-            tolerance=0.0,
-            note=f"{words}; of those that follow most cycles the most efficient",
-        ),
-        judge(
-            group,
-            "number of muscles at 63 kg",
-            "6.4.3: 'until all motor units are recruited'",
-            6.0,
-            float(numbers[-1]),
-            tolerance=0.0,
-        ),
+        say("number_muscles_0", float(numbers[0])),
+        say("least_step_best", float(np.diff(numbers).min()), words),
+        say("number_muscles_63", float(numbers[-1])),
         *_limits(done, best),
     ]
 
 
 def _limits(done: Experiments, best: Mapping[float, tuple[int, int]]) -> list[Comparison]:
     """Up to which payload and which pressure the source can give, by the best number of muscles."""
-    group, found = GROUPS["best"], done.steep
+    found = done.steep
     whole = [load for load, (_, k) in best.items() if k == done.cycles]
     top = found.tops() > found.high - 1.0
     need = float(found.gradient()[top].min()) / BAR
     return [
-        judge(
-            group,
-            "largest payload that follows every cycle",
-            "6.5.1: 'limited the maximum test payload to 27 kg (60 lb)'",
-            27.0,
+        say(
+            "largest_payload_follows",
             max(whole),
-            "kg",
-            tolerance=9.0,
-            cannot_tell=(
-                "" if done.cycles == 8 else "two cycles of eight: the tank does not run low"
-            ),
-            note="payloads in steps of 9 kg; the tank runs low before the lift fails",
+            "" if done.cycles == 8 else "two cycles of eight: the tank does not run low",
         ),
-        judge(
-            group,
-            "least of tank less muscles with which the arm still reaches its angle",
-            ("6.6: 'this becomes an issue when the pressure gradient is less than 2 bar (30 psi)'"),
-            2.0,
-            need,
-            "bar",
-            tolerance=0.5,
-            note=(
-                "within 1 deg at the end of the hold; the lift of 6 s asks little of the valve, "
-                "whose size is not published"
-            ),
-        ),
+        say("least_tank_muscles", need),
     ]
 
 
 def _rubber(done: Experiments) -> list[Comparison]:
-    group = GROUPS["rubber"]
     cases = MATRIX[90.0]
     with_, without = (100.0 * _of(found, cases) for found in (done.steep, done.bare))
-    where = "6.4.3, Fig. 6.10: 'the efficiency range jumps from 10-30% to 52-66%'"
     bound = _bound(done)
     return [
-        judge(
-            group,
-            "with elasticity: least efficiency",
-            where,
-            10.0,
-            float(with_.min()),
-            "%",
-            tolerance=2.5,
-            note="without a payload, six muscles; with 9 kg it is "
-            f"{100 * done.steep.of(9.0, 6):.1f}",
-        ),
-        judge(
-            group,
-            "with elasticity: largest efficiency",
-            where,
-            30.0,
-            float(with_.max()),
-            "%",
-            tolerance=2.5,
-        ),
-        judge(
-            group,
-            "without elasticity: least efficiency",
-            where,
-            52.0,
+        say("elasticity_least_efficiency", float(with_.min()), 100 * done.steep.of(9.0, 6)),
+        say("elasticity_largest_efficiency", float(with_.max())),
+        say(
+            "without_elasticity_least",
             float(without.min()),
-            "%",
-            tolerance=2.5,
-            note=(
-                "without a payload: the empty arm of 1.8 kg m asks six muscles for "
-                f"{done.bare.pressure[done.bare.row(0.0, 6)].max() / BAR:.2f} bar, and isothermal "
-                "air that pushes with a gauge pressure P gives P/(P + 1.013 bar) of (6.8) at the "
-                f"most, {bound:.0f} %; with 9 kg and six muscles it is "
-                f"{100 * done.bare.of(9.0, 6):.1f}"
-            ),
+            done.bare.pressure[done.bare.row(0.0, 6)].max() / BAR,
+            bound,
+            100 * done.bare.of(9.0, 6),
         ),
-        judge(
-            group,
-            "without elasticity: largest efficiency",
-            where,
-            66.0,
-            float(without.max()),
-            "%",
-            tolerance=2.5,
-        ),
+        say("without_elasticity_largest", float(without.max())),
         *_turned(done),
     ]
 
 
 def _turned(done: Experiments) -> list[Comparison]:
     """Which number of muscles is best and worst without elasticity."""
-    group = GROUPS["rubber"]
     bare = 100.0 * np.array([[done.bare.of(p, n) for n in MUSCLES] for p in (0.0, 27.0)])
     return [
-        judge(
-            group,
-            "without elasticity, 0 kg: two muscles less the better of four and six",
-            "6.4.3: 'the 2-PAM configuration displays the greatest efficiency at zero payload'",
-            0.0,
+        say(
+            "without_elasticity_0",
             float(bare[0, 0] - bare[0, 1:].max()),
-            "%",
-            relation="above",
-            note="efficiency [%] with 2, 4, 6: " + ", ".join(f"{x:.1f}" for x in bare[0]),
+            ", ".join(f"{x:.1f}" for x in bare[0]),
         ),
-        judge(
-            group,
-            "without elasticity, 27 kg: two muscles less the worse of four and six",
-            "6.4.3: 'but becomes the least efficient at the maximum payload'",
-            0.0,
+        say(
+            "without_elasticity_27",
             float(bare[1, 0] - bare[1, 1:].min()),
-            "%",
-            relation="below",
-            note="efficiency [%] with 2, 4, 6: "
-            + ", ".join(f"{x:.1f}" for x in bare[1])
-            + "; with the gas laws in gauge pressures it is so, see below",
+            ", ".join(f"{x:.1f}" for x in bare[1]),
         ),
     ]
 
@@ -677,8 +370,7 @@ def _bound(done: Experiments) -> float:
 
 
 def _readings(done: Experiments) -> list[Comparison]:
-    group, rows = GROUPS["readings"], []
-    where = "6.4.3, Fig. 6.10: 10-30 and 52-66 %"
+    rows = []
     for name, pair in done.readings.items():
         for elastic, found, low, high in (
             ("with", pair[0], 10.0, 30.0),
@@ -686,19 +378,7 @@ def _readings(done: Experiments) -> list[Comparison]:
         ):
             values = 100.0 * _of(found, MATRIX[90.0])
             off = abs(float(values.min()) - low) + abs(float(values.max()) - high)
-            rows.append(
-                judge(
-                    group,
-                    f"{name}, {elastic} elasticity: both ends of the range, off by in all",
-                    where,
-                    0.0,
-                    off,
-                    "%",
-                    tolerance=5.0,
-                    note=f"{values.min():.1f} to {values.max():.1f} %",
-                    apart=OTHER,
-                )
-            )
+            rows.append(say("elasticity_both_ends", off, name, elastic, values.min(), values.max()))
     return rows
 
 
@@ -706,7 +386,7 @@ def _readings(done: Experiments) -> list[Comparison]:
 
 
 def _tests(done: Experiments) -> list[Comparison]:
-    group, found = GROUPS["tests"], done.steep
+    found = done.steep
     work = np.array([[found.work[found.row(p, n)] for n in MUSCLES] for p in PAYLOADS])
     allowed = np.array([[(p, n) in MATRIX[90.0] for n in MUSCLES] for p in PAYLOADS])
     work = np.where(allowed, work, math.nan)
@@ -715,47 +395,21 @@ def _tests(done: Experiments) -> list[Comparison]:
     tops = found.tops()[own]
     drop = (found.source[own, 0] - found.source[own, -1]) / BAR
     return [
-        judge(
-            group,
-            _SPREAD,
-            "6.5.2, Fig. 6.14: 'work output remains essentially constant'",
-            5.0,
+        say(
+            "largest_spread_work",
             100.0 * float(spread.max()),
-            "%",
-            relation="below",
-            note="'essentially' read as 5 %; work [J] at "
-            + "; ".join(
-                f"{p:g} kg: {float(np.nanmean(line)):.0f}"
-                for p, line in zip(PAYLOADS, work, strict=True)
+            "; ".join(
+                (
+                    f"{p:g} kg: {float(np.nanmean(line)):.0f}"
+                    for p, line in zip(PAYLOADS, work, strict=True)
+                )
             ),
         ),
-        judge(
-            group,
-            "18 kg, 2 muscles: spread of the angles reached",
-            (
-                "6.5.2, Fig. 6.11: 'smooth and repeatable despite the source pressure dropping "
-                "during the tests'"
-            ),
-            1.0,
-            float(np.ptp(tops)),
-            "deg",
-            relation="below",
-            note=f"'repeatable' read as one degree; the tank falls by {drop:.1f} bar",
-        ),
-        judge(
-            group,
-            "18 kg, 2 muscles: width of the loop of torque over pressure",
-            "6.5.2, Fig. 6.12: 'these hysteretic curves'",
-            0.0,
+        say("18_kg_2", float(np.ptp(tops)), drop),
+        say(
+            "18_kg_2_muscles",
             100.0 * loop_width(done.steep, own),
-            "%",
-            relation="above",
-            note=(
-                "of the largest torque, at the mean pressure, last whole cycle: joint friction, "
-                "damping and what the rubber's shape does; with (2.36) "
-                f"{100 * loop_width(_hysteretic(), 0):.0f} %. How wide the figure's is cannot be "
-                "read"
-            ),
+            100 * loop_width(_hysteretic(), 0),
         ),
     ]
 
@@ -791,14 +445,10 @@ _NAMED: Final[Mapping[str, tuple[str, ...]]] = {
 
 
 def _suspects(done: Experiments) -> list[Comparison]:
-    group, rows = GROUPS["suspects"], []
+    rows = []
     base = done.readings["as it is"][0]
     rows_ = [base.row(*case) for case in MATRIX[90.0]]
     energy, work = base.energy[rows_], base.work[rows_]
-    where = (
-        "6.5.2: 'unmodeled factors, which could include leakage, tubing losses, and temperature "
-        "change'"
-    )
     ratio = {name: found.energy / energy for name, found in done.suspects.items()}
 
     def told(name: str) -> str:
@@ -813,66 +463,29 @@ def _suspects(done: Experiments) -> list[Comparison]:
     for suspect, members in _NAMED.items():
         best = max(members, key=lambda name: float(ratio[name].min()))
         rows.append(
-            judge(
-                group,
-                f"{suspect}: input with it over that without, least of the ten cases",
-                where,
-                1.01,
+            say(
+                "input_without_least_ten",
                 float(ratio[best].min()),
-                relation="above",
-                note="; ".join(told(name) for name in members)
-                + f"; shown: {best}; 'greater than simulations in each test case' read as 1 % more",
+                suspect,
+                "; ".join(told(name) for name in members),
+                best,
             )
         )
-    return rows + _unnamed(done, energy, where, told)
+    return rows + _unnamed(done, energy, told)
 
 
-def _unnamed(
-    done: Experiments, energy: Array, where: str, told: Callable[[str], str]
-) -> list[Comparison]:
+def _unnamed(done: Experiments, energy: Array, told: Callable[[str], str]) -> list[Comparison]:
     """What else could make the input larger, each a check of our own."""
-    group, base = GROUPS["suspects"], done.readings["as it is"][0]
+    base = done.readings["as it is"][0]
     rows_ = [base.row(*case) for case in MATRIX[90.0]]
     gauge = energy / done.readings["gauge pressures in (6.4)"][0].energy[rows_]
     tank = _tank(done)
     other = "hysteresis of the muscles (2.36)"
     return [
-        judge(
-            group,
-            "gauge pressures in the simulation alone: input of the rig over theirs, least",
-            "6.5.2: 'greater than simulations in each test case'",
-            1.01,
-            float(gauge.min()),
-            relation="above",
-            note=(
-                f"{gauge.min():.2f} to {gauge.max():.2f}; the text "
-                "does not name it: experiments take absolute pressures by themselves"
-            ),
-            apart=OWN,
-        ),
-        judge(
-            group,
-            "air of the tank that cools as it expands: input over that of (6.5), least",
-            where,
-            1.01,
-            float(tank.min()),
-            relation="above",
-            note=(
-                f"{tank.min():.2f} to {tank.max():.2f}, by p^(1/1.4) instead of the isothermal "
-                "(6.5), the most that temperature can do there; a tank that was just filled and "
-                "cools by 10 K loses 760 J whatever is lifted"
-            ),
-            apart=OWN,
-        ),
-        judge(
-            group,
-            f"{other}: input with it over that without, least",
-            "not named in 6.5.2",
-            1.01,
-            float((done.suspects[other].energy / energy).min()),
-            relation="above",
-            note=told(other),
-            apart=OWN,
+        say("gauge_pressures_simulation", float(gauge.min()), gauge.min(), gauge.max()),
+        say("air_tank_cools", float(tank.min()), tank.min(), tank.max()),
+        say(
+            "input_without_least", float((done.suspects[other].energy / energy).min()), told(other)
         ),
     ]
 
@@ -892,38 +505,12 @@ def _tank(done: Experiments) -> Array:
 
 
 def _idle(done: Experiments) -> list[Comparison]:
-    group = GROUPS["idle"]
     alone = done.readings["as it is"][0].of(9.0, 2)
     bowed, struts = (float(done.idle[name].efficiency[0]) for name in ("bowed out", "struts"))
     push = float(entry("pam_a_1in").muscle.force(0.0, 0.10))
     return [
-        judge(
-            group,
-            "force of a vented muscle at 10 % contraction if it stayed straight",
-            "6.6: 'the buckling of non-activated PAMs when the activated PAMs contract'",
-            -3.5,
-            push,
-            "N",
-            relation="below",
-            apart=OWN,
-            note=(
-                "it buckles under what a strut of its rubber and wall bears (3.5 N, Euler): the "
-                "model without buckling pushes with that many newtons"
-            ),
-        ),
-        judge(
-            group,
-            "9 kg, rig recruitment: one pair beside two vented ones over two alone",
-            "6.6, Fig. 6.17",
-            1.0,
-            bowed / alone,
-            tolerance=0.05,
-            note=(
-                f"efficiency {100 * bowed:.1f} and {100 * alone:.1f} %; with vented muscles that "
-                f"push like struts {100 * struts:.1f} %"
-            ),
-            apart=OWN,
-        ),
+        say("force_vented_muscle", push),
+        say("9_kg_rig", bowed / alone, 100 * bowed, 100 * alone, 100 * struts),
     ]
 
 
@@ -978,16 +565,16 @@ def tables() -> dict[str, str]:
         f"*W_out (6.7) / E_in (6.8) [J] of {done.cycles} cycles.*",
     ]
     return {
-        GROUPS["cycles"]: "\n".join(efficiency),
-        GROUPS["rubber"]: "\n".join(bare),
-        GROUPS["tests"]: "\n".join(energy),
+        say.groups["cycles"]: "\n".join(efficiency),
+        say.groups["rubber"]: "\n".join(bare),
+        say.groups["tests"]: "\n".join(energy),
     }
 
 
 def in_short(rows: list[Comparison]) -> list[str]:
     """A few sentences about the statements."""
     done = latest()
-    told = Told(rows, GROUPS, 1)
+    told = Told(rows, say.groups, 1)
 
     def spread(name: str) -> tuple[str, str]:
         return tuple(  # type: ignore[return-value]
@@ -1009,47 +596,23 @@ def in_short(rows: list[Comparison]) -> list[str]:
     )
     named = {name: told.row("suspects", _shown(name)) for name in _NAMED}
     trends = [
-        row for row in rows if row.group == GROUPS["cycles"] and row.where.startswith("6.4.3")
+        row for row in rows if row.group == say.groups["cycles"] and row.where.startswith("6.4.3")
     ]
     could = [name for name, row in named.items() if row.verdict == "agree"]
     cannot = [name for name, row in named.items() if row.verdict != "agree"]
-    return [
+    return say.short(
+        (own[0], own[1], part[0].min(), part[0].max(), part[1].min(), part[1].max()),
+        (_bound(done), gauge[0], gauge[1], _order(done), heavy[0], heavy[1]),
+        (sum(row.verdict == "agree" for row in trends), told.ours("tests", _SPREAD, 2)),
         (
-            f"Efficiency at 90 deg over Table 6.3: {own[0]} % with the rubber and {own[1]} % "
-            "without, for 10-30 and 52-66 % in the text. With a payload alone it is "
-            f"{part[0].min():.0f} to {part[0].max():.0f} and {part[1].min():.0f} to "
-            f"{part[1].max():.0f} %: the lower ends are the empty arm's."
+            " and ".join(could) if could else "none",
+            f"; {' and '.join(cannot)} cannot" if cannot else "",
+            more.min(),
+            more.max(),
+            warm.min(),
+            warm.max(),
         ),
-        (
-            "What is missing at the lower ends is not found in muscles or valves. Isothermal air "
-            "that pushes an empty arm of 1.8 kg m with six muscles gives "
-            f"{_bound(done):.0f} % at the most, whatever the rubber (the coefficients of (6.4), "
-            "which make air, allow 1.4 times as much); 52 % needs 1.1 bar of gauge pressure. "
-            "Either the text's gas laws take gauge pressures, as its sentence that one muscle at "
-            "2P and two at P 'hold the same air mass' seems to: then "
-            f"{gauge[0]} and {gauge[1]} %{_order(done)}. Or its arm is heavier than its "
-            "850 N m and 95 kg leave room for: with 11 kg m, which the dashes of Table 6.3 ask "
-            "for, "
-            f"{heavy[0]} and {heavy[1]} %."
-        ),
-        (
-            "Of the six lines about the trends (fewer muscles more efficient, most so with little "
-            "payload, more efficient with payload) "
-            f"{sum(row.verdict == 'agree' for row in trends)} agree; the work differs by "
-            f"{told.ours('tests', _SPREAD, 2)} % over the numbers of muscles."
-        ),
-        (
-            "Of the suspects behind the experiments' larger input, "
-            + (" and ".join(could) if could else "none")
-            + " can raise it in each of the ten cases while the work stays"
-            + (f"; {' and '.join(cannot)} cannot" if cannot else "")
-            + ". Friction of the tubing costs next to nothing at these speeds, its volume "
-            f"{more.min():.0f} to {more.max():.0f} % for 0.1 l. An energy balance of the muscles' "
-            f"air alone raises it by {warm.min():.0f} to {warm.max():.0f} %, since the constant "
-            "coefficients of (6.4) make air. Gauge pressures in the simulation would do it too, "
-            "and no suspect would be needed."
-        ),
-    ]
+    )
 
 
 def _order(done: Experiments) -> str:

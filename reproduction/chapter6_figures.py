@@ -4,7 +4,6 @@ digitised).
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
@@ -16,13 +15,12 @@ from pamrs.library.evaluate import free_contraction
 from pamrs.report.figures import COLOURS
 from reproduction import drawing
 from reproduction import recruiting as rec
-from reproduction.chapter6 import BAR, GROUPS, latest
+from reproduction.chapter6 import BAR, latest, say
 from reproduction.page import Picture
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Cycles
 
 __all__ = ["pictures"]
 
-_KEPT: Final = 64
 _COLOUR: Final = dict(zip(MUSCLES, ("#d55e00", "#0072b2", "#1f1f1f"), strict=True))
 _BAND: Final[dict[str, Any]] = {"color": "#c4c8ce", "alpha": 0.5, "zorder": 0, "lw": 0.0}
 
@@ -30,86 +28,23 @@ _BAND: Final[dict[str, Any]] = {"color": "#c4c8ce", "alpha": 0.5, "zorder": 0, "
 def pictures() -> list[Picture]:
     """Every picture of the chapter, in the order of its figures, from the experiments that were run
     last.
-
-    Returns
-    -------
-    list of Picture
     """
-    drawn: list[tuple[str, str, Callable[[], Figure], str]] = [
-        (
-            "pair",
-            "pair",
-            _pair,
-            "Figs. 6.1 and 6.2: one muscle at full pressure (lines) and two at half (dashed).",
-        ),
-        (
-            "efficiency",
-            "cycles",
-            _efficiency,
-            "Figs. 6.7 and 6.8: efficiency over payload; open: not in Tables 6.2 and 6.3.",
-        ),
-        (
-            "best",
-            "best",
-            _best,
-            "Fig. 6.9: efficiency up to 63 kg of those that follow every cycle; crosses: the tank "
-            "ran low.",
-        ),
-        (
-            "rubber",
-            "rubber",
-            _rubber,
-            "Fig. 6.10: efficiency with the bladder's elasticity (lines) and without (dashed), 90 "
-            "deg; grey: 10-30 and 52-66 %, as printed.",
-        ),
-        (
-            "readings",
-            "readings",
-            _readings,
-            "Range of the efficiency over Table 6.3 by reading, with elasticity (orange) and "
-            "without (blue); grey: as printed.",
-        ),
-        (
-            "time",
-            "tests",
-            _time,
-            "Fig. 6.11: 18 kg, 2 muscles, 90 deg: angle, torque and pressures; red: where work is "
-            "done.",
-        ),
-        (
-            "loops",
-            "tests",
-            _loops,
-            "Fig. 6.12: torque over pressure, 18 kg, 2 muscles, second cycle, without and with the "
-            "hysteresis (2.36).",
-        ),
-        (
-            "energy",
-            "tests",
-            _energy,
-            "Figs. 6.14 and 6.15: work and input energy over payload, 90 deg; open: not in Table "
-            "6.3.",
-        ),
-        (
-            "suspects",
-            "suspects",
-            _suspects,
-            "Input energy with each suspect over that without, the ten cases of Table 6.3.",
-        ),
-    ]
-    return [
-        Picture(f"ch6_{name}", GROUPS[group], caption, drawing.png(draw, _KEPT))
-        for name, group, draw, caption in drawn
-    ]
-
-
-def _axes(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, list[Axes]]:
-    figure, cells = drawing.figure(rows, columns, height, squeeze=False, **more)
-    return figure, list(cells.ravel())
+    drawn = {
+        "ch6_pair": _pair,
+        "ch6_efficiency": _efficiency,
+        "ch6_best": _best,
+        "ch6_rubber": _rubber,
+        "ch6_readings": _readings,
+        "ch6_time": _time,
+        "ch6_loops": _loops,
+        "ch6_energy": _energy,
+        "ch6_suspects": _suspects,
+    }
+    return drawing.pictures(say, drawn)
 
 
 def _pair() -> Figure:
-    figure, cells = _axes(1, 2, 3.2)
+    figure, cells = drawing.axes(1, 2, 3.2)
     for cell, name, title in (
         (cells[0], "pam_a_1in", "A, latex"),
         (cells[1], "pam_b_075in", "B, silicone"),
@@ -126,8 +61,7 @@ def _pair() -> Figure:
                     color=colour,
                     label=f"{count} at {own / BAR:g} bar",
                 )
-        cell.set_title(title)
-        cell.set_xlabel("contraction [%]")
+        cell.set(title=title, xlabel="contraction [%]")
         cell.set_ylim(bottom=0.0)
     cells[0].set_ylabel("force [kN]")
     cells[0].legend(fontsize=7.5, frameon=False)
@@ -155,7 +89,7 @@ def _lines(cell: Axes, found: Cycles, values: Any, style: str = "-", label: str 
 
 
 def _efficiency() -> Figure:
-    figure, cells = _axes(1, 2, 3.2, sharey=True)
+    figure, cells = drawing.axes(1, 2, 3.2, sharey=True)
     done = latest()
     for cell, found in zip(cells, (done.flat, done.steep), strict=True):
         _lines(cell, found, 100.0 * found.efficiency)
@@ -167,7 +101,7 @@ def _efficiency() -> Figure:
 
 
 def _best() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.2)
+    figure, (cell,) = drawing.axes(1, 1, 3.2)
     found = latest().steep
     loads = np.array([*PAYLOADS, *EXTENDED])
     whole = found.followed() == found.count
@@ -178,8 +112,7 @@ def _best() -> Figure:
         cell.plot(loads[ran], values[ran], "-o", ms=4.5, color=_COLOUR[n], label=f"{n} muscles")
         some = ~ran & (found.followed()[rows] > 0)
         cell.plot(loads[some], values[some], "x", ms=6, color=_COLOUR[n])
-    cell.set_xlabel("payload [kg]")
-    cell.set_ylabel("efficiency [%]")
+    cell.set(xlabel="payload [kg]", ylabel="efficiency [%]")
     cell.set_ylim(0.0, 66.0)
     cell.set_xticks(loads)
     cell.legend(fontsize=7.5, frameon=False)
@@ -187,7 +120,7 @@ def _best() -> Figure:
 
 
 def _rubber() -> Figure:
-    figure, (cell,) = _axes(1, 1, 3.6)
+    figure, (cell,) = drawing.axes(1, 1, 3.6)
     done = latest()
     for low, high in ((10.0, 30.0), (52.0, 66.0)):
         cell.axhspan(low, high, **_BAND)
@@ -202,7 +135,7 @@ def _rubber() -> Figure:
 def _readings() -> Figure:
     done = latest().readings
     names = list(done)[::-1]
-    figure, (cell,) = _axes(1, 1, 0.3 * len(names) + 1.0)
+    figure, (cell,) = drawing.axes(1, 1, 0.3 * len(names) + 1.0)
     for low, high in ((10.0, 30.0), (52.0, 66.0)):
         cell.axvspan(low, high, **_BAND)
     for place, name in enumerate(names):
@@ -225,7 +158,7 @@ def _readings() -> Figure:
 
 
 def _time() -> Figure:
-    figure, cells = _axes(3, 1, 4.6, sharex=True)
+    figure, cells = drawing.axes(3, 1, 4.6, sharex=True)
     found = latest().steep
     row = found.row(18.0, 2)
     angle, torque = np.degrees(found.angle[row]), found.torque[row]
@@ -247,7 +180,7 @@ def _time() -> Figure:
 
 
 def _loops() -> Figure:
-    figure, cells = _axes(1, 2, 3.2, sharey=True)
+    figure, cells = drawing.axes(1, 2, 3.2, sharey=True)
     base = latest().readings["as it is"][0]
     rubbing = rec.lifting(
         [(18.0, 2)], 90.0, 2, changed=rec.SUSPECTS["hysteresis of the muscles (2.36)"]
@@ -267,15 +200,14 @@ def _loops() -> Figure:
                 lw=1.2,
                 label=label,
             )
-        cell.set_title(title)
-        cell.set_xlabel("pressure [bar]")
+        cell.set(title=title, xlabel="pressure [bar]")
     cells[0].set_ylabel("torque [N m]")
     cells[0].legend(fontsize=7.5, frameon=False)
     return figure
 
 
 def _energy() -> Figure:
-    figure, cells = _axes(1, 2, 3.2)
+    figure, cells = drawing.axes(1, 2, 3.2)
     found = latest().steep
     for cell, values, label in (
         (cells[0], found.work, "work [kJ]"),
@@ -298,7 +230,7 @@ def _suspects() -> Figure:
         energy / gauge.energy[[gauge.row(*case) for case in MATRIX[90.0]]]
     )
     names = list(sets)[::-1]
-    figure, (cell,) = _axes(1, 1, 0.28 * len(names) + 1.2)
+    figure, (cell,) = drawing.axes(1, 1, 0.28 * len(names) + 1.2)
     for place, name in enumerate(names):
         for (_, n), value in zip(MATRIX[90.0], sets[name], strict=True):
             cell.plot(

@@ -5,15 +5,18 @@ one.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import matplotlib as mpl
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from pamrs.report.figures import STYLE
+from reproduction.page import Picture
+from reproduction.statements import Statements
 
-__all__ = ["figure", "png"]
+__all__ = ["axes", "figure", "pictures", "png"]
 
 
 def figure(rows: int = 1, columns: int = 1, height: float = 3.6, **more: Any) -> tuple[Figure, Any]:
@@ -65,3 +68,38 @@ def png(draw: Callable[[], Figure], colours: int) -> bytes:
     small = io.BytesIO()
     image.save(small, format="png", optimize=True)
     return small.getvalue()
+
+
+def axes(rows: int, columns: int, height: float, **more: Any) -> tuple[Figure, list[Axes]]:
+    """The same with its axes as a list."""
+    drawn, cells = figure(rows, columns, height, squeeze=False, **more)
+    return drawn, list(cells.ravel())
+
+
+def pictures(
+    table: Statements, drawn: Mapping[str, Callable[[], Figure]], colours: int = 64
+) -> list[Picture]:
+    """Every picture of a chapter, in the order of its table.
+
+    Parameters
+    ----------
+    table : Statements
+        Of the chapter.
+    drawn : mapping of str to callable
+        What draws each, by its name.
+    colours : int
+        As for :func:`png`.
+
+    Returns
+    -------
+    list of Picture
+    """
+    return [
+        Picture(
+            one["name"],
+            table.groups[one["group"]],
+            one["caption"],
+            png(drawn[one["name"]], colours),
+        )
+        for one in table.pictures
+    ]

@@ -1,12 +1,9 @@
 """The two joints of dissertation 3.5 (Tables 3.4 and 3.5): what is printed beside what the package
 gives.
-
-``python -m reproduction.joints`` prints both, and the search methods side by side.
 """
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import radians
@@ -14,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, judge, table
+from pamrs.comparison import Comparison
 from pamrs.design import (
     LENGTHS,
     JointDesign,
@@ -26,6 +23,7 @@ from pamrs.design import (
 )
 from pamrs.library import entry
 from pamrs.units import to_si
+from reproduction.statements import Lines, Statements
 
 __all__ = ["CASES", "PublishedCase", "facts_of_geometry", "facts_of_search"]
 
@@ -33,9 +31,7 @@ _FOOT_POUND: Final = to_si(1.0, "ft lbf", "torque")
 _PSI: Final = to_si(1.0, "psi", "pressure")
 _INCH: Final = 0.0254
 
-#: Share of a torque or pressure within which "agree" is said, where both sides mean the same
-#: muscle.
-_TOLERANCE: Final = 0.05
+say: Final = Statements("chapter3")
 
 _BRAID: Final = "braid's force alone"
 _MODULI = {
@@ -79,6 +75,11 @@ class PublishedCase:
     pressure: float
     muscle_length: float
     lengths: tuple[float, float, float, float]
+
+    @property
+    def title(self) -> str:
+        """The group of its statements."""
+        return f"{self.name}: {self.count} {self.muscle} at {self.pressure:g} psi"
 
     def problem(self) -> JointProblem:
         """The design problem in SI units, in the package's bounds (none are printed)."""
@@ -127,105 +128,48 @@ def facts_of_geometry(case: PublishedCase) -> list[Comparison]:
     -------
     list of Comparison
     """
-    problem, printed = case.problem(), case.design()
-    rows = [
-        *_lengths(case, problem, printed),
-        *_torques(case, problem, printed),
-        *_pressures(case, problem),
-    ]
+    problem, printed, rows = case.problem(), case.design(), say.lines(case.title)
+    _lengths(rows, case, problem, printed)
+    _torques(rows, case, problem, printed)
+    _pressures(rows, case, problem)
     if case.name == "shoulder":
         # 6.3 states the torque at 13 bar up to 90 deg, of the same joint
         at = float(printed.joint.torque(problem.muscle, 13e5, radians(90.0), count=case.count))
-        reason = (
-            "the dissertation against itself: 1068 N m to 120 deg in 3.5, 850 N m to 90 deg in "
-            "6.3; the moduli follow 6.3"
-        )
-        torque = case.torque * _FOOT_POUND
-        say = _Speaker(case)
-        rows.append(say("torque at 13 bar and 90 deg", "N m", torque, at, cannot_tell=reason))
+        rows.say("joint_torque_13_bar", at, published=case.torque * _FOOT_POUND)
     return rows
 
 
-def _lengths(case: PublishedCase, problem: JointProblem, printed: JointDesign) -> list[Comparison]:
+def _lengths(rows: Lines, case: PublishedCase, problem: JointProblem, printed: JointDesign) -> None:
     """The muscle's length, its stroke, and the angle within the largest stroke: geometry alone."""
-    say, muscle = _Speaker(case), problem.muscle.parameters["rest_length"] / _INCH
-    reached = float(np.degrees(printed.scores.max_angle[0]))
-    stroke = 100.0 * float(printed.scores.contraction[0].max())
-    return [
-        say("muscle length", "in", case.muscle_length, muscle, tolerance=0.01),
-        say(
-            "stroke of Table 3.5 over the range",
-            "%",
-            15.0,
-            stroke,
-            "below",
-            "the printed lengths miss (3.26)",
-        ),
-        say(
-            "largest angle within 15 % of stroke",
-            "deg",
-            case.angles[1],
-            reached,
-            tolerance=0.02,
-            note="geometry alone: as the line above",
-        ),
-    ]
+    length = problem.muscle.parameters["rest_length"] / _INCH
+    published = case.muscle_length
+    rows.say("joint_length", length, published=published, tolerance=0.01 * abs(published))
+    rows.say("joint_stroke", 100.0 * float(printed.scores.contraction[0].max()))
+    reached, last = float(np.degrees(printed.scores.max_angle[0])), case.angles[1]
+    rows.say("joint_angle", reached, published=last, tolerance=0.02 * abs(last))
 
 
-def _torques(case: PublishedCase, problem: JointProblem, printed: JointDesign) -> list[Comparison]:
+def _torques(rows: Lines, case: PublishedCase, problem: JointProblem, printed: JointDesign) -> None:
     """The torque of the printed lengths, with the library's muscle and with others."""
-    say, unknown = _Speaker(case), _MODULI[case.name]
-    torque = printed.scores.torque[0] / _FOOT_POUND
+    torque, wanted = printed.scores.torque[0] / _FOOT_POUND, case.torque
     needed = _angle_needed(case, problem, torque[0])
-    rows = [
-        say(
-            "torque of Table 3.5 at the least angle",
-            "ft lbf",
-            case.torque,
-            torque[0],
-            "above",
-            f"3.5.2: 'well above'; at rest length the moduli play no part{needed}",
-        ),
-        say(
-            "least torque of Table 3.5",
-            "ft lbf",
-            case.torque,
-            torque.min(),
-            "above",
-            cannot_tell=unknown,
-        ),
-    ]
+    rows.say("joint_torque_at_rest", torque[0], needed, published=wanted)
+    rows.say("joint_least_torque", torque.min(), _MODULI[case.name], published=wanted)
     for title, other in _others(case, problem):
         least = case.design(other).scores.torque[0].min() / _FOOT_POUND
-        bound = title == _BRAID and least < case.torque
+        bound = title == _BRAID and least < wanted
         note = "no rubber at all: with this braid angle no moduli give it" if bound else ""
-        rows.append(say(f"the same, {title}", "ft lbf", case.torque, least, "above", note))
-    return rows
+        rows.say("joint_torque_otherwise", least, title, note, published=wanted)
 
 
-def _pressures(case: PublishedCase, problem: JointProblem) -> list[Comparison]:
+def _pressures(rows: Lines, case: PublishedCase, problem: JointProblem) -> None:
     """The pressure that the printed lengths need, and the least that any joint needs."""
-    say, unknown = _Speaker(case), _MODULI[case.name]
+    unknown, printed = _MODULI[case.name], case.pressure
     free = case.design(problem.replace(max_contraction=0.3))
     needed = (free.needed_pressure or np.nan) / _PSI
+    rows.say("joint_pressure_needed", needed, unknown, published=printed)
     least = problem.least_possible_pressure() / _PSI
-    return [
-        say(
-            "pressure that Table 3.5 needs, any stroke",
-            "psi",
-            case.pressure,
-            needed,
-            cannot_tell=unknown,
-        ),
-        say(
-            "pressure that any joint needs (work)",
-            "psi",
-            case.pressure,
-            least,
-            "below",
-            cannot_tell=unknown,
-        ),
-    ]
+    rows.say("joint_pressure_by_work", least, unknown, published=printed)
 
 
 def facts_of_search(
@@ -248,7 +192,7 @@ def facts_of_search(
     """
     tell = progress or (lambda _: None)
     problem = case.problem()
-    say, unknown = _Speaker(case), _MODULI[case.name]
+    unknown = _MODULI[case.name]
     tell(f"{case.name}: minimum pressure")
     outer = minimum_pressure(problem)
     direct = least_pressure(problem)
@@ -262,33 +206,17 @@ def facts_of_search(
     reachable = problem.replace(pressure=1.1 * (outer.pressure or problem.pressure))
     values = compare_methods(reachable, methods=("ga",), seeds=range(seeds)).fitness[0]
     best = optimise(reachable, "cma").scores.fitness[0]
-    rows = []
+    rows = say.lines(case.title)
     for title, found in (
         ("GA and bisection", outer.design if outer.met else None),
         ("direct search", direct),
     ):
         value = np.nan if found is None else found.problem.pressure / _PSI
-        rows.append(
-            say(f"minimum pressure, {title}", "psi", case.pressure, value, cannot_tell=unknown)
-        )
+        rows.say("joint_minimum_pressure", value, title, unknown, published=case.pressure)
     if direct is not None and second is not None:
         first, later = direct.problem.pressure / _PSI, second.problem.pressure / _PSI
-        note = "3.5.2: enlarged parts 'required higher pressures'; least lengths = Table 3.5's"
-        rows.append(say("minimum pressure with larger parts", "psi", first, later, "above", note))
-    note = (
-        f"3.5.2: runs 'consistently converged to the same final values'; ours by {seeds} seeds, "
-        "1.1 times the minimum pressure"
-    )
-    rows.append(
-        say(
-            "worst J of the GA over the best known",
-            "",
-            1.0,
-            values.max() / best,
-            tolerance=_TOLERANCE,
-            note=note,
-        )
-    )
+        rows.say("joint_larger_parts", later, published=first)
+    rows.say("joint_worst_J", values.max() / best, seeds)
     return rows
 
 
@@ -330,48 +258,3 @@ def _others(case: PublishedCase, problem: JointProblem) -> list[tuple[str, Joint
         (_BRAID, problem.replace(muscle=muscle.replace(model="gaylord"))),
         ("muscle ch2_075in, 4.94 in long", problem.replace(muscle=other)),
     ]
-
-
-class _Speaker:
-    """Makes the rows of one joint."""
-
-    def __init__(self, case: PublishedCase) -> None:
-        self.title = f"{case.name}: {case.count} {case.muscle} at {case.pressure:g} psi"
-
-    def __call__(
-        self,
-        fact: str,
-        unit: str,
-        published: float,
-        ours: float,
-        relation: str = "equals",
-        note: str = "",
-        *,
-        tolerance: float = _TOLERANCE,
-        cannot_tell: str = "",
-    ) -> Comparison:
-        return judge(
-            self.title,
-            fact,
-            "3.5",
-            published,
-            float(ours),
-            unit,
-            relation=relation,
-            tolerance=tolerance * abs(published),
-            cannot_tell=cannot_tell,
-            note="" if cannot_tell else note,
-        )
-
-
-if __name__ == "__main__":
-    for case in CASES:
-        rows = [
-            *facts_of_geometry(case),
-            *facts_of_search(case, progress=lambda text: print(f"{text} ...", file=sys.stderr)),
-        ]
-        print(table(rows), end="\n\n")
-        problem = case.problem()
-        for pressure in (problem.pressure, 1.1 * problem.least_possible_pressure()):
-            print(f"{case.name} at {pressure / 1e5:.4g} bar, J in joule")
-            print(compare_methods(problem.replace(pressure=pressure)).table(), end="\n\n")

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from pamrs.comparison import Comparison, markdown, verdicts
+from reproduction.statements import text
 
 __all__ = ["Picture", "Section", "page"]
 
@@ -85,33 +86,7 @@ def page(sections: Sequence[Section], command: str, folder: str | os.PathLike[st
     str
         Markdown.
     """
-    lines = [
-        "# The 2014 dissertation beside pamrs",
-        "",
-        f"Made by `{command}`; change the code, not this page.",
-        "",
-        (
-            "R. M. Robinson, *Pneumatic Artificial Muscle Actuators for Compliant Robotic "
-            "Manipulators*, University of Maryland, 2014."
-        ),
-        (
-            'Each statement stands beside our number with a verdict: "agree" and "differs" by the '
-            'criterion of its line, "cannot tell"'
-        ),
-        (
-            'where the source or the model leaves it open. "Used to identify" means that the '
-            "statement chose one of our numbers, so that"
-        ),
-        "agreement proves nothing.",
-        "Each published statement counts once. A line with its verdict in brackets stands apart:",
-        "another reading of a statement that counts already, a trial, a check of our own.",
-        "Words in quotes are the source's, word for word; what is not in quotes is put in ours.",
-        (
-            'Under "where", 3.2.4 is a section of the source and (3.24) an equation; [1] is a '
-            "remark below its table."
-        ),
-        "",
-    ]
+    lines = [text("page").format(command=command)]
     for section in sections:
         lines += [f"## {section.title}", "", f"{verdicts(list(section.rows))}.", ""]
         lines += [f"- {sentence}" for sentence in section.in_short] + [""]

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 
 from pamrs.comparison import VERDICTS, Comparison, shown
 from reproduction.page import Section
+from reproduction.statements import text
 
 __all__ = ["counts", "summary"]
 
@@ -49,24 +50,7 @@ def summary(sections: Mapping[str, Section], command: str) -> str:
     str
         Markdown.
     """
-    lines = [
-        "# The 2014 dissertation beside pamrs: every statement",
-        "",
-        f"Made by `{command}`; change the code, not this page.",
-        "",
-        (
-            "Each published statement that counts, once, with its verdict; the pages of the "
-            "chapters have the lines that stand apart (other readings, trials, checks of our own), "
-            "what was chosen and why, and all pictures."
-        ),
-        (
-            '"Used" is how many of those that agree chose one of our numbers, so that agreement '
-            "proves nothing. Where a line does not agree, the reason is given."
-        ),
-        "",
-        "| chapter | agree | of these used | differ | cannot tell | stand apart |",
-        "|---|--:|--:|--:|--:|--:|",
-    ]
+    lines = [text("summary").format(command=command).rstrip()]
     total = dict.fromkeys((*VERDICTS, "used", "apart"), 0)
     for name, section in sections.items():
         found = counts(section)

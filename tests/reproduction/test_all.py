@@ -84,8 +84,10 @@ def package(tmp_path, monkeypatch):
         "reproduction/page.py",
         "reproduction/chapter6.py",
         "reproduction/chapter6_figures.py",
-        "reproduction/symbols.py",
+        "reproduction/statements/symbols.toml",
         "reproduction/chapter3.py",
+        "reproduction/statements/chapter6.toml",
+        "reproduction/statements/chapter3.toml",
     ):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")
@@ -101,8 +103,10 @@ def package(tmp_path, monkeypatch):
         ("pamrs/rigs/shoulder.toml", True),
         ("reproduction/chapter6.py", True),
         ("reproduction/chapter6_figures.py", True),
-        ("reproduction/symbols.py", True),
+        ("reproduction/statements/symbols.toml", True),
         ("reproduction/chapter3.py", False),
+        ("reproduction/statements/chapter6.toml", True),
+        ("reproduction/statements/chapter3.toml", False),
         ("reproduction/page.py", False),
         ("pamrs/cli/fit.py", False),
         ("pamrs/__pycache__/x.pyc", False),

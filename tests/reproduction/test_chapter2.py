@@ -15,7 +15,6 @@ from pamrs.comparison import judge
 from pamrs.library import ch2_075in
 from reproduction import chapter2
 from reproduction import stand_in as stand_ins
-from reproduction.chapter2 import GROUPS
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Statements that do not agree; one that changes sides must be noticed.
@@ -145,13 +144,15 @@ def test_friction_of_the_text_comes_back_from_slipping_loops():
         (0, "differs"),
     ],
 )
-def test_nine_of_ten_stand_ins_decide(above, verdict):
+def test_nine_of_ten_stand_ins_decide(above, verdict, monkeypatch):
+    line = {"group": "free", "fact": "f", "where": "2.3", "published": 1.0, "relation": "above"}
+    monkeypatch.setitem(chapter2.say.rows, "tried", {**line, "note": "because of {0}"})
     values = [2.0] * above + [0.5] * (10 - above)
-    row = chapter2.over("g", "f", "2.3", 1.0, values, relation="above", note="because")
+    row = chapter2.over("tried", values, "it")
     assert row.verdict == verdict
     assert row.ours == np.median(values)
     assert "over 10 stand-ins" in row.note
-    assert row.note.endswith("because")
+    assert row.note.endswith("because of it")
 
 
 def test_statements_count_once_and_with_a_source(few):
@@ -166,7 +167,7 @@ def test_statements_count_once_and_with_a_source(few):
     assert list(again) == [
         "2.3: 'the first- and second-order functions exhibit higher error at high pressures'"
     ]
-    assert {row.group for row in few} == set(GROUPS.values())
+    assert {row.group for row in few} == set(chapter2.say.groups.values())
 
 
 def test_what_needs_no_measurement_is_as_before(few):
@@ -202,7 +203,7 @@ def test_whole_page():
     from reproduction.chapter2_figures import pictures
 
     drawn = pictures()
-    assert {one.group for one in drawn} <= set(GROUPS.values())
+    assert {one.group for one in drawn} <= set(chapter2.say.groups.values())
     for one in drawn:
         assert one.png.startswith(b"\x89PNG")
         assert f"chapter2/{one.name}.png" in (DOCS / "chapter2.md").read_text(encoding="utf-8")

@@ -194,21 +194,21 @@ def test_page_has_every_plant_and_no_picture_is_missing():
     stored = list(
         csv.DictReader(io.StringIO((DOCS / "chapter4" / "facts.csv").read_text(encoding="utf-8")))
     )
-    assert {row["group"] for row in stored} == set(chapter4.GROUPS.values())
-    tried = [row for row in stored if row["group"] == chapter4.GROUPS["effects"]]
+    assert {row["group"] for row in stored} == set(chapter4.say.groups.values())
+    tried = [row for row in stored if row["group"] == chapter4.say.groups["effects"]]
     own = [f"{name}, gains of its own maps" for name in (chapter4.PRINTED, chapter4.RUBBING)]
     assert [row["fact"] for row in tried] == [*VARIANTS, *own]
     # each statement counts once: the printed plant's, of which there is another reading
     counted = {row["fact"] for row in stored if not row["apart"]}
     assert len(counted) == sum(not row["apart"] for row in stored)
     for name, apart in (("printed", False), ("rubbing", True), ("effects", True), ("unit", True)):
-        rows = [row for row in stored if row["group"] == chapter4.GROUPS[name]]
+        rows = [row for row in stored if row["group"] == chapter4.say.groups[name]]
         assert {bool(row["apart"]) for row in rows} == {apart}
     facts = set(verdicts())
     agree = {
         row["fact"]
         for row in stored
-        if row["group"] == chapter4.GROUPS["printed"] and row["verdict"] == "agree"
+        if row["group"] == chapter4.say.groups["printed"] and row["verdict"] == "agree"
     }
     score = next(row for row in tried if row["fact"] == own[0])
     assert int(float(score["ours"])) == len(agree & facts)
@@ -217,7 +217,7 @@ def test_page_has_every_plant_and_no_picture_is_missing():
 def test_the_printed_muscle_lets_go_at_its_free_contraction():
     """3.2.2: 37 % at 150 psi; and (4.7) is above (4.4), since it resists being stretched."""
     muscle = two_branches()
-    told = {name: value for name, value, _ in chapter4.chosen()}["E_R of (4.5), (4.6)"]
+    told = {name: value for name, value, _ in chapter4.say.chosen()}["E_R of (4.5), (4.6)"]
     assert told == f"{muscle.parameters['bladder_modulus'] / 1e6:.2f} MPa"
     psi = 150.0 * PSI
     assert float(muscle.force(psi, 0.37, -1.0)) == pytest.approx(0.0, abs=1e-6)

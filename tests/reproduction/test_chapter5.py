@@ -15,7 +15,6 @@ from pamrs.control import AdaptiveSliding, Neural
 from pamrs.errors import ParameterError
 from reproduction import CHAPTERS, chapter5, tracking
 from reproduction.chapter5_comparison import orders
-from reproduction.chapter5_statements import GROUPS
 from reproduction.tracking import (
     KINDS,
     PERIOD,
@@ -163,7 +162,7 @@ def rows():
 
 
 def test_every_group_has_statements_with_a_source(rows):
-    assert {row.group for row in rows} == set(GROUPS.values())
+    assert {row.group for row in rows} == set(chapter5.say.groups.values())
     assert all(row.where.strip() for row in rows)
     assert len({(row.group, row.fact) for row in rows}) == len(rows)
     assert "nan" not in table(rows) + to_csv(rows) + " ".join(chapter5.in_short(rows))
@@ -214,17 +213,17 @@ def test_the_chapter_is_there():
 def test_page_in_the_documentation_is_of_the_full_plan(rows):
     lines = (DOCS / "chapter5" / "facts.csv").read_text(encoding="utf-8").splitlines()
     stored = {(row["group"], row["fact"]): row for row in csv.DictReader(lines)}
-    assert {group for group, _ in stored} == set(GROUPS.values())
+    assert {group for group, _ in stored} == set(chapter5.say.groups.values())
     known = {row.fact: row for row in rows}
     for fact in (
         "inertia with 50 lb over that without",
         "largest frequency",
         "simplified torque (5.1) against the full model",
     ):
-        assert float(stored[GROUPS["rig"], fact]["ours"]) == pytest.approx(
+        assert float(stored[chapter5.say.groups["rig"], fact]["ours"]) == pytest.approx(
             known[fact].ours, rel=1e-4
         )
-    effects = {fact for group, fact in stored if group == GROUPS["effects"]}
+    effects = {fact for group, fact in stored if group == chapter5.say.groups["effects"]}
     assert {
         f"orders of 5.5 that hold, {name}" for name in (*EFFECTS, "nothing left out")
     } == effects

@@ -12,7 +12,6 @@ import pytest
 from pamrs.errors import ParameterError
 from pamrs.library import pam_a_1in
 from reproduction import chapter6, recruiting
-from reproduction.chapter6 import GROUPS
 from reproduction.recruiting import CYCLE, MATRIX, Cycles, lifting, plant
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
@@ -212,10 +211,10 @@ def test_short_experiments_fill_the_page():
     assert differ - {close} == DIFFER
     assert len({(row.group, row.fact) for row in rows}) == len(rows)
     assert all(row.where[:2] in ("6.", "Ta", "no") for row in rows)
-    assert {row.group for row in rows} == set(GROUPS.values())
+    assert {row.group for row in rows} == set(chapter6.say.groups.values())
     assert all(chapter6.in_short(rows))
     tables = chapter6.tables()
-    assert set(tables) <= set(GROUPS.values())
+    assert set(tables) <= set(chapter6.say.groups.values())
     with (DOCS / "chapter6" / "facts.csv").open(encoding="utf-8", newline="") as stream:
         stored = {(row["group"], row["fact"]): row for row in csv.DictReader(stream)}
     assert list(stored) == [(row.group, row.fact) for row in rows]
@@ -228,5 +227,5 @@ def test_short_experiments_fill_the_page():
     from reproduction.chapter6_figures import pictures
 
     for picture in pictures():
-        assert picture.group in GROUPS.values()
+        assert picture.group in chapter6.say.groups.values()
         assert picture.png.startswith(b"\x89PNG")
