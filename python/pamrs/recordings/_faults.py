@@ -26,6 +26,7 @@ _MARGIN: Final = 2.0  # on the longest expected run
 _RAIL_SHARE: Final = 0.1  # of the samples that dropouts may take; more is how the channel is
 _RAIL_LEAP: Final = 5.0  # step into a dropout over the largest one elsewhere
 _RAIL_SAME: Final = 0.3  # difference before and after it, over that step
+_EDGES: Final = 1.5  # quanta that noise has to span, at least two, for stays to be judged by it
 _REST: Final = 12.0  # quanta that a channel at rest may span
 
 #: Set by the controller or the user: constant stretches are their nature.
@@ -222,7 +223,9 @@ class _Stretches:
         )
         alive = noisy & calm
         number = int(alive.sum())
-        if number < 3:
+        # noise that crosses one edge of a converter's steps, and no more, crosses none where the
+        # signal rests between two edges: however long it stays there, it tells nothing
+        if number < 3 or float(np.median(spans[alive])) < _EDGES * self.quantum:
             return number, math.inf
         most = min(max(float(np.max(equal[alive])), 0.05), 0.97)
         n = len(self.data)

@@ -152,6 +152,11 @@ def noise_levels(
             if block.channel in prepared.steps:
                 single = max(single, float(rounded))
             noise = single + drives
+            if powers and not {block.channel, *noisy}.isdisjoint(prepared.steps):
+                # where the steps of a converter lie is one number that nobody knows, the same in
+                # all recordings: of each source the realisation that leaves most counts, no mean
+                _, most, _, own_most = np.max(powers, axis=0)
+                noise = max(noise, float(most + own_most))
             key = block.name, prepared.recording.name
             bent = None
             if known:

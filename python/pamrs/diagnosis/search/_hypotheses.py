@@ -285,7 +285,10 @@ def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
     """
     nothing = refit.group([refit.start], {"": 1.0}, None)
     blocks = refit.trial.inner.blocks
-    persistent = [e for e in _acting(refit.trial, blocks) if info_of(e).lasting]
+    # the rounding of a coarse converter does not average out as noise does
+    coarse = {name for p in refit.trial.inner.recordings for name in p.steps}
+    fine = [b for b in blocks if coarse.isdisjoint((b.channel, *b.drives))]
+    persistent = [e for e in _acting(refit.trial, fine) if info_of(e).lasting]
     trial = replace(refit.trial, suspects=blocks)
     part = trial.inner.losses.part
     below = part("the search below the noise", lambda: below_noise(trial, nothing, persistent, say))
