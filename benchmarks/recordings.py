@@ -98,7 +98,7 @@ def shares_of_parameters(case: Case, told: dict[str, Any]) -> dict[str, float]:
     """
     settings = DiagnosisSettings()
     held = [prepare(r, case.rig, settings) for r in case.held_out]
-    blocks = list(available_blocks(case.rig, case.channels, settings.prepare))
+    blocks = list(available_blocks(case.rig, case.channels))
     problem = Problem(blocks, held, core_rig(case.rig), settings)
     values = {name: float(entry["value"]) for name, entry in told["parameters"].items()}
     friction = {n: v for n, v in values.items() if n in FRICTION}

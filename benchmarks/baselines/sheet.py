@@ -14,6 +14,7 @@ from scipy.stats import chi2
 
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, free_baseline, residuals
+from pamrs.diagnosis.fit._fitting import FINAL_STEP_SHARE
 from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.search import refitted, with_autocorrelation
@@ -129,12 +130,11 @@ class Sheet:
 
 def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
     """Baseline inside its tolerances, as the diagnosis refits it; and fitted on without them, as
-    far as the bounds of :class:`pamrs.diagnosis.FitSettings` let a parameter go (None where that
-    model cannot be run).
+    far as a diagnosis lets a freed parameter go (None where that model cannot be run).
     """
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
     best, weights = with_autocorrelation(inner, nominal, first)
-    own = inner.settings.fit
+    own = inner.settings
     try:
         free = fit(
             inner,
@@ -145,7 +145,7 @@ def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
             warm=best,
             freed=tuple(free_baseline(inner, nominal)),
             evaluations=own.baseline_evaluations,
-            share=own.final_step_share,
+            share=FINAL_STEP_SHARE,
         )
     except SimulationError:
         return best, None
@@ -211,7 +211,7 @@ def sheet(folder: str | os.PathLike[str]) -> Sheet:
     settings = DiagnosisSettings()
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
-    blocks = available_blocks(rig, case.channels, settings.prepare)
+    blocks = available_blocks(rig, case.channels)
     core = core_rig(rig)
     columns: list[Column] = []
     moved: dict[str, float] = {}

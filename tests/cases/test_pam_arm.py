@@ -37,7 +37,5 @@ def test_episodes_become_a_case(tmp_path: Path) -> None:
     assert len(case.held_out) == convert.HELD_OUT
     assert case.recordings[0].sample_time == 0.02
     assert len(case.recordings[0]) == 60 - 2 * convert.RESET
-    assert [b.name for b in available_blocks(case.rig, case.channels, SETTINGS.prepare)] == [
-        "arm.base"
-    ]
+    assert [b.name for b in available_blocks(case.rig, case.channels)] == ["arm.base"]
     assert not case.rig.parameter("transmission.plus.radius").known

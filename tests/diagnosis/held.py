@@ -33,7 +33,7 @@ def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Atte
             f"hold{seed}", "fit", 0.1, channels, {"muscle_pressure": noise}, [7, seed]
         )
         kept.append(prepare(recording, RIG, SETTINGS))
-    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
+    blocks = available_blocks(RIG, ("muscle_pressure",))
     core = core_rig(RIG)
     inner, outer = (Problem(blocks, some, core, SETTINGS) for some in (kept[:-1], kept[-1:]))
     levels = noise_levels(inner, core_rig(plant, core)) | noise_levels(outer, core_rig(plant, core))

@@ -16,13 +16,14 @@ import pamrs
 from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import known_parameters, with_effects_of, with_known, without_passing
+from pamrs.diagnosis.fit._held import _HELD_SHARE
 from pamrs.diagnosis.result import schema
 from tests.diagnosis import again
 
 SHOULDER = pamrs.rigs.shoulder()
 LEAKING = SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9}, std={"conductance": 1e-11})
 BOTH = LEAKING.with_effect("muscle_hysteresis")
-FIT = DiagnosisSettings().fit
+FIT = DiagnosisSettings()
 
 
 @pytest.fixture(scope="module")
@@ -143,12 +144,12 @@ def test_a_note_of_the_case_stays_with_the_model(tmp_path) -> None:
 
 
 def test_known_of_a_held_parameter_is_at_least_a_share_of_it() -> None:
-    known = known_parameters(LEAKING, FIT)
-    assert known["leak_muscle.conductance"].tol == pytest.approx(FIT.held_share * 1e-9)
+    known = known_parameters(LEAKING)
+    assert known["leak_muscle.conductance"].tol == pytest.approx(_HELD_SHARE * 1e-9)
     assert known["leak_muscle.laminar_share"].tol == 0.0  # a choice
     assert known["arm.payload"] == SHOULDER.parameter("arm.payload")
     wide = SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9}, std={"conductance": 2e-9})
-    assert known_parameters(wide, FIT)["leak_muscle.conductance"].tol == 2e-9
+    assert known_parameters(wide)["leak_muscle.conductance"].tol == 2e-9
 
 
 def test_values_of_held_effects_keep_place_form_and_deviation() -> None:

@@ -20,7 +20,7 @@ SETTINGS = DiagnosisSettings()
 
 RIG = pamrs.rigs.shoulder()
 CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
-BLOCKS = [b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare) if b.kind != "arm"]
+BLOCKS = [b for b in available_blocks(RIG, CHANNELS) if b.kind != "arm"]
 TERMS = _Terms(0.985, 30.0, {})
 TRIAL = Attempts(
     Problem(BLOCKS, [], core_rig(RIG), SETTINGS),

@@ -120,14 +120,14 @@ def test_experiments_are_refused_for_rigs_that_nobody_could_command(name: str) -
     text = pamrs.rigs.named(name).to_toml_text()
     driven = re.sub(r"(?m)^\[(supply|valve).*\n(?:(?!\[).*\n)*", "", text)
     with pytest.raises(DiagnosisError, match="no valve that a person could command"):
-        library(parse_rig(driven), SETTINGS.next_experiment)
+        library(parse_rig(driven), SETTINGS)
 
 
 def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"sensors.pressure_zero": 800.0, "chamber.alpha": 1.25})
     prepared = prepare(recorded(true, "all", "fit"), rig, SETTINGS)
-    blocks = {b.name: b for b in available_blocks(rig, NAMES, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
     chamber = Problem([blocks["chamber"]], [prepared], core_rig(rig), SETTINGS)
     # as if its own data had said another zero
     moved = fit(chamber, rig, (), {}, {"chamber": 1.0}, settled={"sensors.pressure_zero": -2500.0})
@@ -171,8 +171,8 @@ def test_pressures_that_begin_at_one_atmosphere_are_asked_about() -> None:
         )
         for zero in (0.0, 101325.0)
     ]
-    assert words.absolute(cases[0], SETTINGS.warnings) == []
-    (told,) = words.absolute(cases[1], SETTINGS.warnings)
+    assert words.absolute(cases[0]) == []
+    (told,) = words.absolute(cases[1])
     assert "absolute pressures" in told
 
 
@@ -183,18 +183,18 @@ def test_a_channel_that_a_new_model_spoils_is_told() -> None:
     }
     channels = {name: ChannelError(**row) for name, row in table.items()}
     spoiled = replace(channels["muscle_pressure"], after=9100.0)
-    (told,) = words.worse({**channels, "muscle_pressure": spoiled}, SETTINGS.warnings)
+    (told,) = words.worse({**channels, "muscle_pressure": spoiled})
     assert "muscle pressure by 9.10 kPa, the nominal one by 7.50 kPa" in told
-    assert words.worse({"joint_angle": channels["joint_angle"]}, SETTINGS.warnings) == []
+    assert words.worse({"joint_angle": channels["joint_angle"]}) == []
 
 
 def test_parameters_that_are_all_at_their_walls_explain_nothing() -> None:
     rig = pamrs.rigs.shoulder()
     prepared = prepare(recorded(rig, "all", "fit"), rig, SETTINGS)
-    blocks = {b.name: b for b in available_blocks(rig, NAMES, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(rig, NAMES)}
     arm = Problem([blocks["arm"]], [prepared], core_rig(rig), SETTINGS)
     found = fit(arm, rig, (), {}, {"arm": 1.0})
-    walls = SETTINGS.fit.most_tolerances
+    walls = SETTINGS.most_tolerances
     stuck = replace(found, moved=dict.fromkeys(found.moved, walls))
     free, held = (stand_of(one, arm, {"arm": 1.0}) for one in (found, stuck))
     assert free.basis.shape[1] > 0

@@ -40,7 +40,7 @@ def made(
     run = pamrs.simulate(rig, supply_command=command, sample_time=DT, initial=start)
     channels = {"supply_command": command, "muscle_pressure": run["muscle_pressure"]}
     one = noisy("lift", "fit", DT, channels, {"muscle_pressure": 400.0}, [seed])
-    (block,) = available_blocks(rig, tuple(channels), SETTINGS.prepare)
+    (block,) = available_blocks(rig, tuple(channels))
     return block, prepare(one, rig, SETTINGS)
 
 
@@ -74,7 +74,7 @@ def test_a_supply_with_a_gauge_begins_where_it_was_measured() -> None:
     channels |= {n: run[n] for n in ("supply_pressure", "muscle_pressure")}
     noise = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
     one = noisy("lift", "fit", DT, channels, noise, [3])
-    blocks = available_blocks(RIG, tuple(channels), SETTINGS.prepare)
+    blocks = available_blocks(RIG, tuple(channels))
     assert begun_alike(blocks, core_rig(RIG), prepare(one, RIG, SETTINGS)).unsettled == {}
 
 
@@ -137,12 +137,12 @@ def test_an_experiment_tells_nothing_by_samples_that_are_not_judged() -> None:
 def test_a_recording_counts_by_the_samples_that_are_judged() -> None:
     """What is told of nothing but rows after the beginning is told by as many as are left."""
     (prepared,) = fills(8.0, "muscle_pressure").problem.recordings
-    (block,) = available_blocks(RIG, ("supply_command", "muscle_pressure"), SETTINGS.prepare)
-    most = SETTINGS.next_experiment.effective_samples
+    (block,) = available_blocks(RIG, ("supply_command", "muscle_pressure"))
+    most = SETTINGS.effective_samples
     dropped = prepared.unsettled["muscle_pressure"]
-    assert counted(prepared, block, SETTINGS.next_experiment) == most * (1 - dropped / prepared.n)
+    assert counted(prepared, block, SETTINGS) == most * (1 - dropped / prepared.n)
     whole = replace(prepared, unsettled={})
-    assert counted(whole, block, SETTINGS.next_experiment) == most
+    assert counted(whole, block, SETTINGS) == most
 
 
 def test_an_experiment_shorter_than_its_beginning_tells_nothing() -> None:

@@ -16,6 +16,7 @@ from pamrs.diagnosis.evidence import Candidate, share_left, weigh
 from pamrs.diagnosis.fit import Events, Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block, available_blocks
+from pamrs.diagnosis.search import _hypotheses
 from pamrs.recordings import Recording
 
 SETTINGS = DiagnosisSettings()
@@ -141,7 +142,7 @@ def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candida
 def chamber() -> list[Block]:
     """The chamber of a shoulder."""
     names = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
-    blocks = available_blocks(pamrs.rigs.shoulder(), names, SETTINGS.prepare)
+    blocks = available_blocks(pamrs.rigs.shoulder(), names)
     return [block for block in blocks if block.name == "chamber"]
 
 
@@ -256,7 +257,7 @@ def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
     start = left(60.0, 20000.0, None)
 
     def share(fitted: float, happened: Events | None) -> float:
-        return share_left(left(fitted, 120.0, happened), start, chamber(), SETTINGS.evidence)
+        return share_left(left(fitted, 120.0, happened), start, chamber())
 
     assert share(16.0, None) == share(0.3, None) == pytest.approx(0.006)
     assert share(0.3, events) == pytest.approx(0.006)
@@ -275,15 +276,18 @@ def test_a_tube_is_named_with_the_place_of_the_transducer() -> None:
     assert abs(told["conductance"]["value"] / 5e-8 - 1.0) < 0.15
 
 
-def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter() -> None:
-    search = replace(SETTINGS.search, fitted_hint=0.0, held_out_ratio=1.3)
+def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(_hypotheses, "_FITTED_HINT", 0.0)
+    monkeypatch.setattr(_hypotheses, "_HELD_OUT_RATIO", 1.3)
     said: list[str] = []
     nominal = pamrs.rigs.shoulder()
     known = nominal.parameter("arm.viscous")
     truth = nominal.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})
     slow, fast = shoulder_case(truth, speed=0.02), shoulder_case(truth, speed=2.0)
     case = pamrs.Case("unseen", nominal, [*slow.recordings[:2], fast.recordings[2]], Path())
-    found = pamrs.diagnose(case, settings=replace(SETTINGS, search=search), progress=said.append)
+    found = pamrs.diagnose(case, progress=said.append)
     assert "arm: one baseline leaves noise in all recordings" in said
     assert found.verdict == "parameters"
     assert abs(found.parameters["arm.viscous"]["moved_sigmas"] - 2.0) < 0.2

@@ -28,7 +28,8 @@ from pamrs.diagnosis.next_experiment import (
     protocol_of,
 )
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment._chains import commands_for, driving
+from pamrs.diagnosis.next_experiment._chains import BANDWIDTH, commands_for, driving
+from pamrs.diagnosis.next_experiment._choice import _LEAST_HIGHEST
 from pamrs.diagnosis.next_experiment._several import _rests, _stairs, _turned
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import EFFECTS
@@ -40,7 +41,7 @@ from tests.diagnosis import synthetic
 from tests.simulation.test_spools import PAIR
 
 SETTINGS = DiagnosisSettings()
-OWN = SETTINGS.next_experiment
+OWN = SETTINGS
 JOINT = pamrs.rigs.antagonistic_joint()
 TWO = pamrs.rigs.named("two_joint_arm")
 REGULATED = pamrs.rigs.named("regulated_joint")
@@ -103,7 +104,7 @@ def test_pressures_follow_references_of_their_own() -> None:
     time = 0.01 * np.arange(1501)
     wave = 0.6e5 * np.sin(2.0 * np.pi * 0.1 * time)
     wanted = {"flexor": 3e5 + wave, "extensor": 3e5 - wave}
-    sent = commands_for(JOINT, wanted, sample_time=0.01, bandwidth=OWN.bandwidth)
+    sent = commands_for(JOINT, wanted, sample_time=0.01, bandwidth=BANDWIDTH)
     assert list(sent) == ["valve_command.flexor", "valve_command.extensor"]
     found = pamrs.simulate(JOINT, sample_time=0.01, **driving(sent))
     for side in SIDES:
@@ -124,7 +125,7 @@ def test_valves_that_switch_hold_a_pressure(carrier: bool) -> None:
     reference = np.interp(
         0.01 * np.arange(901), [0.0, 1.0, 4.0, 5.0, 9.0], [2e5, 3e5, 3e5, 1e5, 1e5]
     )
-    sent = commands_for(rig, {"": reference}, sample_time=0.01, bandwidth=OWN.bandwidth)
+    sent = commands_for(rig, {"": reference}, sample_time=0.01, bandwidth=BANDWIDTH)
     found = pamrs.simulate(rig, sample_time=0.01, **driving(sent))["muscle_pressure"]
     for begin, level in ((250, 3e5), (700, 1e5)):
         assert float(np.mean(found[begin : begin + 150])) == pytest.approx(level, abs=0.2e5)
@@ -238,12 +239,12 @@ def test_what_was_recorded_without_pressure_is_not_filled(flexor: float) -> None
     run = waves.simulate(joint)
     late = run.time > 5.0  # the rig begins at 2 bar
     for name, peak in peaks.items():
-        assert run[name][late].max() <= 1.06 * max(peak, OWN.least_highest)
+        assert run[name][late].max() <= 1.06 * max(peak, _LEAST_HIGHEST)
     # what has no gauge is no higher than what has one, and what has one was not filled
     (waves,) = experiments_of(
         JOINT, [recording({"muscle_pressure.flexor": flexor})], OWN, {"multisine"}
     )
-    top = 1.06 * max(flexor, OWN.least_highest)
+    top = 1.06 * max(flexor, _LEAST_HIGHEST)
     assert waves.simulate(JOINT)["muscle_pressure.extensor"][late].max() <= top
 
 
@@ -286,7 +287,7 @@ def test_what_lines_join_is_filled_one_by_one() -> None:
 
 
 def test_a_question_about_a_chamber_moves_its_own_chain() -> None:
-    blocks = available_blocks(JOINT, measurable(JOINT), SETTINGS.prepare)
+    blocks = available_blocks(JOINT, measurable(JOINT))
     problem = Problem(blocks, [], core_rig(JOINT), SETTINGS)
     asked = _Question(JOINT, [], blocks, [], problem)
     kinds = {b.name: asked.experiment(b)[2] for b in blocks if b.name != "chamber.flexor"}
@@ -314,7 +315,7 @@ closing_delay   = { value = 0, unit = "ms" }
 
 def test_a_question_never_moves_another_chain_than_the_block_s_own() -> None:
     assert [can_shut(MIXED, chain) for chain in chains_of(MIXED)] == [False, True]
-    blocks = available_blocks(MIXED, measurable(MIXED), SETTINGS.prepare)
+    blocks = available_blocks(MIXED, measurable(MIXED))
     asked = _Question(MIXED, [], blocks, [], Problem(blocks, [], core_rig(MIXED), SETTINGS))
     made = {b.name: asked.experiment(b)[2] for b in blocks if b.kind == "chamber"}
     assert {name: e.name for name, e in made.items() if e is not None} == {
@@ -341,7 +342,7 @@ def test_only_what_lines_join_blows_over() -> None:
         "hold_short",
         "hold_long",
     }
-    blocks = available_blocks(rig, measurable(rig), SETTINGS.prepare)
+    blocks = available_blocks(rig, measurable(rig))
     assert {_telling(block, rig).kind for block in blocks} == {"hold_low"}
     line = """
 [line]
@@ -355,7 +356,7 @@ diameter = { value = 4, unit = "mm", tol = 0.05 }
     over = {e.name: e for e in library(rig, OWN) if e.kind == "blow_over"}
     assert list(over) == ["blow_over.left", "blow_over.right"]
     assert over["blow_over.left"].duration < 30.0  # not as long as the third one stays apart
-    blocks = available_blocks(rig, measurable(rig), SETTINGS.prepare)
+    blocks = available_blocks(rig, measurable(rig))
     asked = _Question(rig, [], blocks, [], Problem(blocks, [], core_rig(rig), SETTINGS))
     made = {b.name: asked.experiment(b)[2] for b in blocks if b.kind == "chamber"}
     assert {name: e.name for name, e in made.items() if e is not None} == {
@@ -369,7 +370,7 @@ def test_pressures_that_cannot_be_found_are_told_in_words(monkeypatch) -> None:
     sealed = pamrs.rigs.sealed_chamber()
     assert library(sealed, OWN, highest={})[0].name == "hold_low"
     with pytest.raises(DiagnosisError, match="has the chains flexor, extensor; the pressures of a"):
-        pressure_range(JOINT, OWN)
+        pressure_range(JOINT)
     with pytest.raises(
         ParameterError, match=r"highest has 'flexr', .* one of 'flexor', 'extensor'"
     ):
@@ -521,7 +522,7 @@ def test_the_place_of_a_leak_is_asked_of_the_muscle_that_may_have_it() -> None:
         for side in SIDES
     ]
     pool = only(JOINT, "step_and_shut.flexor")
-    found = propose(JOINT, hypotheses, noise_of(JOINT, OWN), experiments=pool)
+    found = propose(JOINT, hypotheses, noise_of(JOINT), experiments=pool)
     assert found.expected_information_bits > 0.9
     assert "at flexor" in found.text
     assert set(found.protocol.commands) == {f"valve_command.{side}" for side in SIDES}

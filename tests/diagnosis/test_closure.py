@@ -12,9 +12,11 @@ from pamrs import _core
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain import describe_closure
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
+from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME
 from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
 from pamrs.diagnosis.prepare import Block, available_blocks, prepare
 from pamrs.diagnosis.search import find_closure
+from pamrs.diagnosis.search._closure import _MOST_TERMS
 from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
@@ -63,7 +65,7 @@ class Case:
 
     def __init__(self, truth: pamrs.Rig, names: tuple[str, ...]) -> None:
         self.blocks: list[Block] = [
-            b for b in available_blocks(NOMINAL, tuple(NOISE), SETTINGS.prepare) if b.name in names
+            b for b in available_blocks(NOMINAL, tuple(NOISE)) if b.name in names
         ]
         self.problem, self.held = (
             Problem(
@@ -79,7 +81,7 @@ class Case:
         )
         white = dict.fromkeys(names, 1.0)
         first = fit(self.problem, NOMINAL, (), {}, white)
-        width = SETTINGS.noise.fit_bin_time
+        width = FIT_BIN_TIME
         self.autocorrelation = {
             b.name: inflation(b, self.problem.recordings, first.residuals, width)
             for b in self.blocks
@@ -106,8 +108,7 @@ class Case:
         own = next(b for b in self.blocks if b.name == block)
         found = [residuals(self.held, m.rig) for m in (self.baseline, model)]
         ratios = [
-            excess(own, self.held.recordings, r, noise_level, SETTINGS.noise).ratio - 1.0
-            for r in found
+            excess(own, self.held.recordings, r, noise_level, SETTINGS).ratio - 1.0 for r in found
         ]
         return 1.0 - float(np.sqrt(max(0.0, ratios[1]) / ratios[0]))
 
@@ -139,11 +140,7 @@ def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(
     assert found is not None
     assert case.evaluations <= 18
     assert found.values["closure_torque.sine_4"] == pytest.approx(2.5, rel=0.1)
-    assert (
-        2
-        <= sum(name.startswith("closure_torque.") for name in found.values)
-        <= SETTINGS.closures.most_terms + 2
-    )
+    assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= _MOST_TERMS + 2
     assert case.gap_closed(found, "arm") > 0.85
     text = describe_closure(found, case.problem, case.baseline)
     assert "a torque is missing" in text
@@ -185,7 +182,7 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(
         case.problem, case.problem.core.respecified(case.baseline.rig.to_json())
     )
     found = [
-        excess(b, case.problem.recordings, case.baseline.residuals, noise_level, SETTINGS.noise)
+        excess(b, case.problem.recordings, case.baseline.residuals, noise_level, SETTINGS)
         for b in case.blocks
     ]
     assert all(kept.ratio < 1.2 for kept in found)

@@ -69,7 +69,7 @@ def test_a_valve_lets_through_what_its_openings_do_and_not_their_mean() -> None:
     command = np.repeat(moves, 2)
     made = pamrs.simulate(rig, valve_command=command, sample_time=dt, step=0.001)
     fast = of("a", "fit", dt, {"valve_command": command} | {n: made[n] for n in NAMES[1:]})
-    blocks = available_blocks(rig, NAMES, SETTINGS.prepare)
+    blocks = available_blocks(rig, NAMES)
     chamber = next(b for b in blocks if b.name == "chamber")
     core = core_rig(rig)
     logged = averaged(fast, 5)
@@ -85,18 +85,18 @@ def test_a_valve_lets_through_what_its_openings_do_and_not_their_mean() -> None:
 
 def test_only_fast_recordings_are_averaged_and_no_further_than_needed() -> None:
     one = run()
-    blocks = available_blocks(pamrs.rigs.shoulder(), NAMES, SETTINGS.prepare)
-    few = replace(SETTINGS.prepare, ample_samples=40)
-    assert averaged_to_need([one], blocks, "a", SETTINGS.prepare) == ([one], [1])
+    blocks = available_blocks(pamrs.rigs.shoulder(), NAMES)
+    few = replace(SETTINGS, ample_samples=40)
+    assert averaged_to_need([one], blocks, "a", SETTINGS) == ([one], [1])
     assert averaged_to_need([one], blocks, "a", few)[1] == [1]  # at the rate that is needed
     quick = run(dt=0.001, duration=4.0)
     assert averaged_to_need([quick, one], blocks, "a", few)[1] == [9, 1]
-    assert averaged_to_need([quick], blocks, "a", SETTINGS.prepare)[1] == [3]  # it is short
+    assert averaged_to_need([quick], blocks, "a", SETTINGS)[1] == [3]  # it is short
     with pytest.raises(
         DiagnosisError, match=r"'long': .* 3644 samples .* at most 3500 .* start and"
     ):
         averaged_to_need([quick, one], blocks, "long", replace(few, most_samples=3500))
-    sealed = available_blocks(pamrs.rigs.sealed_chamber(), ("muscle_pressure",), SETTINGS.prepare)
+    sealed = available_blocks(pamrs.rigs.sealed_chamber(), ("muscle_pressure",))
     assert averaged_to_need([quick], sealed, "a", few)[1] == [99]
 
 
@@ -114,7 +114,7 @@ def test_channels_without_use_are_told_everywhere() -> None:
         "temperature": rng.normal(293.0, 0.1, size),
     }
     hold: Recording = of("hold", "fit", 0.02, channels)
-    settings = SETTINGS.with_values({"prepare.ample_samples": 500})
+    settings = replace(SETTINGS, ample_samples=500)
     found = pamrs.diagnose(pamrs.Case("hold", rig, [hold], Path()), settings=settings)
     assert [e.id for e in found.effects][:1] == ["leak_muscle"]
     (own,) = json.loads(found.to_json())["data"]
@@ -185,14 +185,14 @@ def room_of(*temperatures: float, rig: pamrs.Rig = NOZZLE) -> tuple[pamrs.Rig, l
         of(f"hold{k}", "fit", 0.02, {"ambient_temperature": np.full(50, room)})
         for k, room in enumerate(temperatures)
     ]
-    return at_ambient(rig, recordings, SETTINGS.plausibility)
+    return at_ambient(rig, recordings, SETTINGS)
 
 
 def test_one_temperature_holds_for_all_recordings() -> None:
     rig, said = room_of(290.0, 291.0, 299.0)
     assert rig.parameter("gas.temperature").value == pytest.approx(291.0, abs=0.1)
     assert "differs between the recordings, from 290.0 to 299.0 K" in said[1]
-    assert at_ambient(NOZZLE, [], SETTINGS.plausibility)[1] == []
+    assert at_ambient(NOZZLE, [], SETTINGS)[1] == []
 
 
 @pytest.mark.parametrize(
@@ -218,7 +218,7 @@ def test_an_impossible_room_ends_a_diagnosis_unless_it_is_allowed() -> None:
     hot = pamrs.Case("hot", NOZZLE, [warm_stand(1, room=390.0)], Path())
     with pytest.raises(DiagnosisError, match=r"hold1 \(390.0 K\): no room has it"):
         pamrs.diagnose(hot)
-    wider = SETTINGS.with_values({"plausibility.most_room": 400.0})
+    wider = replace(SETTINGS, most_room=400.0)
     assert "gas.temperature is 390 K" in " ".join(pamrs.diagnose(hot, settings=wider).warnings)
 
 
@@ -257,10 +257,10 @@ def test_masked_samples_say_nothing_of_the_room() -> None:
     values = np.where(np.arange(50) < 20, 295.0, 273.15)
     one = of("hold", "fit", 0.02, {"ambient_temperature": values})
     usable = replace(one, mask={"ambient_temperature": values > 280.0})
-    rig, _ = at_ambient(NOZZLE, [usable], SETTINGS.plausibility)
+    rig, _ = at_ambient(NOZZLE, [usable], SETTINGS)
     assert rig.parameter("gas.temperature").value == 295.0
     none = replace(one, mask={"ambient_temperature": np.zeros(50, dtype=bool)})
-    assert at_ambient(NOZZLE, [none], SETTINGS.plausibility) == (NOZZLE, [])
+    assert at_ambient(NOZZLE, [none], SETTINGS) == (NOZZLE, [])
 
 
 def test_a_recorded_temperature_of_the_gas_is_compared_by_a_replay() -> None:

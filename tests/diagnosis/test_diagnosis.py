@@ -100,7 +100,6 @@ def test_noise_level_is_recovered(level: float) -> None:
     estimate = noise_level(
         slow + rng.normal(0.0, level, 4000),
         np.ones(4000, dtype=bool),
-        SETTINGS.prepare,
         seed=SETTINGS.seed,
     )
     assert estimate == pytest.approx(level, rel=0.08)
@@ -108,7 +107,7 @@ def test_noise_level_is_recovered(level: float) -> None:
 
 def test_quantised_rest_has_the_noise_of_its_lattice() -> None:
     values = np.where(np.arange(400) % 50 == 0, 42.0, 0.0)
-    found = noise_level(values, np.ones(400, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    found = noise_level(values, np.ones(400, dtype=bool), seed=SETTINGS.seed)
     assert found == pytest.approx(42.0 / np.sqrt(12.0))
 
 
@@ -117,7 +116,7 @@ def test_a_channel_that_chatters_has_the_noise_of_its_gauge() -> None:
     rng = np.random.default_rng(3)
     chatter = np.where(np.arange(4000) % 2, 2e5, 0.0) * (1.0 + 0.02 * np.sin(np.arange(4000) / 90))
     values = 3e5 + chatter + rng.normal(0.0, 400.0, 4000)
-    found = noise_level(values, np.ones(4000, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    found = noise_level(values, np.ones(4000, dtype=bool), seed=SETTINGS.seed)
     assert found == pytest.approx(400.0, rel=0.2)
 
 
@@ -172,9 +171,7 @@ def test_a_hole_in_a_drive_costs_only_itself() -> None:
     recording.mask["valve_command"][900:930] = False
     prepared = prepare(recording, pamrs.rigs.shoulder(), SETTINGS)
     lost = {}
-    for block in available_blocks(
-        pamrs.rigs.shoulder(), tuple(recording.channels), SETTINGS.prepare
-    ):
+    for block in available_blocks(pamrs.rigs.shoulder(), tuple(recording.channels)):
         rows = prepared.usable(
             block.channel, block.drives, prepared.starts(block.window, block.drives)
         )
@@ -204,11 +201,7 @@ def test_mostly_missing_data_are_refused_in_words() -> None:
 def _share(name: str, recording: Recording) -> float:
     rig = pamrs.rigs.shoulder()
     prepared = prepare(recording, rig, SETTINGS)
-    block = next(
-        b
-        for b in available_blocks(rig, tuple(recording.channels), SETTINGS.prepare)
-        if b.name == name
-    )
+    block = next(b for b in available_blocks(rig, tuple(recording.channels)) if b.name == name)
     return float(
         prepared.usable(
             block.channel, block.drives, prepared.starts(block.window, block.drives)

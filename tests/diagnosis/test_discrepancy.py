@@ -52,15 +52,11 @@ def judged(off: list[Array], stated: dict[str, dict[str, float]]) -> Excess:
         found, _ = recorded(seed)
         channels = found.channels | {"joint_angle": found.channels["joint_angle"] + more}
         recordings.append(prepare(replace(found, channels=channels), RIG, SETTINGS))
-    blocks = [
-        b
-        for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
-        if b.channel == "joint_angle"
-    ]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.channel == "joint_angle"]
     core = core_rig(RIG)
     problem = Problem(blocks, recordings, core, SETTINGS)
     level = noise_levels(problem, core, stated)
-    return excess(blocks[0], recordings, residuals(problem, RIG), level, SETTINGS.noise)
+    return excess(blocks[0], recordings, residuals(problem, RIG), level, SETTINGS)
 
 
 def smooth(seed: int) -> Array:

@@ -28,7 +28,7 @@ def run(truth: pamrs.Rig, name: str, swing: float, seed: int) -> Recording:
 
 
 def problem(*recordings: Recording) -> Problem:
-    blocks = available_blocks(RIG, ("valve_command", *SHOULDER), SETTINGS.prepare)
+    blocks = available_blocks(RIG, ("valve_command", *SHOULDER))
     chamber = [block for block in blocks if block.name == "chamber"]
     prepared = [prepare(recording, RIG, SETTINGS) for recording in recordings]
     return Problem(chamber, prepared, core_rig(RIG), SETTINGS)

@@ -52,12 +52,12 @@ def test_a_length_beyond_the_load_does_not_end_the_run(value: float) -> None:
 )
 def test_every_channel_is_looked_at(name: str, value: float) -> None:
     bad = dropped(name, value, [(30, 40)])
-    (masked,), (told,) = without_impossible([bad], RIG, SETTINGS.plausibility)
+    (masked,), (told,) = without_impossible([bad], RIG, SETTINGS)
     assert np.flatnonzero(~masked.mask[name]).tolist() == list(range(30, 40))
     assert np.isnan(masked.channels[name][30:40]).all()
     assert f"10 samples of {name} in lift.csv" in told
     sound = dropped(name, value, [])
-    (kept,), said = without_impossible([sound], RIG, SETTINGS.plausibility)
+    (kept,), said = without_impossible([sound], RIG, SETTINGS)
     assert said == []
     assert all(mask.all() for mask in kept.mask.values())
 
@@ -80,7 +80,7 @@ def commanded(stretches: list[tuple[int, int]], *values: float) -> Recording:
 
 def test_commands_that_a_logger_lost_are_masked() -> None:
     bad = commanded([(0, 12), ONCE, (1990, 2000)], -327.68, -327.68, -327.68)
-    (masked,), (told,) = without_impossible([bad], SHOULDER, SETTINGS.plausibility)
+    (masked,), (told,) = without_impossible([bad], SHOULDER, SETTINGS)
     assert np.flatnonzero(~masked.mask["valve_command"]).tolist() == [
         *range(12), *range(30, 40), *range(1990, 2000)
     ]  # fmt: skip
@@ -100,9 +100,7 @@ def test_commands_that_a_logger_lost_are_masked() -> None:
 def test_what_a_controller_asked_for_stays(
     stretches: list[tuple[int, int]], values: tuple[float, ...]
 ) -> None:
-    (kept,), said = without_impossible(
-        [commanded(stretches, *values)], SHOULDER, SETTINGS.plausibility
-    )
+    (kept,), said = without_impossible([commanded(stretches, *values)], SHOULDER, SETTINGS)
     assert said == []
     assert kept.mask["valve_command"].all()
 

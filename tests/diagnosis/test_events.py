@@ -139,9 +139,7 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
         for r in recordings("payload_change", {"mass_change": 0.4}, 4.0)[:2]
     ]
     blocks = [
-        b
-        for b in available_blocks(rig, tuple(prepared[0].recording.channels), SETTINGS.prepare)
-        if b.name == "arm"
+        b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"
     ]
     happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]

@@ -23,7 +23,7 @@ from pamrs.diagnosis.result import schema
 from tests.diagnosis import synthetic
 
 SETTINGS = DiagnosisSettings()
-NOISE = usual_noise(SETTINGS.next_experiment)
+NOISE = usual_noise()
 
 
 @pytest.fixture(scope="module")
@@ -31,10 +31,7 @@ def pool():
     """The experiments of the shoulder."""
     names = ("null_ramp", "nested_triangles", "slow_triangle")
     return {
-        e.name: e
-        for e in library(
-            pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=names
-        )
+        e.name: e for e in library(pamrs.rigs.shoulder(), SETTINGS, sample_time=0.01, only=names)
     }
 
 

@@ -18,7 +18,7 @@ from pamrs.diagnosis.explain._owners import owners_of_effects
 from pamrs.diagnosis.fit import Problem, fit, form_in, starts_of
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import screen
-from pamrs.diagnosis.search._sets import far_above_noise, in_best_forms
+from pamrs.diagnosis.search._sets import _STRONG_RATIO, far_above_noise, in_best_forms
 from pamrs.simulation import core_rig
 from tests.diagnosis.again import case
 from tests.diagnosis.held import RIG, SETTINGS, attempts
@@ -77,7 +77,7 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Atte
 def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attempts) -> None:
     base = hurried(trial, 20)
     (block,) = trial.suspects
-    strong = SETTINGS.search.strong_ratio
+    strong = _STRONG_RATIO
 
     def left(ratio: float, systematic: float) -> Candidate:
         kept = replace(base.fitted[block.name], ratio=ratio, systematic=systematic)
@@ -108,7 +108,7 @@ def test_what_no_residual_depends_on_is_not_known() -> None:
     kept = [prepare(given.recordings[0], SHOULDER, SETTINGS)]
     blocks = [
         b
-        for b in available_blocks(SHOULDER, tuple(given.recordings[0].channels), SETTINGS.prepare)
+        for b in available_blocks(SHOULDER, tuple(given.recordings[0].channels))
         if b.name == "arm"
     ]
     problem = Problem(blocks, kept, core_rig(SHOULDER), SETTINGS)

@@ -22,6 +22,9 @@ from pamrs.diagnosis.next_experiment import (
     measurable,
     protocol_of,
 )
+from pamrs.diagnosis.next_experiment._differences import _FORCE_NOISE
+from pamrs.diagnosis.next_experiment._frame import _LEAST_STROKE
+from pamrs.diagnosis.next_experiment._strokes import _FILLING_TIME
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import load_recording
@@ -29,7 +32,7 @@ from pamrs.simulation import reading, replay
 from tests.diagnosis import frames
 from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, RIGS, VALVED
 
-OWN = DiagnosisSettings().next_experiment
+OWN = DiagnosisSettings()
 HOME = Path(__file__).parents[2]
 OPEN = {
     "muscle_hysteresis": {"friction_constant": 2.0, "friction_pressure": 0.0, "presliding": 3e-3},
@@ -89,7 +92,7 @@ def test_experiments_keep_to_what_a_frame_can_do(rig: pamrs.Rig) -> None:
         force = reading(run, "force")
         assert force is not None
         # what is not filled yet cannot pull
-        assert force[0 if filled is None else round(OWN.filling_time / 0.01) :].min() > 0.0
+        assert force[0 if filled is None else round(_FILLING_TIME / 0.01) :].min() > 0.0
     still = pool["multisine"].commands["length"]
     assert np.ptp(still) == 0.0
     assert "with the length held at" in pool["multisine"].text
@@ -107,7 +110,7 @@ def test_recordings_say_how_long_how_fast_and_how_high() -> None:
     pool = experiments_of(BENCH, given.recordings, OWN)
     longest = max(frames.strokes(k)[0].max() for k in range(3))
     highest = max(frames.strokes(k)[1].max() for k in range(3))
-    shortest = longest - OWN.least_stroke * REST
+    shortest = longest - _LEAST_STROKE * REST
     for experiment in pool:
         length, pressure = (experiment.commands[n] for n in ("length", "pressure_command"))
         assert shortest - 1e-3 <= length.min()
@@ -128,7 +131,7 @@ def test_a_muscle_that_was_held_is_moved_by_the_least_stroke() -> None:
     (found,) = experiments_of(BENCH, [held], OWN, {"slow_strokes"})
     length = found.commands["length"]
     assert length.max() == pytest.approx(0.95 * REST, abs=3e-4)
-    assert np.ptp(length) == pytest.approx(OWN.least_stroke * REST, abs=3e-4)
+    assert np.ptp(length) == pytest.approx(_LEAST_STROKE * REST, abs=3e-4)
 
 
 def test_a_stand_that_cannot_move_gets_no_strokes() -> None:
@@ -182,7 +185,7 @@ def test_the_file_is_played_from_the_command_line(
 def test_a_shut_valve_keeps_the_air_while_the_length_moves() -> None:
     (experiment,) = library(VALVED, OWN, sample_time=0.01, only={"sealed_strokes"})
     run = experiment.simulate(VALVED)
-    shut = run.time >= OWN.filling_time
+    shut = run.time >= _FILLING_TIME
     mass = run["air_mass"][shut]
     assert np.ptp(mass) < 1e-6 * mass.mean()
     pressure, volume = run["muscle_pressure"][shut] + 101325.0, run["air_volume"][shut]
@@ -245,7 +248,7 @@ def test_held_lengths_show_no_friction_and_strokes_do(monkeypatch: pytest.Monkey
     assert still.seen == ()
     moved = next(a for a in still.additions if a.name == "slow_strokes")
     assert "muscle_hysteresis" in moved.seen
-    assert still.noise["force"] == OWN.force_noise
+    assert still.noise["force"] == _FORCE_NOISE
     quiet = {"muscle_pressure": 50.0, "length": 1e-5, "force": 0.3}
     both = made("slow_strokes", "strokes_at_speeds", noise=quiet)
     assert set(both.seen) == {"muscle_hysteresis", "muscle_rate_damping"}

@@ -35,7 +35,7 @@ SETTINGS = DiagnosisSettings()
 
 def problem_of(rig: Rig, records: list[Recording]) -> Problem:
     names = [n for n in NAMES if all(n in r.channels for r in records)]
-    blocks = available_blocks(rig, names, SETTINGS.prepare)
+    blocks = available_blocks(rig, names)
     return Problem(blocks, [prepare(r, rig, SETTINGS) for r in records], core_rig(rig), SETTINGS)
 
 
@@ -111,7 +111,7 @@ def test_of_a_long_log_the_first_part_is_asked_and_said() -> None:
     rig = parse_rig(WARM)
     true = rig.with_effect("leak_muscle", {"conductance": 3e-8})
     told = _free_run.Known(("chamber.dead_volume",), np.array([5e-4]), np.array([[5e-6]]))
-    warnings = replace(SETTINGS.warnings, off_samples=1000)
+    warnings = replace(SETTINGS, off_samples=1000)
     problem = problem_of(rig, [filled(true, "held_out", 2, PRESSURES)])
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
     runs = []

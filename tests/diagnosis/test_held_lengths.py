@@ -16,7 +16,7 @@ from tests.diagnosis.frames import DT, played
 
 NOISE = frames.NOISE["length"]
 LAYOUT = Path(__file__).parents[2] / "cases" / "layouts" / "isometric_bench.toml"
-SETTINGS = DiagnosisSettings().prepare
+SETTINGS = DiagnosisSettings()
 
 
 @pytest.mark.parametrize("drift", [0.0, 1.0, 20.0])

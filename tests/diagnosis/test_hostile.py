@@ -243,14 +243,12 @@ def test_what_cannot_be_is_refused_in_words(name: str, plain: Table, tmp_path: P
 
 def test_sound_recordings_are_plausible(plain: Table, tmp_path: Path) -> None:
     case = loaded(tmp_path, plain)
-    assert implausible(case.recordings[0], case.rig, SETTINGS.plausibility) == []
+    assert implausible(case.recordings[0], case.rig, SETTINGS) == []
     resting = {c: v[:400] for c, v in plain.items()} | {
         "muscle_pressure": np.zeros(400),
         "joint_angle": np.full(400, 0.2618),
     }
-    assert (
-        implausible(loaded(tmp_path, resting).recordings[0], case.rig, SETTINGS.plausibility) == []
-    )
+    assert implausible(loaded(tmp_path, resting).recordings[0], case.rig, SETTINGS) == []
 
 
 def test_every_finding_is_told_at_once(plain: Table, tmp_path: Path) -> None:
@@ -269,14 +267,13 @@ def test_an_arm_whose_swing_moves_the_pressure_is_not_refused() -> None:
     model = lift.assumed(lift.VARIANTS[name]).with_parameters({"arm.payload": payload})
     record = recorded(truth, model, trajectories.compound(), "fit", 0, 25.0)
     assert np.ptp(record.channels["joint_angle"]) > 1.0
-    assert implausible(record, model, SETTINGS.plausibility) == []
+    assert implausible(record, model, SETTINGS) == []
     turned = replace(
         record,
         channels=record.channels | {"valve_command": 10.0 - record.channels["valve_command"]},
     )
     assert any(
-        "goes against valve_command" in text
-        for text in implausible(turned, model, SETTINGS.plausibility)
+        "goes against valve_command" in text for text in implausible(turned, model, SETTINGS)
     )
 
 

@@ -29,9 +29,7 @@ def decay(x: Array, time: Array, data: Array) -> tuple[Array, Array, str]:
 
 
 def test_the_end_of_a_valley_is_found() -> None:
-    x, (rows, _, _), spent = levenberg_marquardt(
-        rosenbrock, np.array([-1.2, 1.0]), WIDE, 60, SETTINGS.fit
-    )
+    x, (rows, _, _), spent = levenberg_marquardt(rosenbrock, np.array([-1.2, 1.0]), WIDE, 60)
     # a step stops being worth it at a gain of 0.2 in chi-square, or of the two thousandth part
     assert float(rows @ rows) < 1.0
     assert np.allclose(x, 1.0, atol=2e-3)
@@ -48,7 +46,7 @@ def test_the_same_end_as_scipy_in_a_box(seed: int) -> None:
         np.array([1.8, 5.0]),
     )  # the best amplitude lies beyond the wall
     x, best, _ = levenberg_marquardt(
-        lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40, SETTINGS.fit
+        lambda x: decay(x, time, data), np.array([0.5, 0.5]), (low, high), 40
     )
     theirs = least_squares(
         lambda x: decay(x, time, data)[0],
@@ -72,7 +70,7 @@ def test_a_point_that_cannot_be_simulated_is_taken_back() -> None:
         return 10.0 * np.arctan(2.0 * (x - 1.0)), np.diag(20.0 / (1.0 + 4.0 * (x - 1.0) ** 2)), None
 
     x, _, _ = levenberg_marquardt(
-        evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30, SETTINGS.fit
+        evaluate, np.array([-1.0]), (np.array([-5.0]), np.array([5.0])), 30
     )
     assert max(visited) > 1.5, "the first step overshoots: the case is empty otherwise"
     assert abs(float(x[0]) - 1.0) < 0.02
@@ -83,9 +81,7 @@ def test_a_start_that_cannot_be_simulated_is_an_error() -> None:
         raise SimulationError("no such plant")
 
     with pytest.raises(SimulationError, match="no such plant"):
-        levenberg_marquardt(
-            evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5, SETTINGS.fit
-        )
+        levenberg_marquardt(evaluate, np.zeros(1), (np.array([-1.0]), np.array([1.0])), 5)
 
 
 def test_noise_is_not_worth_an_evaluation() -> None:
@@ -97,7 +93,6 @@ def test_noise_is_not_worth_an_evaluation() -> None:
         np.zeros(1),
         (WIDE[0][:1], WIDE[1][:1]),
         9,
-        SETTINGS.fit,
     )
     spent = found[2]
     assert spent == 1
@@ -114,7 +109,7 @@ def test_a_step_that_walls_bend_uphill_is_shortened() -> None:
         return 10.0 * root @ (x - aim), 10.0 * root, None
 
     low, high = np.array([-1.0, -40.0]), np.array([1.0, 1.0])
-    x, (rows, _, _), _ = levenberg_marquardt(evaluate, np.zeros(2), (low, high), 40, SETTINGS.fit)
+    x, (rows, _, _), _ = levenberg_marquardt(evaluate, np.zeros(2), (low, high), 40)
     theirs = lsq_linear(10.0 * root, 10.0 * root @ aim, (low, high))
     assert 0.5 * float(rows @ rows) <= theirs.cost * (1.0 + 2e-3)
     assert np.allclose(x, theirs.x, atol=1e-2)
@@ -129,7 +124,7 @@ def test_a_fit_ends_where_steps_do_not_keep_their_promise() -> None:
         return 10.0 + 5.0 * np.abs(x), np.array([[5.0]]), None
 
     x, best, count = levenberg_marquardt(
-        evaluate, np.array([3.0]), (np.array([-9.0]), np.array([9.0])), 40, SETTINGS.fit
+        evaluate, np.array([3.0]), (np.array([-9.0]), np.array([9.0])), 40
     )
     assert count == len(spent) < 12
     assert (

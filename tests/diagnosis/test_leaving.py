@@ -39,7 +39,7 @@ def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) ->
 
 
 def problem(*recordings: Recording) -> Problem:
-    blocks = available_blocks(RIG, ("muscle_pressure",), SETTINGS.prepare)
+    blocks = available_blocks(RIG, ("muscle_pressure",))
     return Problem(blocks, [prepare(r, RIG, SETTINGS) for r in recordings], core_rig(RIG), SETTINGS)
 
 

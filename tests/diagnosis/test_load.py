@@ -58,7 +58,7 @@ def case(rig: pamrs.Rig, pressure: float = 2.5e5) -> pamrs.Case:
 
 
 def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(RIG, tuple(NOISE))}
     assert blocks["load"].kind == "arm"
     assert "length" in blocks["chamber"].drives
     problem = Problem(
@@ -136,7 +136,7 @@ def test_a_length_that_cannot_be_is_refused() -> None:
     def told(change: Callable[[np.ndarray], np.ndarray]) -> str:
         sound = recording(RIG, "slow", "fit", 0, 4.0)
         channels = sound.channels | {"length": change(sound.channels["length"])}
-        return "; ".join(implausible(replace(sound, channels=channels), RIG, SETTINGS.plausibility))
+        return "; ".join(implausible(replace(sound, channels=channels), RIG, SETTINGS))
 
     assert told(lambda x: x) == ""
     assert "length has the one value" in told(lambda x: np.full_like(x, 0.25))
@@ -145,7 +145,7 @@ def test_a_length_that_cannot_be_is_refused() -> None:
         lambda x: 0.24 + 100.0 * (x - x.mean()) * np.sign(np.sin(1e4 * np.arange(x.size)))
     )
     slow = replace(recording(RIG, "slow", "fit", 0, 4.0), sample_time=0.4)
-    assert "too slow for a load" in "; ".join(implausible(slow, RIG, SETTINGS.plausibility))
+    assert "too slow for a load" in "; ".join(implausible(slow, RIG, SETTINGS))
 
 
 def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure() -> None:
@@ -154,9 +154,7 @@ def test_a_load_behind_a_valve_that_was_not_recorded_is_driven_by_its_pressure()
         whole,
         channels={n: v for n, v in whole.channels.items() if n in ("muscle_pressure", "length")},
     )
-    assert [b.name for b in available_blocks(RIG, tuple(bare.channels), SETTINGS.prepare)] == [
-        "load"
-    ]
+    assert [b.name for b in available_blocks(RIG, tuple(bare.channels))] == ["load"]
     assert prepare(bare, RIG, SETTINGS).n == whole.time.size
 
 
@@ -167,7 +165,7 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
     changed = RIG.with_effect(
         "payload_change", {"mass_change": -2.0, "time": 7.0}
     )  # of which 4 s are not recorded
-    load = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "load"]
+    load = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "load"]
     problem = Problem(
         load,
         [prepare(recording(changed, "slow", "fit", 0, 6.0), RIG, SETTINGS)],
@@ -181,7 +179,7 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
 
 
 def test_the_next_experiment_with_a_load_is_simulated() -> None:
-    experiments = library(RIG, SETTINGS.next_experiment, only={"staircase", "other_payload"})
+    experiments = library(RIG, SETTINGS, only={"staircase", "other_payload"})
     assert [e.name for e in experiments] == ["staircase", "other_payload"]
     assert experiments[1].changes == {"load.mass": pytest.approx(20.0)}
     creeping = RIG.with_effect("muscle_creep")
@@ -213,9 +211,7 @@ def test_a_frame_holds_the_length_and_has_no_block_of_its_own() -> None:
     assert RIG.muscle is not None
     bench = pamrs.rigs.bench(RIG.muscle)
     assert not [
-        b
-        for b in available_blocks(bench, ("muscle_pressure", "length"), SETTINGS.prepare)
-        if b.name == "load"
+        b for b in available_blocks(bench, ("muscle_pressure", "length")) if b.name == "load"
     ]
     signals = {
         n: (np.full(64, v), np.zeros(64)) for n, v in (("muscle_pressure", 2e5), ("length", 0.25))

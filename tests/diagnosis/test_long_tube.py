@@ -45,12 +45,12 @@ def opened(
 
 
 def test_both_gauges_are_boundaries_and_the_hose_lies_in_each_block() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS)}
     assert list(blocks) == ["chamber.left", "chamber.right"]
     for block in blocks.values():
         assert {"line.length", "line.diameter", "line.alpha"} <= block.parameters
     usual = RIG.with_parameters({"line.segments": 0})
-    for block in available_blocks(usual, CHANNELS, SETTINGS.prepare):
+    for block in available_blocks(usual, CHANNELS):
         assert "line.length" in block.parameters
         assert "line.alpha" not in block.parameters
 
@@ -61,7 +61,7 @@ def test_both_gauges_are_boundaries_and_the_hose_lies_in_each_block() -> None:
 )
 def test_what_is_wrong_along_the_hose_shows(wrong: dict[str, float], seen: bool) -> None:
     prepared = prepare(opened(RIG.with_parameters(wrong), "fit", 0, 3e5), RIG, SETTINGS)
-    right = available_blocks(RIG, CHANNELS, SETTINGS.prepare)[1]
+    right = available_blocks(RIG, CHANNELS)[1]
     left = residual(right, core_rig(RIG), prepared, [])
     ratio = float(np.std(left.value[left.rows])) / left.noise
     assert (ratio > 2.0) == seen, ratio
@@ -69,7 +69,7 @@ def test_what_is_wrong_along_the_hose_shows(wrong: dict[str, float], seen: bool)
 
 def test_sensitivities_are_those_of_differences() -> None:
     prepared = prepare(opened(RIG, "fit", 0, 3e5), RIG, SETTINGS)
-    block = available_blocks(RIG, CHANNELS, SETTINGS.prepare)[1]
+    block = available_blocks(RIG, CHANNELS)[1]
     for name in ("line.length", "line.diameter", "line.alpha", "chamber.right.alpha_in"):
         value = RIG.parameter(name).value
         slope = residual(block, core_rig(RIG), prepared, [name]).jacobian
@@ -95,7 +95,7 @@ def test_what_shows_a_flow_before_the_recording_is_not_judged(rig: Rig, late: fl
     where that is forgotten.
     """
     prepared = prepare(opened(rig, "fit", 0, 4e5, late, 3.0), rig, SETTINGS)
-    blocks, core = available_blocks(rig, CHANNELS, SETTINGS.prepare), core_rig(rig)
+    blocks, core = available_blocks(rig, CHANNELS), core_rig(rig)
     kept = begun_alike(blocks, core, prepared)
     before, after = (residual(blocks[1], core, p, []) for p in (prepared, kept))
     assert np.std(before.value[before.rows]) > 1.7 * before.noise
@@ -121,7 +121,7 @@ def test_a_tube_that_was_at_rest_loses_nothing(
     true = rig.with_parameters(wrong)
     run = pamrs.simulate(true, sample_time=0.002, duration=1.0, initial=start)
     one = noisy("r", "fit", 0.002, {name: run[name] for name in CHANNELS}, NOISE, [7, 3])
-    blocks = available_blocks(rig, CHANNELS, SETTINGS.prepare)
+    blocks = available_blocks(rig, CHANNELS)
     kept = begun_alike(blocks, core_rig(rig), prepare(one, rig, SETTINGS))
     assert kept.unsettled == {}
 

@@ -11,6 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings, _capped, _unsettled
+from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
@@ -71,10 +72,7 @@ def bare(tmp_path_factory: pytest.TempPathFactory) -> pamrs.Rig:
 
 def test_every_block_has_its_own_drives_and_parameters(rig: pamrs.Rig) -> None:
     blocks = {
-        b.name: b
-        for b in available_blocks(
-            rig, tuple(recorded(rig, 1, "fit", n=40).channels), SETTINGS.prepare
-        )
+        b.name: b for b in available_blocks(rig, tuple(recorded(rig, 1, "fit", n=40).channels))
     }
     assert list(blocks) == ["supply", "chamber.flexor", "chamber.extensor", "arm.elbow"]
     assert [b.kind for b in blocks.values()] == ["supply", "chamber", "chamber", "arm"]
@@ -138,8 +136,7 @@ def test_the_channels_decide_what_can_be_told_apart(
     name: str, channels: tuple[str, ...], expected: list[str]
 ) -> None:
     assert [
-        b.name
-        for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels, SETTINGS.prepare)
+        b.name for b in available_blocks(pamrs.load_rig(RIGS / f"{name}.toml"), channels)
     ] == expected
 
 
@@ -175,7 +172,7 @@ def test_no_confident_name_beside_unknown_geometry(
     assert _unsettled(bare) == []
     assert _unsettled(pamrs.load_rig(tmp_path / "rig.toml")) == ["transmission.flexor.radius"]
     arm = available_blocks(
-        bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels), SETTINGS.prepare
+        bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels)
     )[0]
     group = Group(
         [arm],
@@ -187,7 +184,7 @@ def test_no_confident_name_beside_unknown_geometry(
         {},
         [arm],
     )
-    capped = _capped(group, SETTINGS.verdict.unknown_geometry_probability).probabilities
+    capped = _capped(group, _UNKNOWN_GEOMETRY_PROBABILITY).probabilities
     assert capped["muscle_hysteresis"] < 0.5
     assert sum(capped.values()) == pytest.approx(1.0)
     assert capped["unlisted"] > 0.5

@@ -14,9 +14,9 @@ from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import fit, starts_of
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.screen import Stand
-from pamrs.diagnosis.search._below_noise import _by_chance
+from pamrs.diagnosis.search._below_noise import _STATED_SHARE, _by_chance
 from pamrs.diagnosis.search._sets import without_needless
-from pamrs.diagnosis.search._wrong_parameters import _needless
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, _needless
 from tests.diagnosis.held import RIG, SETTINGS, attempts
 
 
@@ -48,7 +48,7 @@ def test_a_parameter_beside_another_has_to_take_a_share_of_its_own() -> None:
         return cast("Candidate", SimpleNamespace(misfit=misfit))
 
     trial = cast("Attempts", SimpleNamespace(settings=SETTINGS))
-    share = SETTINGS.search.further_share
+    share = FURTHER_SHARE
     short = {("a",): left(100.0), ("b",): left(300.0), ("a", "b"): left(101.0 * (1.0 - share))}
     assert _needless(("a", "b"), short, trial)
     assert not _needless(("a", "b"), short | {("a", "b"): left(99.0 * (1.0 - share))}, trial)
@@ -63,7 +63,7 @@ def test_a_signature_has_a_share_of_the_stated_error_by_chance() -> None:
     }
     trial = cast("Attempts", SimpleNamespace(noise_level=levels, settings=SETTINGS))
     stand = cast("Stand", SimpleNamespace(power_left=400.0))
-    share = SETTINGS.below_noise.stated_share
+    share = _STATED_SHARE
     assert _by_chance(trial, stand) == pytest.approx(share * 0.75 * 400.0)
     quiet = cast("Attempts", SimpleNamespace(noise_level={}, settings=SETTINGS))
     assert _by_chance(quiet, stand) == 0.0

@@ -20,6 +20,7 @@ from pamrs.diagnosis.explain._next import _pair, _Question, _telling
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import (
     Experiment,
+    _choice,
     entropy,
     library,
     linear,
@@ -41,17 +42,13 @@ from pamrs.simulation import core_rig, replay
 from tests.diagnosis import again, test_places
 
 SETTINGS = DiagnosisSettings()
-OWN = SETTINGS.next_experiment
-NOISE = usual_noise(OWN)
+OWN = SETTINGS
+NOISE = usual_noise()
 SHOULDER = pamrs.rigs.shoulder()
 ANTAGONISTS = pamrs.rigs.antagonistic_joint()
 REGULATED = pamrs.rigs.named("regulated_joint")
 SENSORS = ("supply_pressure", "muscle_pressure", "joint_angle")
-OPEN = replace(
-    SETTINGS,
-    verdict=replace(SETTINGS.verdict, settled=0.99999, in_set=5e-4),
-    next_experiment=replace(OWN, simulated_from=5e-4, least_probability=5e-4),
-)
+OPEN = DiagnosisSettings(settled=0.99999, in_set=5e-4, simulated_from=5e-4)
 """Settings by which hardly anything is settled."""
 
 
@@ -105,7 +102,7 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
         labels.append(term_of(effect, *at))
     hypotheses = [(label, rival, 0.5) for label, rival in zip(labels, rivals, strict=True)]
     pool = library(rig, OWN, sample_time=0.01, highest=4e5, only=names)
-    noise, channels = noise_of(rig, OWN), measurable(rig)
+    noise, channels = noise_of(rig), measurable(rig)
     proposed = propose(rig, hypotheses, noise, channels=channels, experiments=pool)
     chosen = next(e for e in pool if e.name == proposed.excitation["kind"])
     outcome = outcome_of(chosen, hypotheses, noise, channels, SETTINGS)
@@ -265,13 +262,14 @@ def test_every_block_has_its_own_experiment(
     rig: str, channels: tuple[str, ...], kinds: list[str]
 ) -> None:
     model = pamrs.rigs.named(rig)
-    blocks = available_blocks(model, channels, SETTINGS.prepare)
+    blocks = available_blocks(model, channels)
     told = [_telling(block, model).kind for block in blocks]
     assert all(name.startswith(kind) for name, kind in zip(told, kinds, strict=True))
 
 
 @pytest.mark.parametrize("wrong", [False, True], ids=["effect", "parameter"])
-def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
+def test_every_open_pair_has_an_experiment(wrong: bool, monkeypatch) -> None:
+    monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
     volume = SHOULDER.parameter("chamber.dead_volume")
     truth = (
         SHOULDER.with_parameters({volume.name: volume.value + 6.0 * volume.tol})
@@ -298,7 +296,10 @@ def test_every_open_pair_has_an_experiment(wrong: bool) -> None:
     assert found.to_dict()["next_experiment"]["pairs"]
 
 
-def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(tmp_path, capsys) -> None:
+def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(
+    tmp_path, capsys, monkeypatch
+) -> None:
+    monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
     leak = ANTAGONISTS.with_effect("leak_muscle", {"conductance": 2e-11}, at="flexor")
     given = test_places.case(leak)
     found = pamrs.diagnose(replace(given, recordings=given.recordings[:2]), settings=OPEN)
@@ -340,7 +341,7 @@ def test_a_pair_that_nothing_simulates_is_told_in_words(driven: bool) -> None:
     if not driven:  # pressures that are given: no experiment of the library drives them
         cut = re.sub(r"(?m)^\[(supply|valve).*\n(?:(?!\[).*\n)*", "", rig.to_toml_text())
         rig = parse_rig(cut)
-    blocks = available_blocks(rig, measurable(rig), SETTINGS.prepare)
+    blocks = available_blocks(rig, measurable(rig))
     from pamrs.diagnosis.evidence import Candidate, Group, Judged
     from pamrs.diagnosis.fit import Fit
 

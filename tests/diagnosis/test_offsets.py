@@ -26,7 +26,7 @@ SETTINGS = DiagnosisSettings()
 
 def problem(recordings: Sequence[Recording]) -> Problem:
     core = core_rig(RIG)
-    blocks = available_blocks(RIG, tuple(recordings[0].channels), SETTINGS.prepare)
+    blocks = available_blocks(RIG, tuple(recordings[0].channels))
     ready = [begun_alike(blocks, core, prepare(r, RIG, SETTINGS)) for r in recordings]
     return Problem(blocks, ready, core, SETTINGS)
 

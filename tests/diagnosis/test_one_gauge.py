@@ -40,14 +40,14 @@ def case(true: pamrs.Rig) -> pamrs.Case:
 
 
 def test_the_chamber_simulates_a_regulator_that_has_no_gauge() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS)}
     assert set(blocks) == {"chamber", "arm"}
     assert blocks["chamber"].beside == ("supply",)
     assert blocks["chamber"].covers == "regulator, line and chamber"
     assert "supply.time_constant" in blocks["chamber"].parameters
     assert acts_in("supply_regulator_deadband", blocks["chamber"])
     assert not acts_in("supply_regulator_deadband", blocks["arm"])
-    both = available_blocks(RIG, (*CHANNELS, "supply_pressure"), SETTINGS.prepare)
+    both = available_blocks(RIG, (*CHANNELS, "supply_pressure"))
     assert {b.name: b.beside for b in both} == {"supply": (), "chamber": (), "arm": ()}
 
 

@@ -15,10 +15,12 @@ from scipy.signal import decimate
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.prepare import overlap, without_copies
+from pamrs.diagnosis.prepare._deviations import WINDOW_SAMPLES
+from pamrs.diagnosis.prepare._overlap import _GAP
 from pamrs.recordings import Recording
 
 Array = NDArray[np.float64]
-SETTINGS = DiagnosisSettings().overlap
+SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 SENSORS = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 KINDS = ("multisine", "steps", "holds", "fast")
@@ -121,12 +123,12 @@ def test_copies_are_found_however_they_were_made(how: str, kind: str, bits: floa
     one = run(kind, bits=bits)
     copy = changed(one, how)
     for first, second in ((copy, one), (one, copy)):
-        assert overlap(first, second, SETTINGS) is not None
+        assert overlap(first, second) is not None
 
 
 def test_where_the_copy_lies_is_told() -> None:
     one = run()
-    found = overlap(changed(one, "window"), one, SETTINGS)
+    found = overlap(changed(one, "window"), one)
     assert found is not None
     assert found.own == pytest.approx((0.0, 5.0), abs=0.4)
     assert found.other == pytest.approx((4.5, 9.5), abs=0.4)
@@ -139,19 +141,19 @@ def test_where_the_copy_lies_is_told() -> None:
 @pytest.mark.parametrize("dt", [0.002, 0.005, 0.02])
 def test_a_repetition_is_no_copy(kind: str, bits: float, dt: float) -> None:
     one, two = run(kind, dt=dt, bits=bits), run(kind, seed=2, dt=dt, bits=bits)
-    assert overlap(one, two, SETTINGS) is None
-    assert overlap(two, one, SETTINGS) is None
+    assert overlap(one, two) is None
+    assert overlap(two, one) is None
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_repetition_at_another_rate_is_no_copy(kind: str) -> None:
-    assert overlap(run(kind), run(kind, seed=2, dt=0.001), SETTINGS) is None
-    assert overlap(run(kind), run(kind, seed=2, dt=0.02), SETTINGS) is None
+    assert overlap(run(kind), run(kind, seed=2, dt=0.001)) is None
+    assert overlap(run(kind), run(kind, seed=2, dt=0.02)) is None
 
 
 def test_windows_of_one_run_that_do_not_meet_are_two() -> None:
     one = run(duration=40.0)
-    assert overlap(one.between(0.0, 19.0), one.between(20.0, 39.0), SETTINGS) is None
+    assert overlap(one.between(0.0, 19.0), one.between(20.0, 39.0)) is None
 
 
 def test_rests_on_steps_of_a_converter_are_no_copies() -> None:
@@ -162,25 +164,25 @@ def test_rests_on_steps_of_a_converter_are_no_copies() -> None:
         for k, chance in enumerate((0.0, 0.0, 0.01, 0.01, 0.3, 0.3))
     ]
     for a in range(0, 6, 2):
-        assert overlap(rests[a], rests[a + 1], SETTINGS) is None
+        assert overlap(rests[a], rests[a + 1]) is None
 
 
 def test_a_copy_is_left_out_of_the_proof_and_said() -> None:
     one, two = run(seed=1), replace(run(seed=2), role="held_out")
-    kept, said = without_copies([one, changed(one, "shifted"), two], SETTINGS)
+    kept, said = without_copies([one, changed(one, "shifted"), two])
     assert [r.name for r in kept] == [one.name, two.name]
     assert len(said) == 1
     assert "copy (copy.csv) holds the same samples as multisine1 (multisine1.csv)" in said[0]
     assert "it is no held-out proof and was left out of it" in said[0]
-    twice, said = without_copies([one, replace(changed(one, "equal"), role="fit"), two], SETTINGS)
+    twice, said = without_copies([one, replace(changed(one, "equal"), role="fit"), two])
     assert [r.name for r in twice] == [one.name, two.name]
     assert "it says nothing more and was left out" in said[0]
-    assert without_copies([one, two], SETTINGS) == ([one, two], [])
+    assert without_copies([one, two]) == ([one, two], [])
 
 
 def test_one_that_is_listed_twice_is_kept_once() -> None:
     one, two = run(), run("steps", seed=2)
-    kept, said = without_copies([one, two, one], SETTINGS)
+    kept, said = without_copies([one, two, one])
     assert [r.name for r in kept] == [one.name, two.name]
     assert len(said) == 1
     assert "it says nothing more and was left out" in said[0]
@@ -208,16 +210,16 @@ def test_what_a_held_out_window_does_not_share_is_kept(kind: str, bits: float, c
     whole = run(kind, duration=40.0, bits=bits)
     one = whole.between(0.0, 18.0)
     proof = replace(every(whole.between(10.0, 40.0), count), name="proof", role="held_out")
-    kept, said = without_copies([one, proof], SETTINGS)
+    kept, said = without_copies([one, proof])
     assert [r.name for r in kept] == [one.name, "proof"]
     # the first 8 s of it are shared; a gap, and a window in which that is told, are left out too
     begin = proof.duration - kept[1].duration
-    margin = SETTINGS.gap + SETTINGS.window_samples * proof.sample_time
-    assert 8.0 + SETTINGS.gap <= begin <= 8.0 + margin + 0.5
+    margin = _GAP + WINDOW_SAMPLES * proof.sample_time
+    assert 8.0 + _GAP <= begin <= 8.0 + margin + 0.5
     step = round(begin / proof.sample_time)
     for name, values in kept[1].channels.items():
         np.testing.assert_array_equal(values, proof.channels[name][step:])
-    assert overlap(kept[1], one, SETTINGS) is None
+    assert overlap(kept[1], one) is None
     assert len(said) == 1
     assert f"{proof.duration:.4g} s are held out, the rest is no proof" in said[0]
 
@@ -226,12 +228,12 @@ def test_a_copy_inside_other_data_leaves_both_sides() -> None:
     one = run(duration=40.0)
     before, after = run(seed=77, duration=15.0), run(seed=78, duration=20.0)
     proof = joined("proof", before, one.between(4.0, 12.0), after)
-    kept, said = without_copies([one, proof], SETTINGS)
+    kept, said = without_copies([one, proof])
     first, second = (r for r in kept if r.role == "held_out")
-    assert first.duration == pytest.approx(15.0 - SETTINGS.gap, abs=0.7)
-    assert second.duration == pytest.approx(20.0 - SETTINGS.gap, abs=0.7)
-    assert first.duration < 15.0 - SETTINGS.gap
-    assert second.duration < 20.0 - SETTINGS.gap
+    assert first.duration == pytest.approx(15.0 - _GAP, abs=0.7)
+    assert second.duration == pytest.approx(20.0 - _GAP, abs=0.7)
+    assert first.duration < 15.0 - _GAP
+    assert second.duration < 20.0 - _GAP
     assert first.name.startswith("proof, 0 to 1")
     assert second.name.endswith(f"{proof.duration:.4g} s")
     assert " and " in said[0]
@@ -241,10 +243,10 @@ def test_two_copies_at_different_times_are_both_cut_out() -> None:
     one, two = run(duration=30.0), run("fast", seed=5, duration=30.0)
     new = run(seed=77, duration=24.0)
     proof = joined("proof", two.between(3.0, 13.0), new, one.between(6.0, 16.0))
-    kept, _ = without_copies([one, two, proof], SETTINGS)
+    kept, _ = without_copies([one, two, proof])
     (left,) = (r for r in kept if r.role == "held_out")
-    assert left.duration == pytest.approx(24.0 - 2 * SETTINGS.gap, abs=1.4)
-    assert all(overlap(left, fitted, SETTINGS) is None for fitted in (one, two))
+    assert left.duration == pytest.approx(24.0 - 2 * _GAP, abs=1.4)
+    assert all(overlap(left, fitted) is None for fitted in (one, two))
     at = proof.channels["muscle_pressure"].tolist().index(left.channels["muscle_pressure"][0])
     assert 2000 < at < 2000 + 4800
 
@@ -252,7 +254,7 @@ def test_two_copies_at_different_times_are_both_cut_out() -> None:
 def test_what_is_left_is_left_out_where_it_is_short() -> None:
     whole = run(duration=40.0)
     proof = replace(whole.between(4.0, 26.0), name="proof", role="held_out")
-    kept, said = without_copies([whole.between(0.0, 18.0), proof], SETTINGS)
+    kept, said = without_copies([whole.between(0.0, 18.0), proof])
     assert len(kept) == 1
     assert "it is no held-out proof and was left out of it" in said[0]
     assert "s, is too short" in said[0]
@@ -265,7 +267,7 @@ def test_a_rest_that_cannot_be_told_counts_as_shared() -> None:
     rough, still = 400.0 * rng.standard_normal(2000), np.zeros(4000)
     one = of("one", "fit", 0.01, {"muscle_pressure": 2e5 + np.r_[rough, still]})
     proof = replace(one, name="proof", role="held_out")
-    kept, said = without_copies([one, proof], SETTINGS)
+    kept, said = without_copies([one, proof])
     assert kept == [one]
     assert "is too short" not in said[0]
 
@@ -274,7 +276,7 @@ def test_a_stretch_is_kept_once() -> None:
     whole = run(duration=40.0)
     proof = replace(whole.between(10.0, 40.0), name="proof", role="held_out")
     again = replace(proof, name="again")
-    kept, said = without_copies([whole.between(0.0, 18.0), proof, again], SETTINGS)
+    kept, said = without_copies([whole.between(0.0, 18.0), proof, again])
     assert [r.name for r in kept] == [whole.name, "proof"]
     assert "again (multisine1.csv) holds the same samples as proof" in said[-1]
     assert "it says nothing more and was left out" in said[-1]

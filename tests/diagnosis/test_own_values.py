@@ -80,11 +80,7 @@ def test_sensitivities_are_those_of_the_value_elsewhere(error: str, slope: float
         "told", "fit", record.time, DT, record.channels, record.mask, parameters={NAME: own}
     )
     prepared = prepare(told, SHOULDER, SETTINGS)
-    (arm,) = [
-        b
-        for b in available_blocks(SHOULDER, tuple(record.channels), SETTINGS.prepare)
-        if b.name == "arm"
-    ]
+    (arm,) = [b for b in available_blocks(SHOULDER, tuple(record.channels)) if b.name == "arm"]
     there = prepare(replace(told, parameters={}), SHOULDER, SETTINGS)
     core = core_rig(SHOULDER)
     found = residuals(Problem([arm], [prepared], core, SETTINGS), SHOULDER, [NAME])["arm", "told"]

@@ -76,7 +76,7 @@ def blocks_of(rig: pamrs.Rig, *without: str):
         for name in rig.tables(kind)
     ]
     told = tuple(name for name in channels if name not in without)
-    return available_blocks(rig, told, SETTINGS.prepare)
+    return available_blocks(rig, told)
 
 
 def test_one_block_of_each_kind_leaves_every_effect_as_it_was() -> None:

@@ -14,7 +14,8 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import library, pressure_range, trial_of
-from pamrs.diagnosis.next_experiment._differences import _free
+from pamrs.diagnosis.next_experiment._chains import BANDWIDTH
+from pamrs.diagnosis.next_experiment._differences import _KNOWN_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
 from pamrs.simulation import core_rig
 
@@ -26,9 +27,9 @@ ALL = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 def test_levels_follow_from_the_rig() -> None:
     for name in ("shoulder", "elbow"):
         rig = pamrs.rigs.named(name)
-        span = pressure_range(rig, SETTINGS.next_experiment)
+        span = pressure_range(rig)
         assert 0.0 < span.low < span.high < rig.model["supply"]["initial_pressure"]
-    assert pressure_range(pamrs.rigs.shoulder(), SETTINGS.next_experiment, highest=2e5).high <= 2e5
+    assert pressure_range(pamrs.rigs.shoulder(), highest=2e5).high <= 2e5
 
 
 @pytest.mark.parametrize("gas", [(287.05, 1.4), (2077.1, 1.667), (188.9, 1.3)])
@@ -38,9 +39,7 @@ def test_commands_are_found_for_the_gas_of_the_rig(gas: tuple[float, float]) -> 
         {"gas.gas_constant": constant, "gas.heat_capacity_ratio": ratio}
     )
     reference = np.interp(np.arange(401) * 0.01, [0.0, 1.0, 2.0, 4.0], [0.0, 1e5, 1e5, 3e5])
-    command = trial_of(
-        rig, reference, sample_time=0.01, bandwidth=SETTINGS.next_experiment.bandwidth
-    )
+    command = trial_of(rig, reference, sample_time=0.01, bandwidth=BANDWIDTH)
     found = pamrs.simulate(rig, command, sample_time=0.01)["muscle_pressure"]
     assert np.abs(found - reference)[50:].max() < 0.1e5
 
@@ -55,7 +54,7 @@ def test_each_of_two_leaks_keeps_its_own_uncertainty() -> None:
     two = one.with_effect("leak_muscle", {"conductance": 6e-11}, at="extensor")
     free = _free(problem, two)
     assert free["leak_muscle.flexor.conductance"] == pytest.approx(1e-11)
-    share = SETTINGS.next_experiment.known_share
+    share = _KNOWN_SHARE
     assert free["leak_muscle.extensor.conductance"] == pytest.approx(share * 6e-11)
 
 
@@ -117,9 +116,7 @@ def few():
     """Plans of the shoulder from one experiment in the place of all, computed once, so that the
     tests are quick.
     """
-    pool = library(
-        pamrs.rigs.shoulder(), SETTINGS.next_experiment, sample_time=0.01, only=["slow_triangle"]
-    )
+    pool = library(pamrs.rigs.shoulder(), SETTINGS, sample_time=0.01, only=["slow_triangle"])
     made = plan._parts
     kept: dict[str, Any] = {}
 
@@ -179,9 +176,7 @@ def test_holds_on_both_sides_separate_a_leak_from_centre_leakage(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     rig = pamrs.rigs.shoulder()
-    (both,) = pool = library(
-        rig, SETTINGS.next_experiment, sample_time=0.01, only=["holds_both_sides"]
-    )
+    (both,) = pool = library(rig, SETTINGS, sample_time=0.01, only=["holds_both_sides"])
     monkeypatch.setattr(plan, "library", lambda *_: pool)
     leaks = {name: EFFECTS[name] for name in ("leak_muscle", "valve_centre_leakage")}
     monkeypatch.setattr(plan, "CATALOGUE", leaks)

@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from pamrs.diagnosis.evidence._predictive import _autoregression, _stretches, bootstrapped
-from pamrs.diagnosis.settings import EvidenceSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 
-SETTINGS = EvidenceSettings()
+SETTINGS = DiagnosisSettings()
 
 
 def autoregressive(count: int, share: float, size: float, seed: int = 3) -> np.ndarray:
@@ -51,7 +51,7 @@ def test_densities_are_those_of_each_sample_after_those_before_it() -> None:
 
 @given(st.lists(st.floats(-5.0, 5.0), min_size=2, max_size=6), st.integers(1, 30))
 def test_without_a_difference_the_priors_decide(priors: list[float], count: int) -> None:
-    found = bootstrapped(np.zeros((len(priors), count)), np.array(priors), SETTINGS)
+    found = bootstrapped(np.zeros((len(priors), count)), np.array(priors))
     whole = np.exp(priors) / np.exp(priors).sum()
     assert found == pytest.approx(whole, abs=1e-9)
 
@@ -59,8 +59,8 @@ def test_without_a_difference_the_priors_decide(priors: list[float], count: int)
 @given(st.floats(-1e3, 1e3))
 def test_only_differences_count(shift: float) -> None:
     scores = np.random.default_rng(1).normal(size=(3, 12))
-    plain = bootstrapped(scores, np.zeros(3), SETTINGS)
-    assert bootstrapped(scores + shift, np.zeros(3), SETTINGS) == pytest.approx(plain, abs=1e-6)
+    plain = bootstrapped(scores, np.zeros(3))
+    assert bootstrapped(scores + shift, np.zeros(3)) == pytest.approx(plain, abs=1e-6)
     assert plain.sum() == pytest.approx(1.0)
 
 
@@ -68,6 +68,6 @@ def test_a_lead_in_every_stretch_counts_more_than_as_large_a_lead_in_one() -> No
     everywhere, once = np.zeros((2, 20)), np.zeros((2, 20))
     everywhere[0] = 0.4
     once[0, 5] = 8.0
-    sure, open_ = (bootstrapped(s, np.zeros(2), SETTINGS)[0] for s in (everywhere, once))
+    sure, open_ = (bootstrapped(s, np.zeros(2))[0] for s in (everywhere, once))
     assert sure > 0.999
     assert 0.6 < open_ < 0.98

@@ -57,7 +57,7 @@ def pulled(true: pamrs.Rig, tare: float = 0.0) -> pamrs.Case:
 
 def test_the_force_is_that_of_a_simulation() -> None:
     case = pulled(BENCH)
-    (block,) = available_blocks(BENCH, case.channels, SETTINGS.prepare)
+    (block,) = available_blocks(BENCH, case.channels)
     assert (block.name, block.kind, block.channel) == ("force", "pull", "force")
     time = np.arange(0.0, 4.0, DT)
     length, slope = 0.25 + 0.01 * np.sin(time), 0.01 * np.cos(time)

@@ -114,9 +114,7 @@ def test_each_block_is_driven_by_what_stands_next_to_it() -> None:
 
     def drives(*gauges: str) -> dict[str, set[str]]:
         have = (*commands, "muscle_pressure", *gauges)
-        return {
-            block.name: set(block.drives) for block in available_blocks(rig, have, SETTINGS.prepare)
-        }
+        return {block.name: set(block.drives) for block in available_blocks(rig, have)}
 
     every = drives(BOTTLE, OUTLET)
     assert every == {
@@ -159,7 +157,7 @@ def test_a_line_at_the_regulator_does_not_tell_what_is_drawn() -> None:
         )
         channels = {"supply_command.regulator": set_to, **{name: run[name] for name in NOISE}}
         recordings.append(noisy(f"r{seed}", role, 0.005, channels, NOISE, [2, seed]))
-    blocks = available_blocks(rig, tuple(channels), SETTINGS.prepare)
+    blocks = available_blocks(rig, tuple(channels))
     assert [block.name for block in blocks] == ["supply.regulator", "chamber"]
     assert pamrs.diagnose(pamrs.Case("case", rig, recordings, Path())).verdict == "none"
 
@@ -198,7 +196,7 @@ def test_a_command_above_the_bottle_is_no_error_of_units() -> None:
 
 def test_experiments_keep_below_the_bottle() -> None:
     rig = parse_rig(LINED + '[limits]\nmax_pressure = { value = 12, unit = "bar" }\n')
-    proposed = library(rig, SETTINGS.next_experiment)
+    proposed = library(rig, SETTINGS)
     assert proposed
     highest = max(float(np.max(one.command)) for one in proposed if one.command is not None)
     assert highest <= 0.8 * 9e5 + 1.0

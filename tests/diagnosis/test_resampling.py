@@ -39,7 +39,6 @@ def screened(
             (e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s)
             for e, s in signatures.items()
         ],
-        SETTINGS.screen,
     )
 
 

@@ -18,6 +18,7 @@ from pamrs import report
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_aside
 from pamrs.diagnosis.explain import _assemble, _free_run
+from pamrs.diagnosis.explain._free_run import _OFF_NOISES
 from pamrs.diagnosis.explain._next import _telling, next_experiment
 from pamrs.diagnosis.fit import Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.next_experiment import experiments_of
@@ -70,9 +71,9 @@ def test_blocks_that_were_not_judged_are_said_everywhere() -> None:
 
 
 def test_every_block_of_a_full_log_is_judged() -> None:
-    assert unjudged_blocks(RIG, NAMES, SETTINGS.prepare) == []
+    assert unjudged_blocks(RIG, NAMES) == []
     lacking = tuple(name for name in NAMES if name != "joint_angle")
-    assert [b.name for b in unjudged_blocks(RIG, lacking, SETTINGS.prepare)] == [
+    assert [b.name for b in unjudged_blocks(RIG, lacking)] == [
         "supply",
         "chamber",
         "arm",
@@ -109,7 +110,7 @@ def test_valve_and_chamber_are_judged_without_a_gauge_at_the_tank(what: str) -> 
 
 def known_of(rig: pamrs.Rig) -> _free_run.Known:
     """What the rig file says of the values."""
-    own = {n: p for n, p in known_parameters(rig, SETTINGS.fit).items() if p.tol > 0.0}
+    own = {n: p for n, p in known_parameters(rig).items() if p.tol > 0.0}
     tols = np.diag([p.tol for p in own.values()])
     return _free_run.Known(tuple(own), np.array([p.value for p in own.values()]), tols)
 
@@ -122,7 +123,7 @@ def test_a_free_run_beyond_what_is_known_of_the_values_is_off(strength: float, o
     )
     true = true.with_effect("leak_muscle", {"conductance": strength}) if strength else true
     prepared = prepare(recorded(true, "a", "fit"), RIG, SETTINGS)
-    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    blocks = available_blocks(RIG, NAMES)
     problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
     own = residuals(problem, RIG)
     runs, _ = _free_run.free_run(
@@ -130,7 +131,7 @@ def test_a_free_run_beyond_what_is_known_of_the_values_is_off(strength: float, o
     )
     assert runs is not None
     error = runs[0].channels["muscle_pressure"]
-    assert error.noises > SETTINGS.warnings.off_noises  # the nominal values miss it in both cases
+    assert error.noises > _OFF_NOISES  # the nominal values miss it in both cases
     assert error.off is off
 
 
@@ -156,7 +157,7 @@ def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
 
 def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     prepared = prepare(recorded(RIG, "a", "fit"), RIG, SETTINGS)
-    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    blocks = available_blocks(RIG, NAMES)
     chamber = next(b for b in blocks if b.name == "chamber")
     problem = Problem(blocks, [prepared], core_rig(RIG), SETTINGS)
     base = Candidate(
@@ -175,7 +176,7 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
 
 
 def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> None:
-    blocks = available_blocks(RIG, NAMES, SETTINGS.prepare)
+    blocks = available_blocks(RIG, NAMES)
     (chamber,) = (b for b in blocks if b.name == "chamber")
     assert _telling(chamber, RIG).kind == "step_and_shut"
     assert _telling(chamber, RIG, ["pressure_lag"]).kind == "step_and_shut"
@@ -183,7 +184,7 @@ def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> N
     assert leak.kind == "sealed_hold"
     assert "inside those that are already recorded" in leak.text
     record = recorded(RIG, "a", "fit")
-    own = SETTINGS.next_experiment
+    own = SETTINGS
     (hold,) = experiments_of(RIG, [record], own, ["sealed_hold"])
     run = hold.simulate(RIG)
     assert run["muscle_pressure"].max() < 1.02 * record.channels["muscle_pressure"].max()
@@ -235,7 +236,7 @@ def leak_group(strength: float) -> tuple[Problem, Group]:
     """A chamber's group with the leak that its log has, fitted, and a companion beside it."""
     true = RIG.with_effect("leak_muscle", {"conductance": strength})
     prepared = prepare(recorded(true, "all", "fit"), RIG, SETTINGS)
-    (chamber,) = [b for b in available_blocks(RIG, NAMES, SETTINGS.prepare) if b.name == "chamber"]
+    (chamber,) = [b for b in available_blocks(RIG, NAMES) if b.name == "chamber"]
     problem = Problem([chamber], [prepared], core_rig(RIG), SETTINGS)
     free = {"leak_muscle.conductance": strength}
     base = fit(problem, RIG, (), {}, {"chamber": 1.0})

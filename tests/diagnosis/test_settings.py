@@ -1,5 +1,5 @@
-"""Settings of a diagnosis: one home for every number, each with its reason, passed in, in the
-result.
+"""Settings of a diagnosis: few, each with its reason, passed in, in the result where changed; every
+other number is a constant with its reason beside its use.
 """
 
 from __future__ import annotations
@@ -14,27 +14,11 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.settings import EvidenceSettings, NoiseSettings, settings_table
 from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
 
 ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
-CONSTANTS = {
-    "prepare/_ambient.py": {"_SAME"},  # of temperatures that are told as one
-    # of a filter, a flip of a converter, a least squares and a quotient
-    "prepare/_deviations.py": {"_TAPS", "_SOON", "_ROWS", "_TINY"},
-    "prepare/_signals.py": {"_TERMS"},  # of a cubic
-    "screen/_leave_one_out.py": {"_RIDGE"},  # keeps a matrix invertible
-    "prepare/_plausible.py": {"_DEGREES", "_TOLD"},  # of a circle; findings that a message lists
-    "prepare/_rails.py": {"_TOLD"},  # recordings that a message counts
-    "next_experiment/_chains.py": {"_LEAST_SHARE"},  # of the choked flow
-    "explain/_conditions.py": {"_MAP_CELLS", "_ONE_SIDED"},  # of a picture and of words
-    "explain/_assemble.py": {"_REFERENCE_DENSITY"},  # of ISO 6358
-    "explain/_closure_words.py": {"_UNITS"},  # of sizes that are told
-    "prove.py": {"TIMEOUT", "_POLL"},  # of processes
-}
-"""Numbers of modules that steer no verdict, and what they are."""
 
 
 def sealed_case(conductance: float = 3e-11) -> pamrs.Case:
@@ -59,9 +43,9 @@ def sealed_case(conductance: float = 3e-11) -> pamrs.Case:
     return pamrs.Case("hold", rig, [recording], Path())
 
 
-def numbers(tree: ast.Module) -> set[str]:
-    """Names that a module gives a number, or a collection with a number in it, at its own level."""
-    found = set()
+def numbers(tree: ast.Module) -> dict[str, ast.stmt]:
+    """Statements that give a name of a module a number, or a collection with a number in it."""
+    found: dict[str, ast.stmt] = {}
     for statement in tree.body:
         if isinstance(statement, ast.Assign):
             targets, value = statement.targets, statement.value
@@ -69,32 +53,43 @@ def numbers(tree: ast.Module) -> set[str]:
             targets, value = [statement.target], statement.value
         else:
             continue
-        literal = (
-            not isinstance(value, (ast.Call, ast.Subscript))
-            or isinstance(value, ast.Call)
-            and not value.args
-        )
         constants = [
             n
             for n in ast.walk(value)
             if isinstance(n, ast.Constant) and type(n.value) in (int, float)
         ]
-        if constants and literal:
-            found |= {
-                n.id for target in targets for n in ast.walk(target) if isinstance(n, ast.Name)
-            }
+        if constants and not isinstance(value, ast.Subscript):
+            names = [n for t in targets for n in ast.walk(t) if isinstance(n, ast.Name)]
+            found |= {n.id: statement for n in names}
     return found
 
 
-def test_no_module_keeps_a_number_of_its_own() -> None:
+def without_reason(text: str) -> list[str]:
+    """Numbers of a module with no comment behind, above or text below them."""
+    tree, lines = ast.parse(text), text.splitlines()
+    texts = {
+        n.lineno
+        for n in tree.body
+        if isinstance(n, ast.Expr)
+        and isinstance(n.value, ast.Constant)
+        and isinstance(n.value.value, str)
+    }
+    return [
+        name
+        for name, own in numbers(tree).items()
+        if "#" not in lines[own.lineno - 1]
+        and not lines[own.lineno - 2].startswith("#")
+        and (own.end_lineno or own.lineno) + 1 not in texts
+    ]
+
+
+def test_every_number_of_a_module_has_its_reason() -> None:
+    assert without_reason("_A = 1\n\n_B = 2  # of a cubic\n# of air\n_C = (3, 4)\n") == ["_A"]
     found = {}
     for path in sorted(DIAGNOSIS.rglob("*.py")):
-        inside = path.relative_to(DIAGNOSIS).as_posix()
-        if not inside.startswith("settings/"):
-            own = numbers(ast.parse(path.read_text(encoding="utf-8")))
-            found[inside] = own - CONSTANTS.get(inside, set())
-            assert CONSTANTS.get(inside, set()) <= own, f"{inside}: not there any more"
-    assert not {name: own for name, own in found.items() if own}
+        found[path.relative_to(DIAGNOSIS).as_posix()] = without_reason(path.read_text("utf-8"))
+    assert sum(map(len, found.values())) == 0, {k: v for k, v in found.items() if v}
+    assert len(found) > 50
 
 
 def test_no_function_reads_a_default() -> None:
@@ -106,102 +101,65 @@ def test_no_function_reads_a_default() -> None:
         "next_experiment/_planning.py",
     }
     for path in sorted(DIAGNOSIS.rglob("*.py")):
-        inside = path.relative_to(DIAGNOSIS).as_posix()
         tree = ast.parse(path.read_text(encoding="utf-8"))
         calls = {
             n.func.id
             for n in ast.walk(tree)
             if isinstance(n, ast.Call) and isinstance(n.func, ast.Name)
         }
-        made = {name for name in calls if name.endswith("Settings")}
-        assert not made or inside.startswith("settings/") or inside in makers, (
-            f"{inside} makes {made}"
-        )
+        inside = path.relative_to(DIAGNOSIS).as_posix()
+        assert "DiagnosisSettings" not in calls or inside in makers, inside
 
 
-def test_every_setting_says_what_it_is_and_where_it_comes_from() -> None:
-    table = list(settings_table())
-    assert len({s.name for s in table}) == len(table) > 200
-    for one in table:
-        assert all(len(text) >= 1 for text in (one.unit, one.reason, one.origin)), one.name
-        assert len(one.reason.split()) >= 2, one.name
+def test_settings_are_few_and_each_says_what_it_is_and_where_it_comes_from() -> None:
+    every = dataclasses.fields(DiagnosisSettings)
+    assert 20 < len(every) <= 50
+    for one in every:
+        told = one.metadata
+        assert all(told[key] for key in ("unit", "reason", "origin")), one.name
+        assert len(told["reason"].split()) >= 2, one.name
+        assert told["least"] <= one.default <= told["most"], one.name
+
+
+def test_every_setting_is_read() -> None:
+    text = "".join(path.read_text("utf-8") for path in DIAGNOSIS.rglob("*.py"))
+    unread = [f.name for f in dataclasses.fields(DiagnosisSettings) if f".{f.name}" not in text]
+    assert not unread
 
 
 def test_settings_go_through_json() -> None:
-    settings = DiagnosisSettings().with_values(
-        {
-            "evidence.softness": 0.5,
-            "prepare.start_reaches": [0.05, 0.1],
-            "search.most_singles": 3,
-            "seed": 7,
-        }
-    )
-    again = DiagnosisSettings.from_dict(json.loads(json.dumps(settings.to_dict())))
-    assert again == settings != DiagnosisSettings()
-    assert again.prepare.start_reaches == (0.05, 0.1)
-    # what is left out keeps its default
-    assert (
-        DiagnosisSettings.from_dict({"evidence": {"softness": 0.5}}).evidence == settings.evidence
-    )
+    settings = DiagnosisSettings(most_room=340.0, most_singles=3, seed=7)
+    told = json.loads(json.dumps(settings.to_dict()))
+    assert told == {"most_singles": 3, "most_room": 340.0, "seed": 7}
+    assert DiagnosisSettings.from_dict(told) == settings != DiagnosisSettings()
+    assert DiagnosisSettings().to_dict() == {}
     with pytest.raises(dataclasses.FrozenInstanceError):
-        settings.evidence.softness = 1.0  # type: ignore[misc]
+        settings.most_room = 1.0  # type: ignore[misc]
 
 
 @pytest.mark.parametrize(
     ("values", "message"),
     [
         (
-            {"evidence.softness": -1.0},
-            r"EvidenceSettings.softness = -1.0 is not allowed: a finite number above 0",
+            {"most_room": -1.0},
+            r"most_room = -1.0 is not allowed: a finite number, at least .* \[K\]",
         ),
+        ({"noise_chance": float("nan")}, r"noise_chance = nan is not allowed: .*, at most 0.5"),
+        ({"most_singles": 1.5}, r"most_singles = 1.5 is not allowed: a whole number, at least 1"),
+        ({"most_singles": True}, r"most_singles = True is not allowed"),
+        ({"most_room": "warm"}, r"most_room = 'warm' is not allowed"),
+        ({"seed": -1}, r"seed = -1 is not allowed: a whole number, at least 0"),
         (
-            {"noise.chance": float("nan")},
-            r"NoiseSettings.chance = nan is not allowed: .* above 0 and at most 0.5",
+            {"softness": 1.0},
+            r"settings has 'softness', which is not allowed: one of smoothing_time",
         ),
-        (
-            {"search.most_singles": 1.5},
-            r"SearchSettings.most_singles = 1.5 is not allowed: a whole number at least 1",
-        ),
-        ({"search.most_singles": True}, r"most_singles = True is not allowed"),
-        (
-            {"screen.place_shares": []},
-            r"place_shares = \[\] is not allowed: like \[0.5, 0.75, 0.93\]",
-        ),
-        ({"screen.place_shares": [0.5, "much"]}, r"place_shares = \[0.5, 'much'\] is not allowed"),
-        ({"screen.place_shares": [1.5]}, r"place_shares = 1.5 is not allowed: .* at most 1"),
-        (
-            {"wrong_parameters.wrong_together": [["arm.mass"]]},
-            r"wrong_together = .* is not allowed",
-        ),
-        (
-            {"verdict.quiet_likely": 0.5},
-            r"quiet_likely \+ quiet_other \+ quiet_unlisted = 0.67 is not allowed",
-        ),
-        ({"evidence.x": 1.0}, r"settings has no 'evidence.x': one of log_odds_explained"),
-        ({"softness": 1.0}, r"settings has no 'softness': one of prepare"),
-        ({"seed": -1}, r"seed = -1 is not allowed: a whole number, 0 or more"),
+        ({3: 1}, r"settings has the key 3"),
+        (5, r"settings = 5 is not allowed"),
     ],
 )
 def test_what_is_not_allowed_is_named(values: dict[str, object], message: str) -> None:
     with pytest.raises(pamrs.ParameterError, match=message):
-        DiagnosisSettings().with_values(values)
-
-
-def test_groups_are_checked_as_a_whole() -> None:
-    with pytest.raises(
-        pamrs.ParameterError, match="evidence is a NoiseSettings; a EvidenceSettings is needed"
-    ):
-        DiagnosisSettings(evidence=NoiseSettings())  # type: ignore[arg-type]
-    with pytest.raises(pamrs.ParameterError, match="settings has 'evidences'"):
-        DiagnosisSettings.from_dict({"evidences": {}})
-    with pytest.raises(pamrs.ParameterError, match=r"settings.evidence is a list"):
-        DiagnosisSettings.from_dict({"evidence": []})
-    with pytest.raises(pamrs.ParameterError, match="settings = 5 is not allowed"):
-        DiagnosisSettings.from_dict(5)  # type: ignore[arg-type]
-    with pytest.raises(pamrs.ParameterError, match="values has the key 3"):
-        DiagnosisSettings().with_values({3: 1})  # type: ignore[dict-item]
-    with pytest.raises(pamrs.ParameterError, match="EvidenceSettings has no 'soft'"):
-        EvidenceSettings.from_dict({"soft": 1.0})
+        DiagnosisSettings.from_dict(values)
 
 
 def test_a_setting_that_changes_changes_the_outcome_and_is_kept() -> None:
@@ -209,13 +167,19 @@ def test_a_setting_that_changes_changes_the_outcome_and_is_kept() -> None:
     usual = pamrs.diagnose(case)
     assert usual.verdict == "effects"
     assert usual.settings == DiagnosisSettings()
-    cautious = DiagnosisSettings().with_values(
-        {"evidence.most_probability": 0.3, "evidence.drift_probability": 0.2, "verdict.named": 0.45}
-    )
+    content = json.loads(usual.to_json())
+    assert content["settings"] == {}
+    assert content["version"] == pamrs.__version__
+    cautious = DiagnosisSettings(most_probability=0.3, drift_probability=0.2, named=0.45)
     other = pamrs.diagnose(case, settings=cautious)
     assert other.verdict == "unlisted"
     assert max(other.probabilities["leak_muscle"], 0.0) <= 0.4 < usual.probabilities["leak_muscle"]
     told = json.loads(other.to_json())["settings"]
+    assert (
+        told
+        == {"most_probability": 0.3, "drift_probability": 0.2, "named": 0.45}
+        == {name: getattr(cautious, name) for name in told}
+    )
     assert DiagnosisSettings.from_dict(told) == other.settings == cautious
 
 

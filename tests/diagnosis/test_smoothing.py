@@ -8,7 +8,7 @@ import pytest
 from pamrs.diagnosis.prepare._signals import filter_length, lengths_of, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
 
-PREPARE = DiagnosisSettings().prepare
+PREPARE = DiagnosisSettings()
 DT = 0.005
 TIME = DT * np.arange(4000)
 FULL = np.full(TIME.size, filter_length(DT, PREPARE), dtype=np.intp)

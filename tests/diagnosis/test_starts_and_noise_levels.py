@@ -14,7 +14,14 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, significant, weigh
 from pamrs.diagnosis.fit import Fit, Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
-from pamrs.diagnosis.prepare import Prepared, available_blocks, begun, noise_level, prepare
+from pamrs.diagnosis.prepare import (
+    Prepared,
+    _signals,
+    available_blocks,
+    begun,
+    noise_level,
+    prepare,
+)
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -109,12 +116,12 @@ def test_what_lies_beyond_a_hole_is_not_asked() -> None:
 
 def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> None:
     core = core_rig(RIG)
-    blocks = available_blocks(RIG, tuple(NOISE), SETTINGS.prepare)
+    blocks = available_blocks(RIG, tuple(NOISE))
     problem = Problem(blocks, [recorded(seed) for seed in range(12)], core, SETTINGS)
     noise_level, found = noise_levels(problem, core), residuals(problem, RIG)
     for block in blocks:
-        each = [excess(block, [p], found, noise_level, SETTINGS.noise) for p in problem.recordings]
-        together = excess(block, problem.recordings, found, noise_level, SETTINGS.noise)
+        each = [excess(block, [p], found, noise_level, SETTINGS) for p in problem.recordings]
+        together = excess(block, problem.recordings, found, noise_level, SETTINGS)
         assert not significant(together)
         assert 0.8 < together.ratio < 1.2
         assert sum(significant(e) for e in each) <= 1
@@ -135,7 +142,7 @@ def named(
 
 
 def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, right, wrong = (
         named((), 1.4, {}),
         named(("leak_muscle",), 1.0, {}),
@@ -152,7 +159,7 @@ def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> N
 
 
 def test_what_is_still_more_than_noise_is_not_explained() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, little, most = (
         named((), 1.4, {}, 0.03),
         named(("leak_muscle",), 1.27, {}, 0.03),
@@ -190,7 +197,7 @@ def test_every_joint_of_an_arm_starts_where_it_was() -> None:
         rig,
         SETTINGS,
     )
-    arms = [b for b in available_blocks(rig, tuple(channels), SETTINGS.prepare) if b.kind == "arm"]
+    arms = [b for b in available_blocks(rig, tuple(channels)) if b.kind == "arm"]
     assert len(arms) == 2
     for block in arms:
         given = begun(block, prepared, [0])
@@ -203,23 +210,24 @@ def test_the_noise_of_a_quantised_channel_is_that_of_noise_and_lattice(steps: fl
     for seed in range(4):
         rng = np.random.default_rng(seed)
         values = np.round(rng.normal(0.0, steps, 20000) + 30.0 * np.sin(np.arange(20000) / 900.0))
-        found = noise_level(
-            values, np.ones(20000, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed
-        )
+        found = noise_level(values, np.ones(20000, dtype=bool), seed=SETTINGS.seed)
         assert found == pytest.approx(np.hypot(steps, 12.0**-0.5), rel=0.1)
 
 
-def test_a_sound_gauge_has_the_noise_of_its_third_differences() -> None:
+def test_a_sound_gauge_has_the_noise_of_its_third_differences(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """The quietest band of few samples is quieter than the others, and far from telling."""
-    always = replace(SETTINGS.prepare, quiet_share=1.0)
-    never = replace(SETTINGS.prepare, quiet_share=0.0)
+
+    def level(share: float) -> float:
+        monkeypatch.setattr(_signals, "_QUIET_SHARE", share)
+        return noise_level(values, usable, seed=SETTINGS.seed)
+
+    usual = _signals._QUIET_SHARE
     for seed in range(40):
         values = np.random.default_rng(seed).normal(0.0, 1.0, 600)
         usable = np.ones(600, dtype=bool)
-        found, high, low = (
-            noise_level(values, usable, s, seed=SETTINGS.seed)
-            for s in (SETTINGS.prepare, never, always)
-        )
+        found, high, low = level(usual), level(0.0), level(1.0)
         assert found == high
         assert low < high
 
@@ -227,12 +235,12 @@ def test_a_sound_gauge_has_the_noise_of_its_third_differences() -> None:
 @pytest.mark.parametrize("samples", [12, 40, 63, 64])
 def test_few_samples_have_a_noise_too(samples: int) -> None:
     values = np.random.default_rng(1).normal(0.0, 1.0, samples)
-    found = noise_level(values, np.ones(samples, dtype=bool), SETTINGS.prepare, seed=SETTINGS.seed)
+    found = noise_level(values, np.ones(samples, dtype=bool), seed=SETTINGS.seed)
     assert 0.3 < found < 3.0
 
 
 def test_a_value_that_nobody_has_published_costs_odds() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, rival = (
         named((), 3.0, {}),
         named(("base_flexibility",), 1.0, {"base_flexibility.natural_frequency": 7.0}),
@@ -249,7 +257,7 @@ def test_a_value_that_nobody_has_published_costs_odds() -> None:
 
 
 def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, rival = named((), 3.0, {}), named(("muscle_creep",), 1.0, {})
     odds = []
     for angle in (1.2, 0.35):
@@ -266,7 +274,7 @@ def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
 
 def test_what_relaxes_at_once_is_another_stiffness() -> None:
     """A time constant below its own standard deviation was not seen: the wrong value wins."""
-    blocks = [b for b in available_blocks(RIG, tuple(NOISE), SETTINGS.prepare) if b.name == "arm"]
+    blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start = named((), 400.0, {})
     value = replace(named((), 1.02, {}), wrong=("muscle.modulus_scale",))
     moved = {"muscle.modulus_scale": -10.0}

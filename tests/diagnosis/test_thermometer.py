@@ -259,10 +259,10 @@ def test_a_log_tells_the_temperature_of_the_gas_from_others(tmp_path: Path) -> N
 
 
 def test_a_thermometer_adds_its_block_and_changes_no_other() -> None:
-    rig, settings = parse_rig(TEXT), DiagnosisSettings().prepare
+    rig = parse_rig(TEXT)
     channels = ("valve_command", "supply_pressure", "muscle_pressure")
-    plain = {b.name: b for b in available_blocks(rig, channels, settings)}
-    more = {b.name: b for b in available_blocks(rig, (*channels, "temperature"), settings)}
+    plain = {b.name: b for b in available_blocks(rig, channels)}
+    more = {b.name: b for b in available_blocks(rig, (*channels, "temperature"))}
     assert set(more) - set(plain) == {"temperature"}
     assert more["supply"] == plain["supply"]
     # what the thermometer says of the beginning, a fit says without it
@@ -328,7 +328,7 @@ def test_a_rig_that_states_the_lag_of_its_thermometer_can_be_planned() -> None:
 def test_two_models_are_compared_where_only_one_has_a_temperature_of_its_gas() -> None:
     bare, settings = parse_rig(COEFFICIENTS), DiagnosisSettings()
     warm = bare.with_effect("heat_transfer")
-    experiment = library(bare, settings.next_experiment)[0]
+    experiment = library(bare, settings)[0]
     pair = [("with", warm, 0.5), ("without", bare, 0.5)]
     noise = {"muscle_pressure": 400.0, "temperature": 0.2}
     told = outcome_of(experiment, pair, noise, ("muscle_pressure", "temperature"), settings)

@@ -12,6 +12,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment import library
+from pamrs.diagnosis.next_experiment._differences import _PRESSURE_NOISE
 from pamrs.diagnosis.prepare import available_blocks, prepare, residual
 from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
@@ -35,7 +36,7 @@ def recorded(true: Rig, role: str, seed: int) -> Recording:
 
 
 def test_every_gauge_is_a_boundary() -> None:
-    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(RIG, CHANNELS)}
     assert list(blocks) == ["supply", "line", "chamber"]
     assert set(blocks["supply"].drives) == {"line_pressure", "valve_command"}
     assert set(blocks["line"].drives) == {"supply_pressure", "muscle_pressure", "valve_command"}
@@ -53,7 +54,7 @@ def test_every_gauge_is_a_boundary() -> None:
 
 def test_the_inlet_drives_the_chamber_where_the_valve_cannot() -> None:
     lacking = ("valve_command", "line_pressure", "muscle_pressure")  # a tank without a gauge
-    (chamber,) = available_blocks(RIG, lacking, SETTINGS.prepare)
+    (chamber,) = available_blocks(RIG, lacking)
     assert (chamber.name, chamber.drives) == ("chamber", ("line_pressure",))
     assert chamber.covers == "line and chamber"
     assert "valve.vent_conductance" not in chamber.parameters
@@ -64,7 +65,7 @@ def test_the_inlet_drives_the_chamber_where_the_valve_cannot() -> None:
 
 def test_without_that_gauge_valve_and_line_are_one() -> None:
     without = tuple(name for name in CHANNELS if name != "line_pressure")
-    blocks = {b.name: b for b in available_blocks(RIG, without, SETTINGS.prepare)}
+    blocks = {b.name: b for b in available_blocks(RIG, without)}
     assert list(blocks) == ["supply", "chamber"]
     assert set(blocks["chamber"].drives) == {"supply_pressure", "valve_command"}
     assert blocks["chamber"].covers == "valve, line and chamber"
@@ -84,7 +85,7 @@ def test_what_is_wrong_shows_between_its_gauges(
     wrong: dict[str, float], seen: dict[str, bool]
 ) -> None:
     prepared = prepare(recorded(RIG.with_parameters(wrong), "fit", 0), RIG, SETTINGS)
-    for block in available_blocks(RIG, CHANNELS, SETTINGS.prepare):
+    for block in available_blocks(RIG, CHANNELS):
         left = residual(block, core_rig(RIG), prepared, [])
         ratio = float(np.std(left.value[left.rows])) / left.noise
         assert (ratio > 2.0) == seen[block.name], (block.name, ratio)
@@ -92,7 +93,7 @@ def test_what_is_wrong_shows_between_its_gauges(
 
 def test_sensitivities_of_the_inlet_are_those_of_differences() -> None:
     prepared = prepare(recorded(RIG, "fit", 0), RIG, SETTINGS)
-    block = available_blocks(RIG, CHANNELS, SETTINGS.prepare)[1]
+    block = available_blocks(RIG, CHANNELS)[1]
     for name in ("valve.vent_conductance", "line.diameter", "line.inlet_volume"):
         value = RIG.parameter(name).value
         slope = residual(block, core_rig(RIG), prepared, [name]).jacobian
@@ -122,7 +123,7 @@ def test_a_small_leak_behind_the_line_is_named() -> None:
 @pytest.fixture
 def planned(monkeypatch: pytest.MonkeyPatch):
     """A plan with some channels, of one experiment and three effects."""
-    (triangle,) = pool = library(RIG, SETTINGS.next_experiment, only=["slow_triangle"])
+    (triangle,) = pool = library(RIG, SETTINGS, only=["slow_triangle"])
     monkeypatch.setattr(plan, "library", lambda *_: pool)
     names = ("leak_muscle", "valve_dead_zone", "valve_centre_leakage")
     monkeypatch.setattr(plan, "CATALOGUE", {name: EFFECTS[name] for name in names})
@@ -133,7 +134,7 @@ def test_a_plan_knows_the_gauge_in_front_of_the_line(planned) -> None:
     whole = planned(*CHANNELS)
     assert [block["name"] for block in whole.blocks] == ["supply", "line", "chamber"]
     assert whole.missing == []
-    assert whole.noise["line_pressure"] == SETTINGS.next_experiment.pressure_noise
+    assert whole.noise["line_pressure"] == _PRESSURE_NOISE
     assert whole.sight("valve_dead_zone").verdict == "seen"
     assert whole.sight("leak_muscle").block == "chamber"
     chamber = whole.blocks[-1]

@@ -29,7 +29,7 @@ SETTINGS = DiagnosisSettings()
 
 RIG = pamrs.rigs.shoulder()
 CHANNELS = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
-BLOCKS = {b.name: b for b in available_blocks(RIG, CHANNELS, SETTINGS.prepare)}
+BLOCKS = {b.name: b for b in available_blocks(RIG, CHANNELS)}
 HEALTHY = ("none", "parameters", "unlisted")
 
 
@@ -82,10 +82,10 @@ def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None
     assert judged[0].probability("valve_dead_zone") == pytest.approx(
         alone[0].probability("valve_dead_zone")
     )
-    found = case_probabilities(judged, SETTINGS.verdict)
+    found = case_probabilities(judged)
     assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
     assert found["unlisted"] < 0.03
-    assert case_ambiguity(judged, SETTINGS.verdict) == []
+    assert case_ambiguity(judged) == []
 
 
 def test_a_second_effect_in_another_block_lowers_nothing() -> None:
@@ -95,7 +95,7 @@ def test_a_second_effect_in_another_block_lowers_nothing() -> None:
     )
     assert judged[0].probabilities["leak_muscle"] == pytest.approx(0.92)
     # each is settled, although the two together are less so
-    assert case_ambiguity(judged, SETTINGS.verdict) == []
+    assert case_ambiguity(judged) == []
     assert {n for j in judged for n in j.named} == {"leak_muscle", "muscle_hysteresis"}
 
 
@@ -104,7 +104,7 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
     judged, _ = said(group("chamber", gas), group("arm", {"pressure_lag": 0.9, "unlisted": 0.1}))
     # what the arm tells of it counts in the chamber too
     assert judged[0].probability("pressure_lag") > 0.8
-    assert case_probabilities(judged, SETTINGS.verdict)["pressure_lag"] > 0.7
+    assert case_probabilities(judged)["pressure_lag"] > 0.7
     assert judged[1].probability("pressure_lag") > 0.9
 
 
@@ -148,12 +148,12 @@ def test_open_sets_stand_beside_what_is_settled() -> None:
         group("chamber", gas), group("arm", {"muscle_creep": 0.98, "unlisted": 0.02})
     )
     assert verdict == "effects"
-    assert case_ambiguity(judged, SETTINGS.verdict) == [
+    assert case_ambiguity(judged) == [
         ["leak_muscle", "muscle_creep"],
         ["chamber.dead_volume", "muscle_creep"],
     ]
     judged, _ = said(group("chamber", gas), group("arm", {"unlisted": 0.98, "muscle_creep": 0.02}))
-    assert case_ambiguity(judged, SETTINGS.verdict) == [["leak_muscle"], ["chamber.dead_volume"]]
+    assert case_ambiguity(judged) == [["leak_muscle"], ["chamber.dead_volume"]]
 
 
 def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
@@ -162,7 +162,7 @@ def test_a_wrong_parameter_is_the_verdict_parameters() -> None:
     )
     assert verdict == "parameters"
     assert judged[0].wrong == ("chamber.dead_volume",)
-    assert case_probabilities(judged, SETTINGS.verdict)["chamber.dead_volume"] > 0.9
+    assert case_probabilities(judged)["chamber.dead_volume"] > 0.9
     # and stays it where another block keeps something without a name; an effect comes first
     assert (
         said(group("chamber", {"chamber.dead_volume": 1.0}), group("arm", {"unlisted": 1.0}))[1]
@@ -206,13 +206,13 @@ def test_healthy_groups() -> None:
         group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}),
         group("arm", {"": 1.0}, moved={"arm.payload": 3.0}),
     )
-    assert case_ambiguity(judged, SETTINGS.verdict) == [["parameters"], ["unlisted"]]
+    assert case_ambiguity(judged) == [["parameters"], ["unlisted"]]
     # what is open in a block keeps that it may have no name
     judged, _ = said(
         group("chamber", {"valve_dead_zone": 1.0}),
         group("arm", {"muscle_creep": 0.5, "unlisted": 0.5}),
     )
-    assert sorted(case_ambiguity(judged, SETTINGS.verdict)) == [
+    assert sorted(case_ambiguity(judged)) == [
         ["muscle_creep", "valve_dead_zone"],
         ["valve_dead_zone", "unlisted"],
     ]
@@ -245,12 +245,12 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(
             if best >= 0.9
             else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
         )
-    sets = case_ambiguity(judged, SETTINGS.verdict)
+    sets = case_ambiguity(judged)
     assert len({tuple(s) for s in sets}) == len(sets)
     assert not sets or any(j.ambiguity for j in judged)
     # a set is names, maybe with what has none; or one word
     assert all(s and (len(s) == 1 or set(s).isdisjoint({"none", "parameters"})) for s in sets)
-    case = case_probabilities(judged, SETTINGS.verdict)
+    case = case_probabilities(judged)
     assert sum(case.values()) == pytest.approx(1.0)
     assert set(HEALTHY) <= set(case)
     named = [j.verdict for j in judged]

@@ -22,7 +22,7 @@ from tests.diagnosis import again
 
 SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
-BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE), SETTINGS.prepare)
+BLOCKS = available_blocks(RIG, ("valve_command", *again.NOISE))
 ARM = [b for b in BLOCKS if b.name == "arm"]
 BEFORE = 1e4
 
@@ -82,7 +82,7 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
     prior = 0.035
     for times in (0.0, 1.0, 10.0):
         found = hypothesis({"com_offset": {"angle": (times * prior, 1e-4)}}, 0.0)
-        assert unlikely(found, {}, SETTINGS.evidence) == pytest.approx(math.log1p(times**2))
+        assert unlikely(found, {}) == pytest.approx(math.log1p(times**2))
 
 
 @pytest.mark.parametrize(
@@ -169,7 +169,7 @@ def test_what_cannot_be_predicted_is_weighed_by_what_is_left(spoilt: np.ndarray)
 
 
 def test_room_beside_is_what_a_perfect_companion_could_gain() -> None:
-    evidence = SETTINGS.evidence
+    evidence = SETTINGS
     start = hypothesis({}, 1.0)
     rooms = [
         room_beside(hypothesis(CREEP, left), start, ARM, evidence)

@@ -18,7 +18,7 @@ from tests.diagnosis.test_overlap import KINDS, SENSORS, of, run
 
 Array = NDArray[np.float64]
 HERE = Path(__file__).parent
-SETTINGS = DiagnosisSettings().overlap
+SETTINGS = DiagnosisSettings()
 RANGES = {"supply_pressure": 16e5, "muscle_pressure": 16e5, "joint_angle": np.pi}
 
 ALTERED = (
@@ -69,7 +69,7 @@ def half(one: Recording, first: int, role: str) -> Recording:
 @pytest.mark.parametrize("name", ["14_copy_odd_even", "15_copy_10_bit"])
 def test_a_copy_is_no_proof(name: str) -> None:
     case = pamrs.load_case(HERE / name)
-    kept, said = without_copies(case.recordings, SETTINGS)
+    kept, said = without_copies(case.recordings)
     assert [one.role for one in kept] == ["fit"]
     assert re.search(r"^z \(.*z\.csv\) holds the same samples as a .*, noise included", said[0])
     assert "it is no held-out proof and was left out of it" in said[0]
@@ -85,12 +85,12 @@ def test_a_diagnosis_of_a_copy_says_that_there_is_no_proof() -> None:
 def test_a_repetition_on_the_same_steps_of_a_converter_is_a_proof() -> None:
     """Eight bits, noise of a sixth of a step: what the two share is the command's."""
     case = pamrs.load_case(HERE / "16_repeat_8_bit")
-    kept, said = without_copies(case.recordings, SETTINGS)
+    kept, said = without_copies(case.recordings)
     assert not said
     assert [one.role for one in kept] == ["fit", "held_out"]
     # one of them twice is a copy all the same
     again = replace(case.recordings[0], role="held_out")
-    assert len(without_copies([case.recordings[0], again], SETTINGS)[0]) == 1
+    assert len(without_copies([case.recordings[0], again])[0]) == 1
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -98,20 +98,20 @@ def test_a_repetition_on_the_same_steps_of_a_converter_is_a_proof() -> None:
 def test_a_copy_that_was_altered_is_found_and_a_repetition_is_not(how: str, kind: str) -> None:
     one, two = run(kind), run(kind, seed=2)
     copy = altered(one, how)
-    assert not [k for k in without_copies([one, copy], SETTINGS)[0] if k.role == "held_out"]
-    assert overlap(one, copy, SETTINGS) is not None
+    assert not [k for k in without_copies([one, copy])[0] if k.role == "held_out"]
+    assert overlap(one, copy) is not None
     if how != "reversed":
-        assert overlap(altered(two, how), one, SETTINGS) is None
-        assert overlap(altered(two, how), altered(one, how), SETTINGS) is None
+        assert overlap(altered(two, how), one) is None
+        assert overlap(altered(two, how), altered(one, how)) is None
 
 
 @pytest.mark.parametrize("kind", ["multisine", "steps", "fast"])
 def test_odd_and_even_samples_of_a_log_do_not_prove_each_other(kind: str) -> None:
     one = run(kind)
-    kept, _ = without_copies([half(one, 0, "fit"), half(one, 1, "held_out")], SETTINGS)
+    kept, _ = without_copies([half(one, 0, "fit"), half(one, 1, "held_out")])
     assert [r.role for r in kept] == ["fit"]
     again = half(run(kind, seed=2), 0, "held_out")
-    assert len(without_copies([half(one, 0, "fit"), again], SETTINGS)[0]) == 2
+    assert len(without_copies([half(one, 0, "fit"), again])[0]) == 2
 
 
 @pytest.mark.parametrize("name", SENSORS)
@@ -119,8 +119,8 @@ def test_odd_and_even_samples_of_a_log_do_not_prove_each_other(kind: str) -> Non
 def test_one_channel_of_a_repetition_may_be_the_copy(kind: str, name: str) -> None:
     one, two = run(kind), run(kind, seed=2)
     mixed = of("mixed", "held_out", one.sample_time, two.channels | {name: one.channels[name]})
-    assert len(without_copies([one, mixed], SETTINGS)[0]) == 1
-    assert len(without_copies([one, replace(two, role="held_out")], SETTINGS)[0]) == 2
+    assert len(without_copies([one, mixed])[0]) == 1
+    assert len(without_copies([one, replace(two, role="held_out")])[0]) == 2
 
 
 @pytest.mark.parametrize("seed", [0, 3, 5, 9])
@@ -140,4 +140,4 @@ def test_commands_in_many_sharp_steps_are_no_copies(seed: int) -> None:
             )
             for role in ("fit", "held_out")
         ]
-        assert len(without_copies(pair, SETTINGS)[0]) == 2
+        assert len(without_copies(pair)[0]) == 2

@@ -19,7 +19,7 @@ from pamrs.diagnosis.noise import excess, noise_levels
 from pamrs.diagnosis.prepare import available_blocks, prepare, without_rails
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import misread
-from pamrs.diagnosis.settings import DiagnosisSettings, PlausibilitySettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Case, Recording
 from pamrs.report import render_html
@@ -52,7 +52,7 @@ def test_what_a_recording_exceeds_is_no_end_of_its_sensor() -> None:
     one = case.recordings[0]
     higher = one.channels["muscle_pressure"] + 5e3
     one.channels["muscle_pressure"][:] = higher
-    kept, said = without_rails(case.recordings, PlausibilitySettings())
+    kept, said = without_rails(case.recordings)
     assert not said
     assert all(
         np.array_equal(k.channels["joint_angle"], r.channels["joint_angle"], equal_nan=True)
@@ -168,7 +168,7 @@ def _problem(case: Case) -> tuple[Problem, pamrs.Rig]:
     """The recordings as they are judged, and the rig."""
     settings = DiagnosisSettings()
     prepared = [prepare(r, case.rig, settings) for r in case.recordings]
-    blocks = available_blocks(case.rig, case.channels, settings.prepare)
+    blocks = available_blocks(case.rig, case.channels)
     return Problem(blocks, prepared, core_rig(case.rig), settings), case.rig
 
 
@@ -248,7 +248,7 @@ def test_two_recordings_of_eight_bits_leave_no_more_than_noise(pair: str, place:
     levels = noise_levels(problem, core_rig(fitted.rig))
     for block in problem.blocks:
         assert problem.recordings[0].steps[block.channel] > 0.0
-        own = excess(block, problem.recordings, fitted.residuals, levels, problem.settings.noise)
+        own = excess(block, problem.recordings, fitted.residuals, levels, problem.settings)
         assert own.ratio <= own.limit, block.name
 
 

@@ -11,7 +11,6 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.rig import parse_rig
 from tests.property.networks import MUSCLE, Blocks, rig_of
 
@@ -138,8 +137,7 @@ def test_a_rig_keeps_how_its_arm_is_mounted() -> None:
 def test_an_arm_is_fitted_by_its_mounting_and_its_joints_springs() -> None:
     channels = ("muscle_pressure.elbow", "muscle_pressure.wrist")
     channels += ("joint_angle.elbow", "joint_angle.wrist")
-    settings = DiagnosisSettings().prepare
-    blocks = available_blocks(pamrs.rigs.named("two_joint_arm"), channels, settings)
+    blocks = available_blocks(pamrs.rigs.named("two_joint_arm"), channels)
     arms = [block for block in blocks if block.kind == "arm"]
     assert len(arms) == 2
     wanted = {"arm.base_angle", "joint.elbow.stiffness", "joint.wrist.spring_angle"}

@@ -9,7 +9,6 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.rig import parse_rig
 
 SOFT, WARM = 4e-3, 313.15
@@ -67,7 +66,7 @@ def test_a_rig_keeps_it_and_an_arm_is_fitted_by_it() -> None:
     assert again.model == rig.model
     assert json.loads(again.to_json())["muscles"][0]["muscle"]["temperature"] == WARM
     channels = ("supply_pressure", "muscle_pressure", "joint_angle", "valve_command")
-    arm = available_blocks(rig, channels, DiagnosisSettings().prepare)[-1]
+    arm = available_blocks(rig, channels)[-1]
     assert {"muscle.softening", "muscle.temperature"} <= arm.parameters
 
 

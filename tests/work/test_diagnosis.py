@@ -103,7 +103,7 @@ def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.Mo
     rig = pamrs.rigs.shoulder()
     truth = rig.with_effect("muscle_hysteresis").with_parameters({"chamber.dead_volume": 1.7e-4})
     recordings = [prepare(recorded(truth, seed), rig, SETTINGS) for seed in (1, 2)]
-    blocks = available_blocks(rig, (*NOISE, "valve_command"), SETTINGS.prepare)
+    blocks = available_blocks(rig, (*NOISE, "valve_command"))
     work, counts = Work(monkeypatch), {}
     for kind in ("supply", "chamber", "arm"):
         chosen = [block for block in blocks if block.kind == kind]

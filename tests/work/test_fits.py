@@ -7,7 +7,6 @@ import pytest
 import scipy.optimize
 from numpy.typing import NDArray
 
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import levenberg_marquardt
 from pamrs.fit import fit_muscle
 from tests.fit.cases import TOLERANCE, measure, muscle
@@ -28,7 +27,7 @@ def test_evaluations_of_the_bounded_least_squares() -> None:
     for name, wall in boxes.items():
         bounds = (np.full(2, -10.0), np.full(2, wall))
         counts[f"valley, {name}"] = levenberg_marquardt(
-            rosenbrock, np.array([-1.2, 1.0]), bounds, 200, DiagnosisSettings().fit, 0.0
+            rosenbrock, np.array([-1.2, 1.0]), bounds, 200, 0.0
         )[2]
     compare("least_squares", counts)
 

@@ -66,6 +66,12 @@ from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
 
+# factor for effects on a joint whose geometry is marked unknown (decision 12)
+_UNKNOWN_GEOMETRY_PROBABILITY = 0.4
+# deviations by which noise may move a regulator's droop before its block is left out
+_REGULATOR_DROOP_SHIFT = 3.0
+
+
 Say = Callable[[str], None]
 
 
@@ -113,7 +119,7 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     That noise grows with the droop, so that a fit would take the droop towards zero to be rid of it
     (errors in variables).
     """
-    tables, most = rig.tables("supply"), problem.settings.prepare.regulator_droop_shift
+    tables = rig.tables("supply")
     drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
     regulated = [
         b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping
@@ -131,11 +137,12 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
         shift = math.sqrt(
             sum(max(0.0, gain) * p.n for gain, p in zip(gains, recordings, strict=True))
         )
-        if shift > most:
+        if shift > _REGULATOR_DROOP_SHIFT:
             found[block.name] = (
                 "only the difference of two measured pressures "
                 f"tells the regulator's flow, and their noise would move its droop by {shift:.2g} "
-                f"standard deviations; at most {most:g} is allowed (a flow meter would settle it)"
+                f"standard deviations; at most {_REGULATOR_DROOP_SHIFT:g} is allowed (a flow meter "
+                "would settle it)"
             )
     return found
 
@@ -225,14 +232,14 @@ def diagnose(
     chosen = DiagnosisSettings() if settings is None else settings
     try:
         case, held = _nominal(case, chosen)
-        alive, dead = without_dead_commands(case.recordings, case.rig, chosen.plausibility)
+        alive, dead = without_dead_commands(case.recordings, case.rig)
         case = replace(case, recordings=alive)
-        check_plausible(case.recordings, case.rig, case.name, chosen.plausibility)
+        check_plausible(case.recordings, case.rig, case.name, chosen)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
     case, clipped, masked = _sound(case, chosen)
-    seen = blocks_beside_tanks(case.rig, case.channels, chosen.prepare)
-    shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen.prepare)
+    seen = blocks_beside_tanks(case.rig, case.channels)
+    shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
@@ -268,11 +275,10 @@ def _physics(
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
     inner, outer = _judged_only(inner, outer, groups)
-    groups = [calibrated(group, inner.settings.verdict) for group in groups]
+    groups = [calibrated(group, inner.settings) for group in groups]
     unsettled = _unsettled(case.rig) if motion else []
-    factor = inner.settings.verdict.unknown_geometry_probability
     if unsettled:
-        groups = [_capped(group, factor) for group in groups]
+        groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
     say("putting the answer together")
     unjudged = [*unjudged, *_lost(every, inner)]
     diagnosis = assemble(case, inner, outer, groups, unjudged)
@@ -281,7 +287,7 @@ def _physics(
         told = (
             f"{', '.join(unsettled)}: marked unknown, and no fit moves them; a wrong one bends the "
             f"{what} as an effect would, so the probability of an effect of muscles and what they "
-            f"move is capped at {100 * factor:.0f} %"
+            f"move is capped at {100 * _UNKNOWN_GEOMETRY_PROBABILITY:.0f} %"
         )
         diagnosis = replace(diagnosis, warnings=[told, *diagnosis.warnings])
     return diagnosis, inner, unjudged
@@ -334,7 +340,7 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     """The case with the rig that its recordings were made on as far as that is known before any
     fit, and what that is, in words.
     """
-    rig, said = at_ambient(case.rig, case.recordings, settings.plausibility)
+    rig, said = at_ambient(case.rig, case.recordings, settings)
     told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
     return case.with_rig(without_passing(rig)), told
 
@@ -343,10 +349,10 @@ def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty],
     """The case with what its recordings cannot have measured masked or left out; what is said of
     sensors whose range ends, and of the rest.
     """
-    kept, clipped = without_rails(case.recordings, settings.plausibility)
-    kept, masked = without_impossible(kept, case.rig, settings.plausibility)
-    kept, copies = without_copies(kept, settings.overlap)
-    kept, unread = without_poor_thermometers(kept, case.rig, settings.prepare)
+    kept, clipped = without_rails(case.recordings)
+    kept, masked = without_impossible(kept, case.rig, settings)
+    kept, copies = without_copies(kept)
+    kept, unread = without_poor_thermometers(kept, case.rig)
     return replace(case, recordings=kept), clipped, [*copies, *masked, *unread]
 
 
@@ -433,13 +439,13 @@ def _problems(
     rig = case.rig
     fitted = [prepare(r, rig, settings) for r in case.fit or case.recordings]
     held = [prepare(r, rig, settings) for r in case.held_out if case.fit]
-    channels, least = case.channels, settings.prepare.least_block_share
-    blocks, core = blocks_beside_tanks(rig, channels, settings.prepare), core_rig(rig)
-    tanks = unread_tanks(rig, channels, settings.prepare)
+    channels, least = case.channels, settings.least_block_share
+    blocks, core = blocks_beside_tanks(rig, channels), core_rig(rig)
+    tanks = unread_tanks(rig, channels)
     fitted, held = ([with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held))
     fitted, held = ([with_own_values(blocks, core, p) for p in part] for part in (fitted, held))
     judged = {b.name for b in blocks}
-    every_block = unjudged_blocks(rig, channels, settings.prepare)
+    every_block = unjudged_blocks(rig, channels)
     without = [
         replace(block, why=f"{block.why}: its simulated pressure drives what it feeds")
         if any(gauge == dotted("supply_pressure", block.name.partition(".")[2]) for gauge in tanks)
@@ -484,5 +490,5 @@ def _problems(
     outer = replace(inner, recordings=held) if held else inner
     begun += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
     begun += said_of_tanks(rig, inner.blocks)
-    begun += said_of_own([*fitted, *held], settings.prepare)
+    begun += said_of_own([*fitted, *held])
     return inner, outer, unjudged, begun

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final
 
-from pamrs import report
+from pamrs import __version__, report
 from pamrs._writing import write_atomically
 from pamrs.channels import unit_of
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -155,7 +155,7 @@ class Diagnosis(Findings):
         and ``left``, the share that it leaves fitted alone (None where the predicted gain is too
         small).
     settings : DiagnosisSettings
-        The numbers that the verdict rests on.
+        What it was made with; the JSON holds what differs from the defaults, and ``version``.
 
     Raises
     ------
@@ -165,7 +165,7 @@ class Diagnosis(Findings):
 
     settings: DiagnosisSettings = field(
         default_factory=DiagnosisSettings,
-        metadata=told("the numbers that the verdict rests on, by step"),
+        metadata=told("the settings that differ from the defaults of `version`"),
     )
 
     @property
@@ -183,7 +183,8 @@ class Diagnosis(Findings):
             if f.metadata.get("json", True) and f.name != "settings"
         ]
         found = {name: to_plain(getattr(self, name)) for name in own}
-        return {"schema": SCHEMA, **found, "settings": self.settings.to_dict()}
+        told = {"settings": self.settings.to_dict(), "version": __version__}
+        return {"schema": SCHEMA, **found, **told}
 
     def to_json(self, path: str | os.PathLike[str] | None = None) -> str:
         """Return the result as strict JSON (schema `pamrs.diagnosis/2`).
@@ -418,7 +419,11 @@ def schema() -> dict[str, Any]:
             "Result of a diagnosis: which physics the simulation of a rig leaves out. All "
             "quantities in SI; null where the data give no number."
         ),
-        "required": ["schema", *found["required"]],
-        "properties": {"schema": {"const": SCHEMA}, **found["properties"]},
+        "required": ["schema", *found["required"], "version"],
+        "properties": {
+            "schema": {"const": SCHEMA},
+            **found["properties"],
+            "version": {"description": "version of pamrs that wrote it", "type": "string"},
+        },
         "$defs": definitions,
     }

@@ -90,7 +90,7 @@ FARTHEST = 3.0
 
 SETTLED = 0.75
 """Probability from which physics is said to lie outside the catalogue (that from which an answer is
-settled, `VerdictSettings.settled`)."""
+settled, `DiagnosisSettings.settled`)."""
 
 BUDGET_NOTE = (
     "Shares are of the variance that the nominal model leaves beyond the noise; all values are "

@@ -23,6 +23,7 @@ from pamrs.diagnosis.evidence._candidates import (
 )
 from pamrs.diagnosis.evidence._determined import determined, put_aside, stated, undetermined
 from pamrs.diagnosis.evidence._verdicts import (
+    WALL_TOLERANCES,
     Judged,
     calibrated,
     case_ambiguity,
@@ -33,6 +34,8 @@ from pamrs.diagnosis.evidence._verdicts import (
     symptoms_of,
 )
 from pamrs.diagnosis.evidence._weighing import (
+    FORM_SHARE_ALIKE,
+    STANDING_PRICE,
     Ranges,
     capped,
     explains,
@@ -50,6 +53,9 @@ from pamrs.diagnosis.evidence._weighing import (
 )
 
 __all__ = [
+    "WALL_TOLERANCES",
+    "FORM_SHARE_ALIKE",
+    "STANDING_PRICE",
     "Attempts",
     "Candidate",
     "Group",

@@ -15,6 +15,9 @@ import numpy as np
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
+    FINAL_STEP_SHARE,
+    FIT_BIN_TIME,
+    LEAST_START,
     Events,
     Fit,
     Key,
@@ -34,7 +37,7 @@ from pamrs.diagnosis.fit import (
     with_effects_of,
     without_term,
 )
-from pamrs.diagnosis.noise import Excess, NoiseLevel, excess, inflation
+from pamrs.diagnosis.noise import CORRELATED_VARIANCE, Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import left_out
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -52,6 +55,23 @@ __all__ = [
     "start_of",
     "without_autocorrelation",
 ]
+
+# share of impossible pressures behind a late gauge: slopes at smoothed edges are too large
+_EMPTIER_SHARE = 0.05
+# share of the highest pressure that is below ambient: a capillary's were by 13 to 16 %
+_EMPTIER_PART = 0.02
+_SEALED_EVALUATIONS = 30  # evaluations of a fit for a rig without a valve, which are cheap
+_POLISH_EVALUATIONS = 10  # evaluations of the last stretch of a fit (decision 22)
+# fits of a set weighted by what it leaves, while correlated variance falls (decision 103)
+_MOST_WEIGHTINGS = 4
+# deviations by which an effect's size may differ between recordings by its own uncertainty
+_SCATTER_STDS = 2.0
+# share of the nominal stable step below which no events are sought: too slow (decision 103)
+_LEAST_STEP_SHARE = 0.2
+_EVALUATIONS_BESIDE = 6  # evaluations of the fit of persistent effects beside events that are held
+_FIRST_EVALUATIONS = 5  # evaluations of such a fit (decision 13)
+# evaluations of a freed parameter's first fit: is it worth a whole one (decision 25)
+_WRONG_PARAMETERS_FIRST_EVALUATIONS = 6
 
 
 Found = TypeVar("Found")
@@ -274,7 +294,7 @@ class Attempts:
 
     def start_of(self, found: Fit, effect: str) -> Start:
         """Where another fit goes on from an effect as it was fitted."""
-        return start_of(found, effect, self.settings.fit.least_start)
+        return start_of(found, effect, LEAST_START)
 
     def transient(self, effect: str, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the
@@ -284,7 +304,7 @@ class Attempts:
             return None  # it would replace what it is to happen beside
         if beside.fit.events is not None or beside.wrong:
             return None  # what happens beside other events, or wrong values, is not fitted
-        stiffest = self.settings.transients.least_step_share * self.inner.core.stable_step
+        stiffest = _LEAST_STEP_SHARE * self.inner.core.stable_step
         if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
             return None  # it would take too long
         return self._tried((*beside.names, effect), lambda: self._transient(effect, beside))
@@ -330,7 +350,7 @@ class Attempts:
             autocorrelation,
             warm,
             events=found.events,
-            evaluations=self.settings.transients.evaluations_beside,
+            evaluations=_EVALUATIONS_BESIDE,
         )
         parts = {
             n: (found.values[n], found.std[n])
@@ -347,7 +367,7 @@ class Attempts:
 
     def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
         """What a block keeps of some recordings."""
-        return excess(block, problem.recordings, found, self.noise_level, self.settings.noise)
+        return excess(block, problem.recordings, found, self.noise_level, self.settings)
 
     def judged(
         self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None
@@ -393,7 +413,6 @@ class Attempts:
             (self.inner.recordings, inside),
             (self.outer.recordings, outside),
             self.noise_level,
-            self.settings.evidence,
         )
 
     def terms_of(self, effect: str) -> list[str]:
@@ -417,13 +436,13 @@ class Attempts:
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(id_of(e) for e in effects):
             return None  # it would replace what the model holds
-        settings, sealed = self.settings.fit, self.nominal.model["valve"] is None
-        limit = settings.sealed_evaluations if sealed else settings.effect_evaluations
+        settings, sealed = self.settings, self.nominal.model["valve"] is None
+        limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
 
         def found() -> Candidate:
             best = self._fit(starts, autocorrelation, warm, evaluations=limit, share=share)
             weights = self.autocorrelation(best)
-            if max(weights.values()) > self.settings.noise.correlated_variance:
+            if max(weights.values()) > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
                 best = self._fit(again, weights, best, evaluations=limit, share=share)
             return self.judged(effects, best)
@@ -439,10 +458,9 @@ class Attempts:
         effects = tuple(start.effect for start in starts)
         if not self.held.isdisjoint(id_of(e) for e in effects):
             return None
-        limit = self.settings.search.first_evaluations
 
         def found() -> Candidate:
-            short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=limit)
+            short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
             return replace(self.judged(effects, short), wrong=wrong)
 
         return self._tried((*effects, *wrong), found)
@@ -499,8 +517,7 @@ class Attempts:
 
         From the nominal values a fit of all of them together is soon at the walls of the others.
         """
-        settings = self.settings
-        known = known_parameters(self.nominal, settings.fit)
+        known = known_parameters(self.nominal)
         others = [n for n in free_baseline(self.inner, self.nominal) if n not in names]
         return fit(
             self.inner,
@@ -510,7 +527,7 @@ class Attempts:
             self.white,
             freed=names,
             settled={n: known[n].value for n in others},
-            evaluations=settings.wrong_parameters.first_evaluations,
+            evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
         )
 
     def freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
@@ -527,7 +544,7 @@ class Attempts:
                 self.white,
                 warm=self._moved_alone(names),
                 freed=names,
-                evaluations=self.settings.wrong_parameters.first_evaluations,
+                evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
             )
             return replace(self.judged((), short), wrong=names)
 
@@ -544,7 +561,7 @@ class Attempts:
         ``share`` is as in :meth:`fitted`.
         """
         settings = self.settings
-        least = settings.fit.final_step_share if share is None else share
+        least = FINAL_STEP_SHARE if share is None else share
 
         def fitted(autocorrelation: dict[str, float], begun: Fit) -> Fit:
             return fit(
@@ -555,14 +572,14 @@ class Attempts:
                 autocorrelation,
                 warm=begun,
                 freed=names,
-                evaluations=settings.fit.baseline_evaluations,
+                evaluations=settings.baseline_evaluations,
                 share=least,
             )
 
         def found(alone: bool) -> Candidate:
             first = fitted(self.white, self._moved_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
-            correlated = max(autocorrelation.values()) > settings.noise.correlated_variance
+            correlated = max(autocorrelation.values()) > CORRELATED_VARIANCE
             judged = self.judged((), fitted(autocorrelation, first) if correlated else first)
             return replace(judged, wrong=names)
 
@@ -586,10 +603,10 @@ class Attempts:
         """
         if not wrong:
             return self.fitted(starts, warm, self.white)
-        limit = self.settings.fit.effect_evaluations
+        limit = self.settings.effect_evaluations
         names = (*(start.effect for start in starts), *wrong)
         found = self._tried(names, lambda: self._gone_on(starts, warm, wrong, limit))
-        if found is None or not found.is_wrong(self.settings.fit.most_tolerances):
+        if found is None or not found.is_wrong(self.settings.most_tolerances):
             return None
         return found
 
@@ -607,10 +624,10 @@ class Attempts:
         """Effects fitted to the end from a fit, with some parameters freed; None where that cannot
         be run.
         """
-        settings = self.settings.fit
-        limit, share = settings.polish_evaluations, settings.final_step_share
         names = (*(start.effect for start in starts), *wrong)
-        return self._tried(names, lambda: self._gone_on(starts, warm, wrong, limit, share))
+        return self._tried(
+            names, lambda: self._gone_on(starts, warm, wrong, _POLISH_EVALUATIONS, FINAL_STEP_SHARE)
+        )
 
     def _gone_on(
         self,
@@ -623,7 +640,7 @@ class Attempts:
         """Effects fitted on from a fit, with some parameters freed."""
         effects = tuple(start.effect for start in starts)
         weights, found = self.autocorrelation(warm), warm
-        for _ in range(self.settings.fit.most_weightings):
+        for _ in range(_MOST_WEIGHTINGS):
             found = self._fit(
                 starts, weights, found, wrong=wrong, evaluations=evaluations, share=share
             )
@@ -637,8 +654,7 @@ class Attempts:
         """Whether a fit leaves so much less autocorrelation than it was weighted by that it ended
         before its end.
         """
-        times = self.settings.noise.correlated_variance
-        return any(times * now < weights[block] for block, now in left.items())
+        return any(CORRELATED_VARIANCE * now < weights[block] for block, now in left.items())
 
     def united(self, candidates: list[Candidate]) -> Fit | None:
         """One fit with everything that some hypotheses name, each for a block of its own; None
@@ -653,10 +669,9 @@ class Attempts:
             values=candidates[0].fit.values
             | {n: c.fit.values[n] for c in candidates for n in c.wrong},
         )
-        share = self.settings.fit.final_step_share
         names = (*(start.effect for start in starts), *wrong)
         return self._tried(
-            names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=share)
+            names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=FINAL_STEP_SHARE)
         )
 
     def polished(self, candidate: Candidate) -> Candidate:
@@ -682,9 +697,9 @@ def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
 
 def autocorrelation_of(problem: Problem, found: Fit) -> dict[str, float]:
     """Weights of the autocorrelation that a fit leaves in each block."""
-    width = problem.settings.noise.fit_bin_time
     return {
-        b.name: inflation(b, problem.recordings, found.residuals, width) for b in problem.blocks
+        b.name: inflation(b, problem.recordings, found.residuals, FIT_BIN_TIME)
+        for b in problem.blocks
     }
 
 
@@ -740,7 +755,6 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
     slope of that) lie below the ambient for a while, where nothing that was recorded does: such a
     lag stands for how the chamber empties.
     """
-    settings = problem.settings.evidence
     for entry in found.rig.effects:
         if "reading" not in ports_of(entry) or term_in(entry) not in found.effects:
             continue
@@ -755,9 +769,9 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
                     continue
                 if entry.get("at", "") not in ("", block):
                     continue
-                behind = np.quantile((value + lag * slope)[rows], settings.emptier_share)
+                behind = np.quantile((value + lag * slope)[rows], _EMPTIER_SHARE)
                 lowest, highest = value[rows].min(), value[rows].max()
-                if behind < min(0.0, lowest) - settings.emptier_part * highest:
+                if behind < min(0.0, lowest) - _EMPTIER_PART * highest:
                     return True
     return False
 
@@ -770,7 +784,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     """
     if len(effects) != 1 or len(problem.recordings) < 2:
         return 0.0
-    info, settings = info_of(effects[0]), problem.settings
+    info = info_of(effects[0])
     leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
     # of a transient effect one size was fitted to all recordings
     if info.transient or leading is None:
@@ -787,7 +801,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             if r.jacobian is None or not acts_in(effects[0], block):
                 continue
             slope = r.jacobian[:, 0] / r.noise
-            unit = inflation(block, [prepared], found, settings.noise.fit_bin_time)
+            unit = inflation(block, [prepared], found, FIT_BIN_TIME)
             num += float(slope @ (r.value / r.noise)) / unit
             den += float(slope @ slope) / unit
         if den > 0:
@@ -795,7 +809,5 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
             errors.append(1.0 / math.sqrt(den) / size)
     if len(steps) < 2:
         return 0.0
-    beyond = [
-        max(0.0, abs(s) - settings.fit.scatter_stds * e) for s, e in zip(steps, errors, strict=True)
-    ]
+    beyond = [max(0.0, abs(s) - _SCATTER_STDS * e) for s, e in zip(steps, errors, strict=True)]
     return float(max(beyond))

@@ -9,17 +9,19 @@ from scipy.stats import chi2
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group
 from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
-from pamrs.diagnosis.settings import EvidenceSettings
 from pamrs.effects import info_of
 
 __all__ = ["determined", "put_aside", "stated", "undetermined"]
+
+# stated deviations within which a size is not determined; a stated one is twice the pieces'
+_DETERMINED_STDS = 1.0
 
 
 def stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
     """A fit with standard deviations that hold for residuals that are no noise; and, of what no
     prior holds, for equations that are not quite the rig's.
     """
-    own, factor = replace(problem, blocks=group.blocks), problem.settings.verdict.spread_factor
+    own, factor = replace(problem, blocks=group.blocks), problem.settings.spread_factor
     known = candidate.fit.held_by_prior
     std = {
         name: spread * (1.0 if name in known else factor)
@@ -55,10 +57,10 @@ def determined(group: Group, problem: Problem) -> Group:
     found = dict(group.probabilities)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.key, 0.0)
-        if not candidate.effects or chance < settings.verdict.in_set:
+        if not candidate.effects or chance < settings.in_set:
             continue
         own = stated(problem, group, candidate)
-        unknown = set(undetermined(own, settings.evidence))
+        unknown = set(undetermined(own))
         if not unknown:
             continue
         rest = keys.get(frozenset(candidate.names) - unknown)
@@ -69,7 +71,7 @@ def determined(group: Group, problem: Problem) -> Group:
     return replace(group, probabilities=found)
 
 
-def undetermined(candidate: Candidate, settings: EvidenceSettings) -> list[str]:
+def undetermined(candidate: Candidate) -> list[str]:
     """Effects of a set whose sizes, all together, are not told from none by its standard
     deviations: with their shapes as uncertain as they are.
 
@@ -99,7 +101,7 @@ def undetermined(candidate: Candidate, settings: EvidenceSettings) -> list[str]:
             continue
         spread = spread * np.outer(std / narrow, std / narrow)
         distance = own @ np.linalg.pinv(spread, hermitian=True) @ own
-        if chi2.sf(distance, len(at)) > chi2.sf(settings.determined_stds**2, 1):
+        if chi2.sf(distance, len(at)) > chi2.sf(_DETERMINED_STDS**2, 1):
             out.append(effect)
     return out
 

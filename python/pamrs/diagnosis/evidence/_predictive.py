@@ -18,9 +18,16 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
-from pamrs.diagnosis.settings import EvidenceSettings
 
 __all__ = ["Densities", "bootstrapped", "log_densities"]
+
+# order of the autoregression of what a hypothesis leaves (decision 14: 1, 2, 4 and 8 do alike)
+_PREDICTIVE_ORDER = 4
+# [s] stretches drawn, longer than a joint's start; 3 and 6 s do alike (decision 14)
+_PREDICTIVE_STRETCH = 3.0
+_PREDICTIVE_DRAWS = 1000  # draws of the bootstrap (a share is then known to 2 %)
+_PREDICTIVE_SEED = 0  # seed of the bootstrap (any)
+
 
 Array = NDArray[np.float64]
 Densities = Mapping[str, Array]
@@ -32,7 +39,6 @@ def log_densities(
     fitted: tuple[list[Prepared], Mapping[Key, Residual]],
     held_out: tuple[list[Prepared], Mapping[Key, Residual]],
     noise_level: Mapping[Key, NoiseLevel],
-    settings: EvidenceSettings,
 ) -> Densities:
     """Logarithms of the density of what a hypothesis leaves, by block and stretch of time.
 
@@ -45,8 +51,6 @@ def log_densities(
         recording as the others predict it is ``held_out``, and counts alone.
     noise_level : dict of NoiseLevel
         By block and recording.
-    settings : EvidenceSettings
-        Order of the autoregression, length of a stretch [s].
     """
     same = held_out[0] is fitted[0]
     found = {}
@@ -59,13 +63,13 @@ def log_densities(
             ]
             for recordings, left in (fitted, held_out)
         )
-        weights, variance = _autoregression([z for z, _ in inside], settings.predictive_order)
+        weights, variance = _autoregression([z for z, _ in inside], _PREDICTIVE_ORDER)
         judged = outside if same else [*outside, *inside]
         found[block.name] = np.array(
             [
                 density
                 for z, dt in judged
-                for density in _stretches(z, weights, variance, settings.predictive_stretch / dt)
+                for density in _stretches(z, weights, variance, _PREDICTIVE_STRETCH / dt)
             ]
         )
     return found
@@ -113,7 +117,7 @@ def _stretches(z: Array, weights: Array, variance: float, bins: float) -> list[f
     return [float(each[first : first + length].sum()) for first in range(0, each.size, length)]
 
 
-def bootstrapped(scores: Array, priors: Array, settings: EvidenceSettings) -> Array:
+def bootstrapped(scores: Array, priors: Array) -> Array:
     """Weights (k,) of hypotheses, which add up to one.
 
     Parameters
@@ -122,12 +126,10 @@ def bootstrapped(scores: Array, priors: Array, settings: EvidenceSettings) -> Ar
         Logarithm of the density of each of n stretches under each of k hypotheses.
     priors : (k,) array
         Logarithm of what each weighs before any stretch.
-    settings : EvidenceSettings
-        Number of draws.
     """
     count = scores.shape[1]
-    rng = np.random.default_rng(settings.predictive_seed)
-    drawn = count * rng.dirichlet(np.ones(count), settings.predictive_draws)
+    rng = np.random.default_rng(_PREDICTIVE_SEED)
+    drawn = count * rng.dirichlet(np.ones(count), _PREDICTIVE_DRAWS)
     total = drawn @ scores.T + priors
     weights = np.exp(total - total.max(axis=1, keepdims=True))
     shares: Array = (weights / weights.sum(axis=1, keepdims=True)).mean(axis=0)

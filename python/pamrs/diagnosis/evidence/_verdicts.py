@@ -14,11 +14,12 @@ from dataclasses import dataclass, replace
 
 from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
 from pamrs.diagnosis.evidence._weighing import paid_for
-from pamrs.diagnosis.settings import DiagnosisSettings, VerdictSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import exclude, is_effect
 from pamrs.findings import HEALTHY
 
 __all__ = [
+    "WALL_TOLERANCES",
     "Judged",
     "calibrated",
     "case_ambiguity",
@@ -28,6 +29,27 @@ __all__ = [
     "judge",
     "symptoms_of",
 ]
+
+# odds of one effect that acts in two groups of blocks to two effects (decision 4)
+_SHARED_ODDS = 6.0
+_ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
+# share of the larger by which values differ however well known, as models err: a factor of two
+_ALIKE_SHARE = 0.5
+# probability from which a case lists a set: most products of several blocks are nothing
+_LISTED = 1e-4
+_COUNTED = 1e-6  # probability from which a hypothesis of one group is put beside those of others
+_MOST_SETS = 8  # sets that a case lists
+# probability of parameters (none) in a group that keeps noise: the rest (decision 4)
+_QUIET_LIKELY = 0.83
+_QUIET_OTHER = 0.03  # probability of the other one of the two (decision 4)
+# probability of unlisted in such a group, too small to see: 24 of 171 groups (decision 4)
+_QUIET_UNLISTED = 0.14
+# parameters with one at its wall: explained, at a price the owner would mind (decision 4)
+_STRAINED_PARAMETERS = 0.75
+_STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
+# [tolerances] moved to its wall (fit.most_tolerances), which is suspect (decision 25)
+WALL_TOLERANCES = 2.9
+
 
 WITHOUT_NAME = (*HEALTHY, "unlisted")
 """Hypotheses that name nothing."""
@@ -80,15 +102,16 @@ def is_parameter(name: str) -> bool:
     return "." in name
 
 
-def symptoms_of(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
+def symptoms_of(group: Group) -> dict[str, float]:
     """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
-    wall = settings.wrong_parameters.wall_tolerances
     return {
-        name: moved for name, moved in group.candidates[0].fit.moved.items() if abs(moved) >= wall
+        name: moved
+        for name, moved in group.candidates[0].fit.moved.items()
+        if abs(moved) >= WALL_TOLERANCES
     }
 
 
-def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
+def _own(group: Group) -> dict[str, float]:
     """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing
     and parameters that moved.
     """
@@ -96,22 +119,21 @@ def _own(group: Group, settings: DiagnosisSettings) -> dict[str, float]:
     unchanged = group.probabilities.get("", 0.0)
     shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong for c in group.candidates)
-    own = settings.verdict
     quiet = {
-        "parameters": own.quiet_likely,
-        "none": own.quiet_other,
-        "unlisted": own.quiet_unlisted,
+        "parameters": _QUIET_LIKELY,
+        "none": _QUIET_OTHER,
+        "unlisted": _QUIET_UNLISTED,
     }
-    if symptoms_of(group, settings) and group.mismatch is None and not explained:
-        quiet = {"parameters": own.strained_parameters, "unlisted": own.strained_unlisted}
+    if symptoms_of(group) and group.mismatch is None and not explained:
+        quiet = {"parameters": _STRAINED_PARAMETERS, "unlisted": _STRAINED_UNLISTED}
     elif not shifted:
-        quiet |= {"none": own.quiet_likely, "parameters": own.quiet_other}
+        quiet |= {"none": _QUIET_LIKELY, "parameters": _QUIET_OTHER}
     for name, share in quiet.items():
         found[name] = found.get(name, 0.0) + unchanged * share
-    return {key: p for key, p in found.items() if p >= own.counted or key in WITHOUT_NAME}
+    return {key: p for key, p in found.items() if p >= _COUNTED or key in WITHOUT_NAME}
 
 
-def calibrated(group: Group, settings: VerdictSettings) -> Group:
+def calibrated(group: Group, settings: DiagnosisSettings) -> Group:
     """A group whose probabilities are as often right as they say.
 
     Where hypotheses compete for a mismatch, the logarithm of the odds between any two of them
@@ -134,7 +156,7 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
     settings : DiagnosisSettings
         Odds of what is shared, probabilities from which something is named or left open.
     """
-    own = [_own(group, settings) for group in groups]
+    own = [_own(group) for group in groups]
     beside: list[dict[str, float]] = [{} for _ in groups]
     several = _in_several(own)
     fitted = [{c.key: c for c in group.candidates} for group in groups]
@@ -154,7 +176,7 @@ def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
         for found, (key, _) in zip(beside, choice, strict=True):
             found[key] = found.get(key, 0.0) + weight
     return [
-        _judged(group, _normalised(found), settings.verdict)
+        _judged(group, _normalised(found), settings)
         for group, found in zip(groups, beside, strict=True)
     ]
 
@@ -174,24 +196,24 @@ def _odds_shared(
     What is there once is paid for once: the dearest price stays, the others are given back. Where
     the groups ask for other values, they are two.
     """
-    if len(holders) < 2 or not _alike(name, [c for _, c in holders], settings.verdict):
+    if len(holders) < 2 or not _alike(name, [c for _, c in holders]):
         return 1.0
     prices = [
         paid_for(c, name, settings)
         for group, c in holders
         if group.mismatch is not None and not group.below_noise
     ]
-    again = settings.verdict.certainty * (sum(prices) - max(prices, default=0.0))
-    return settings.verdict.shared_odds ** (len(holders) - 1) * math.exp(again)
+    again = settings.certainty * (sum(prices) - max(prices, default=0.0))
+    return _SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 
-def _alike(name: str, candidates: Sequence[Candidate], settings: VerdictSettings) -> bool:
+def _alike(name: str, candidates: Sequence[Candidate]) -> bool:
     """Whether hypotheses give one name the same values, as far as each knows them."""
 
     def same(parameter: str, one: Candidate, two: Candidate) -> bool:
         first, second = one.fit.values[parameter], two.fit.values[parameter]
         spread = math.hypot(*(c.fit.std.get(parameter, math.inf) for c in (one, two)))
-        known = settings.alike_stds * spread, settings.alike_share * max(abs(first), abs(second))
+        known = _ALIKE_STDS * spread, _ALIKE_SHARE * max(abs(first), abs(second))
         return abs(first - second) <= max(known)
 
     return all(
@@ -213,7 +235,7 @@ def _normalised(weights: dict[str, float]) -> dict[str, float]:
     return dict(sorted(((key, w / total) for key, w in weights.items()), key=lambda kv: -kv[1]))
 
 
-def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSettings) -> Judged:
+def _judged(group: Group, probabilities: dict[str, float], settings: DiagnosisSettings) -> Judged:
     """The verdict: that of the most probable hypothesis; without a name only if no single name is
     more probable than not.
     """
@@ -236,7 +258,7 @@ def _judged(group: Group, probabilities: dict[str, float], settings: VerdictSett
     )
 
 
-def _sets(probabilities: dict[str, float], settings: VerdictSettings) -> list[list[str]]:
+def _sets(probabilities: dict[str, float], settings: DiagnosisSettings) -> list[list[str]]:
     """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and
     ``parameters`` being one answer.
     """
@@ -258,7 +280,7 @@ def case_verdict(judged: Sequence[Judged]) -> str:
     return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
 
 
-def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> dict[str, float]:
+def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
     """Probabilities of the possible answers for a case: the names of all its blocks together.
 
     ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a
@@ -271,12 +293,10 @@ def case_probabilities(judged: Sequence[Judged], settings: VerdictSettings) -> d
         rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
         key = "+".join(names) or rest
         found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised(
-        {key: p for key, p in found.items() if p >= settings.listed or key in WITHOUT_NAME}
-    )
+    return _normalised({key: p for key, p in found.items() if p >= _LISTED or key in WITHOUT_NAME})
 
 
-def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[list[str]]:
+def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
     """Sets of names that a case leaves open: the open sets of its blocks, each beside what is
     settled in the others.
     """
@@ -295,7 +315,7 @@ def case_ambiguity(judged: Sequence[Judged], settings: VerdictSettings) -> list[
         ]
         if entry and entry not in found:
             found.append(entry)
-    return found[: settings.most_sets] if len(found) > 1 else []
+    return found[:_MOST_SETS] if len(found) > 1 else []
 
 
 def _names(keys: Iterable[str]) -> list[str]:

@@ -15,10 +15,12 @@ from pamrs.diagnosis.evidence._predictive import bootstrapped
 from pamrs.diagnosis.fit import Problem, form_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in, usual_values
 
 __all__ = [
+    "FORM_SHARE_ALIKE",
+    "STANDING_PRICE",
     "capped",
     "explains",
     "log_weight",
@@ -34,6 +36,48 @@ __all__ = [
     "visited",
     "weigh",
 ]
+
+# log odds of explained variance, as probable as unlisted: a name carries half (decision 14)
+_LOG_ODDS_EXPLAINED = 0.0
+# the same of what takes up much of anything, 7 % left: events, parameters (decision 14)
+_LOG_ODDS_EXPLAINED_PLIABLE = 2.6
+_SOFTNESS = 0.4  # [log odds] width of that transition (decision 14)
+# [log odds] odds to unlisted that a set has at the least where it leaves only noise
+_LOG_ODDS_NOISE_LEFT = 3.0
+# share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
+_CLEAR_SHARE = 0.7
+# independent looks that a block's residual counts for (decision 14: tuned on seed 501)
+_LOOKS = 12.0
+# looks at what is left whatever a form is granted: the smaller wins (decision 14)
+_LOOKS_WITHIN = 1.0
+# share of names' odds by predictive density, the rest by what is left (decision 14)
+_PREDICTIVE_SHARE = 0.5
+# excess over noise from which a recording tests what an effect leaves (decision 14)
+_TELLING_EXCESS = 0.5
+_TELLING_SHARE = 0.9  # share of the largest excess from which recordings always are
+FORM_SHARE_ALIKE = 0.01  # form_share where sets of as many effects are compared (decision 20)
+_NOISE_ERROR = 0.06  # standard deviation of a noise level (decision 22)
+# [log odds] the most that what is left in one block, or the priors, count (decisions 22, 25)
+_DECIDED = 8.0
+# log odds: an effect like another, as a parameter is near zero; 7 to 1 (decision 20)
+STANDING_PRICE = 2.0
+_SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
+# [standard deviations] standard deviations within which a value is not told from zero
+_SAME_STDS = 2.0
+# [recordings] lengths of the longest recording beyond which a time constant was not seen
+_UNSEEN_LENGTHS = 3.0
+# [log odds] price of an effect with such a time constant, or with one that is not told from zero
+_UNSEEN_PRICE = 6.5
+# relative scatter of an effect's size between recordings beyond which it is not that effect
+_SCATTER = 0.35
+_SCATTER_WIDTH = 0.1  # further scatter that costs one unit of log odds
+# factor by which a value is one standard deviation outside its usual range (decision 22)
+_RANGE_FACTOR = 3.0
+# [log odds] the most that a value outside its usual range costs (decision 22)
+_MOST_RANGE_PRICE = 4.0
+# share of the range that was visited over which a contact may act (decision 22)
+_CONTACT_SHARE = 0.5
+_CONTACT_WIDTH = 0.15  # share beyond that which costs a standard deviation (decision 22)
 
 
 Ranges = dict[str, tuple[float, float]]
@@ -63,7 +107,7 @@ def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: boo
     ``alone`` says that the chamber is sealed and nothing is held out, ``left`` what the refit
     leaves of the channel.
     """
-    settings = fitted.settings.evidence
+    settings = fitted.settings
     if not alone or mismatch.channel != "muscle_pressure":
         return settings.most_probability
     typical = np.mean([np.mean(np.abs(p.signals["muscle_pressure"][0])) for p in fitted.recordings])
@@ -71,9 +115,7 @@ def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: boo
     return settings.drift_probability if drifts else settings.most_probability
 
 
-def share_left(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
-) -> float:
+def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
     """Share of the baseline's excess variance that a set of effects leaves in recordings that it
     was not fitted to.
 
@@ -83,14 +125,13 @@ def share_left(
     the larger share of the two counts.
     """
     (was, now), (before, after) = _excesses(candidate, baseline, suspects)
-    telling = settings.telling_excess
-    if candidate.fit.events is not None and min(was, before) > telling:
+    if candidate.fit.events is not None and min(was, before) > _TELLING_EXCESS:
         return max(now / was, after / before)
-    if before > min(telling, settings.telling_share * max(was, before)):
+    if before > min(_TELLING_EXCESS, _TELLING_SHARE * max(was, before)):
         return after / before
     shares = [now / was] if was > 0.0 else []
-    if after > telling:
-        shares.append((after - telling) / max(was, telling))
+    if after > _TELLING_EXCESS:
+        shares.append((after - _TELLING_EXCESS) / max(was, _TELLING_EXCESS))
     return max(shares, default=1.0)
 
 
@@ -108,15 +149,13 @@ def _excesses(
     ]
 
 
-def explains(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
-) -> bool:
+def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> bool:
     """Whether only noise is left, fitted and held out, where there was clearly more."""
     quiet = not any(
         significant(e[b.name]) for b in suspects for e in (candidate.fitted, candidate.held_out)
     )
     before, after = max(_excesses(candidate, baseline, suspects))
-    return quiet and after < settings.clear_share * before
+    return quiet and after < _CLEAR_SHARE * before
 
 
 def weigh(
@@ -156,21 +195,18 @@ def weigh(
     in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
     not all the suspects.
     """
-    named = [c for c in candidates if c.names and not _absent(c, settings.evidence)]
+    named = [c for c in candidates if c.names and not _absent(c)]
     if not named:
         return {"unlisted": 1.0}
     start = candidates[0]
-    evidence = settings.evidence
-    odd = {c: unlikely(c, ranging or {}, evidence) for c in named}
-    against = {c: _against(c, seconds, odd[c], evidence) for c in named}
+    odd = {c: unlikely(c, ranging or {}) for c in named}
+    against = {c: _against(c, seconds, odd[c]) for c in named}
 
     plain = _plain(named, start, suspects, against, settings)
     value = _leading_value(plain)
     trusted = {
         c: min(
-            _trusted(
-                one, other, suspects if own is None else own[c], most, seconds, odd[c], evidence
-            )
+            _trusted(one, other, suspects if own is None else own[c], most, seconds, odd[c])
             for one, other in _explained_by(c, start, plain)
         )
         for c in named
@@ -181,27 +217,27 @@ def weigh(
         top = max(scores.values())
         return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
 
-    coarse, fine = weights_of(evidence.form_share), weights_of(evidence.form_share_alike)
+    coarse, fine = weights_of(settings.form_share), weights_of(FORM_SHARE_ALIKE)
     weights: dict[Candidate, float] = {}
     for count in {len(c.names) for c in named}:
         alike = [c for c in named if len(c.names) == count]
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
-    weights = _between_places(weights, suspects, evidence)
+    weights = _between_places(weights, suspects)
     out = _trusted_parts(weights, trusted)
-    lost = _lost_by_priors(plain, evidence)
+    lost = _lost_by_priors(plain)
     prior = {c: -(_before(c, settings) + against[c] + lost[c] + _of_events(c)) for c in named}
-    predicted = _by_prediction(prior, suspects, evidence)
+    predicted = _by_prediction(prior, suspects)
     if predicted is not None:
-        by_prediction, share = _trusted_parts(predicted, trusted), evidence.predictive_share
+        by_prediction, share = _trusted_parts(predicted, trusted), _PREDICTIVE_SHARE
         out = {key: (1.0 - share) * p + share * by_prediction[key] for key, p in out.items()}
-    _shared_out(out, named, start, suspects, seconds, evidence)
+    _shared_out(out, named, start, suspects, seconds)
     out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
 def _by_prediction(
-    prior: Mapping[Candidate, float], suspects: list[Block], settings: EvidenceSettings
+    prior: Mapping[Candidate, float], suspects: list[Block]
 ) -> dict[Candidate, float] | None:
     """Weights of sets by how probable each makes every stretch of the recordings; None where that
     is not known of all of them. ``prior`` is the logarithm of what each weighs before.
@@ -215,7 +251,7 @@ def _by_prediction(
     scores = np.array(rows)
     if scores.size == 0 or not np.isfinite(scores).all():
         return None
-    shares = bootstrapped(scores, np.array(list(prior.values())), settings)
+    shares = bootstrapped(scores, np.array(list(prior.values())))
     return dict(zip(prior, shares.tolist(), strict=True))
 
 
@@ -235,9 +271,8 @@ def _plain(
     settings: DiagnosisSettings,
 ) -> dict[Candidate, float]:
     """Logarithms of weights, the same being granted to all."""
-    share = settings.evidence.form_share_alike
-    scores = {c: _score(c, start, suspects, share, settings) - against[c] for c in named}
-    return _beside_values(scores, settings.evidence)
+    scores = {c: _score(c, start, suspects, FORM_SHARE_ALIKE, settings) - against[c] for c in named}
+    return _beside_values(scores)
 
 
 def _leading_value(plain: Mapping[Candidate, float]) -> Candidate | None:
@@ -288,7 +323,7 @@ def _scores(
             return _score_beside(c, value, start, suspects, granted, settings)
         return _score(c, start, suspects, granted, settings)
 
-    return _beside_values({c: score(c) - against[c] for c in plain}, settings.evidence)
+    return _beside_values({c: score(c) - against[c] for c in plain})
 
 
 def _trusted_parts(
@@ -316,7 +351,7 @@ def _trusted_parts(
     return out
 
 
-def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
+def _absent(candidate: Candidate) -> bool:
     """Whether the sizes of an effect of a set, taken together, are not told from none: a fit that
     goes on beside such an effect may end lower, which is not the effect's doing.
 
@@ -339,7 +374,7 @@ def _absent(candidate: Candidate, settings: EvidenceSettings) -> bool:
         certain = np.any((values != 0.0) & (np.diag(spread)[sizes] == 0.0))
         distance = values @ np.linalg.pinv(spread, hermitian=True)[np.ix_(sizes, sizes)] @ values
         # of a single size: whether it is within so many standard deviations of none
-        if not certain and chi2.sf(distance, sum(sizes)) >= chi2.sf(settings.same_stds**2, 1):
+        if not certain and chi2.sf(distance, sum(sizes)) >= chi2.sf(_SAME_STDS**2, 1):
             return True
     return False
 
@@ -378,27 +413,22 @@ def log_weight(
 
     ``value`` is the most probable wrong value alone, where none of the effects alone weighs more.
     """
-    evidence, share = settings.evidence, settings.evidence.form_share_alike
     if value is not None and candidate.wrong:
-        own = _score_beside(candidate, value, baseline, suspects, share, settings)
+        own = _score_beside(candidate, value, baseline, suspects, FORM_SHARE_ALIKE, settings)
     else:
-        own = _score(candidate, baseline, suspects, share, settings)
-    return own - _against(candidate, seconds, unlikely(candidate, ranging, evidence), evidence)
+        own = _score(candidate, baseline, suspects, FORM_SHARE_ALIKE, settings)
+    return own - _against(candidate, seconds, unlikely(candidate, ranging))
 
 
-def _against(
-    candidate: Candidate, seconds: float, unlikely: float, settings: EvidenceSettings
-) -> float:
+def _against(candidate: Candidate, seconds: float, unlikely: float) -> float:
     """What a set loses against others by a clock that does not drift, by times that were not seen,
     and by its values (``unlikely``).
     """
-    standing = settings.standing_price * stands(candidate, seconds)
-    return standing + settings.unseen_price * _unseen(candidate, seconds, settings) + unlikely
+    standing = STANDING_PRICE * stands(candidate, seconds)
+    return standing + _UNSEEN_PRICE * _unseen(candidate, seconds) + unlikely
 
 
-def _between_places(
-    weights: dict[Candidate, float], blocks: list[Block], settings: EvidenceSettings
-) -> dict[Candidate, float]:
+def _between_places(weights: dict[Candidate, float], blocks: list[Block]) -> dict[Candidate, float]:
     """Weights of sets of the same effects at other places shared out among them, by what each
     leaves inside the noise as well.
 
@@ -413,9 +443,7 @@ def _between_places(
     for several in (cs for cs in alike.values() if len(cs) > 1):
         within = {c: _inside_noise(c, blocks) for c in several}
         least = min(within.values())
-        own = {
-            c: weights[c] * math.exp(0.25 * settings.looks * (least - within[c])) for c in within
-        }
+        own = {c: weights[c] * math.exp(0.25 * _LOOKS * (least - within[c])) for c in within}
         share = sum(weights[c] for c in several) / sum(own.values())
         found |= {c: share * weight for c, weight in own.items()}
     return found
@@ -433,32 +461,29 @@ def _shared_out(
     start: Candidate,
     suspects: list[Block],
     seconds: float,
-    settings: EvidenceSettings,
 ) -> None:
     """Share probabilities out between sets that are the same data, by the odds before any data."""
     for one in named:
         for effect in one.effects:
             same = info_of(effect).same_data
-            if same is None or not same_recordings(one, effect, seconds, settings):
+            if same is None or not same_recordings(one, effect, seconds):
                 continue
             names = {same.effect if e == effect else e for e in one.effects}
             other = next((c for c in named if set(c.effects) == names and not c.wrong), None)
             # what explains more than the other could is something else as well
             if other is None:
                 continue
-            left, beside = (share_left(c, start, suspects, settings) for c in (one, other))
-            if left > beside + settings.form_share_alike:
+            left, beside = (share_left(c, start, suspects) for c in (one, other))
+            if left > beside + FORM_SHARE_ALIKE:
                 continue
             both, odds = (
                 out.get(one.key, 0.0) + out.get(other.key, 0.0),
-                math.exp(settings.standing_price),
+                math.exp(STANDING_PRICE),
             )
             out[one.key], out[other.key] = both / (1.0 + odds), both * odds / (1.0 + odds)
 
 
-def same_recordings(
-    candidate: Candidate, effect: str, seconds: float, settings: EvidenceSettings
-) -> bool:
+def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
     """
@@ -474,25 +499,19 @@ def same_recordings(
         own[same.without] * seconds,
         candidate.fit.std.get(f"{effect}.{same.without}", 0.0) * seconds,
     )
-    at_rest = abs(telling) < max(
-        settings.same_share * abs(own[same.size]), settings.same_stds * spread
-    )
+    at_rest = abs(telling) < max(_SAME_SHARE * abs(own[same.size]), _SAME_STDS * spread)
     return bool(
         own[same.size] > 0.0 and at_rest and all(own[name] == value for name, value in same.held)
     )
 
 
-def _beside_values(
-    scores: dict[Candidate, float], settings: EvidenceSettings
-) -> dict[Candidate, float]:
+def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
     """Scores of effects and of wrong values made comparable, by what their priors lose."""
-    lost = _lost_by_priors(scores, settings)
+    lost = _lost_by_priors(scores)
     return {c: score - lost[c] for c, score in scores.items()}
 
 
-def _lost_by_priors(
-    scores: Mapping[Candidate, float], settings: EvidenceSettings
-) -> dict[Candidate, float]:
+def _lost_by_priors(scores: Mapping[Candidate, float]) -> dict[Candidate, float]:
     """What the priors of the other parameters lose, which counts between effects and wrong values.
 
     A value that is wrong lets the others go back to where they were expected; sets of effects keep
@@ -502,13 +521,13 @@ def _lost_by_priors(
     if not any(c.wrong for c in scores):
         return dict.fromkeys(scores, 0.0)
     effects = [c for c in scores if not c.wrong]
-    shared = strained(max(effects, key=lambda c: scores[c]), settings) if effects else 0.0
-    return {c: strained(c, settings) if c.wrong else shared for c in scores}
+    shared = strained(max(effects, key=lambda c: scores[c])) if effects else 0.0
+    return {c: strained(c) if c.wrong else shared for c in scores}
 
 
-def strained(candidate: Candidate, settings: EvidenceSettings) -> float:
+def strained(candidate: Candidate) -> float:
     """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
-    return min(0.5 * candidate.fit.strain, settings.decided)
+    return min(0.5 * candidate.fit.strain, _DECIDED)
 
 
 def _trusted(
@@ -518,17 +537,14 @@ def _trusted(
     most: float,
     seconds: float,
     unlikely: float,
-    settings: EvidenceSettings,
 ) -> float:
     """Probability of a set against ``unlisted``; ``unlikely`` is what it loses by its values."""
-    left = min(max(share_left(candidate, baseline, suspects, settings), 1e-6), 1.0 - 1e-6)
-    even = (
-        settings.log_odds_explained_pliable if _pliable(candidate) else settings.log_odds_explained
-    )
-    odds = (math.log((1.0 - left) / left) - even) / settings.softness
-    if explains(candidate, baseline, suspects, settings):
-        odds = max(odds, settings.log_odds_noise_left)
-    return capped(odds - unlikely - penalty(candidate, seconds, settings), most)
+    left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
+    even = _LOG_ODDS_EXPLAINED_PLIABLE if _pliable(candidate) else _LOG_ODDS_EXPLAINED
+    odds = (math.log((1.0 - left) / left) - even) / _SOFTNESS
+    if explains(candidate, baseline, suspects):
+        odds = max(odds, _LOG_ODDS_NOISE_LEFT)
+    return capped(odds - unlikely - penalty(candidate, seconds), most)
 
 
 def _pliable(candidate: Candidate) -> bool:
@@ -547,21 +563,21 @@ def capped(odds: float, most: float) -> float:
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
 
-def penalty(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> float:
+def penalty(candidate: Candidate, seconds: float) -> float:
     """What a set's values take from the logarithm of its odds: a size that scatters between
     recordings, a time that was not seen.
     """
-    scatter = max(0.0, candidate.scatter - settings.scatter) / settings.scatter_width
-    return scatter + settings.unseen_price * _unseen(candidate, seconds, settings)
+    scatter = max(0.0, candidate.scatter - _SCATTER) / _SCATTER_WIDTH
+    return scatter + _UNSEEN_PRICE * _unseen(candidate, seconds)
 
 
-def _unseen(candidate: Candidate, seconds: float, settings: EvidenceSettings) -> bool:
+def _unseen(candidate: Candidate, seconds: float) -> bool:
     """Whether a time constant of a set was not seen: it is much longer than the recordings, or
     not told from zero. What relaxes at once is another stiffness.
     """
-    std, least = candidate.fit.std, settings.same_stds
+    std = candidate.fit.std
     return any(
-        value > settings.unseen_lengths * seconds or value < least * std.get(name, 0.0)
+        value > _UNSEEN_LENGTHS * seconds or value < _SAME_STDS * std.get(name, 0.0)
         for name, value in _effect_values(candidate)
         if find_parameter(name).time_constant
     )
@@ -587,7 +603,7 @@ def stands(candidate: Candidate, seconds: float) -> bool:
     return any(at_rest(effect, same) for effect, same in known if same is not None)
 
 
-def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) -> float:
+def unlikely(candidate: Candidate, ranging: Ranges) -> float:
     """What a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
@@ -595,13 +611,13 @@ def unlikely(candidate: Candidate, ranging: Ranges, settings: EvidenceSettings) 
     contact is met near an end of the motion, and what acts over most of the range is none; other
     parameters lose by how many times they are outside the range of usual values, for certain.
     """
-    lost = sum(_rare(candidate, name, settings) for name in candidate.fit.effect_values)
+    lost = sum(_rare(candidate, name) for name in candidate.fit.effect_values)
     for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
-        lost += _contact_price(effect["id"], effect["parameters"], ranging, settings)
+        lost += _contact_price(effect["id"], effect["parameters"], ranging)
     return lost
 
 
-def _rare(candidate: Candidate, name: str, settings: EvidenceSettings) -> float:
+def _rare(candidate: Candidate, name: str) -> float:
     """What a set loses by the value of one parameter of an effect."""
     lost, value = 0.0, candidate.fit.values[name]
     effect = name.partition(".")[0]
@@ -614,14 +630,12 @@ def _rare(candidate: Candidate, name: str, settings: EvidenceSettings) -> float:
         # what is large and hardly determined may be a part of its value, not nothing
         least = value * math.exp(-wide / value) if value > 0.0 else 0.0
         times = max(low / max(value + wide, 1e-300), least / high, 1.0)
-        outside = math.log(times) / math.log(settings.range_factor)
-        lost += min(0.5 * outside**2, settings.most_range_price)
+        outside = math.log(times) / math.log(_RANGE_FACTOR)
+        lost += min(0.5 * outside**2, _MOST_RANGE_PRICE)
     return lost
 
 
-def _contact_price(
-    effect: str, values: Mapping[str, float], ranging: Ranges, settings: EvidenceSettings
-) -> float:
+def _contact_price(effect: str, values: Mapping[str, float], ranging: Ranges) -> float:
     """What an effect loses by a contact that is met in the middle of the motion."""
     lost = 0.0
     for place in EFFECTS[effect].with_role("place"):
@@ -630,8 +644,8 @@ def _contact_price(
             inside = (values[place.name] - low) / (high - low)
             above = all(values[side.name] >= 0.0 for side in EFFECTS[effect].with_role("side"))
             touched = 1.0 - inside if above else inside
-            beyond = max(0.0, touched - settings.contact_share) / settings.contact_width
-            lost += min(0.5 * beyond**2, settings.most_range_price)
+            beyond = max(0.0, touched - _CONTACT_SHARE) / _CONTACT_WIDTH
+            lost += min(0.5 * beyond**2, _MOST_RANGE_PRICE)
     return lost
 
 
@@ -645,7 +659,7 @@ def _score(
     """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is
     granted to the forms of equations.
     """
-    lost = _lost_by_left(candidate, baseline, suspects, share, settings.evidence)
+    lost = _lost_by_left(candidate, baseline, suspects, share, settings)
     return -lost - _before(candidate, settings)
 
 
@@ -654,7 +668,7 @@ def _lost_by_left(
     baseline: Candidate,
     suspects: list[Block],
     share: float,
-    settings: EvidenceSettings,
+    settings: DiagnosisSettings,
 ) -> float:
     """What a set loses by what it leaves, ``share`` of the mismatch being granted to forms."""
     total = 0.0
@@ -662,33 +676,31 @@ def _lost_by_left(
     for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
         for block in suspects:
             excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
-            total += 0.25 * settings.looks * math.log(1.0 + left + share * excess)
+            total += 0.25 * _LOOKS * math.log(1.0 + left + share * excess)
             # of two that leave less than forms may, the one that leaves less is the more probable
-            total += 0.25 * settings.looks_within * math.log(1.0 + left)
+            total += 0.25 * _LOOKS_WITHIN * math.log(1.0 + left)
             # of a mismatch near the noise the noise says how much may be left, of a strong one the
             # forms
-            spread = math.hypot(
-                now[block.name].scatter, settings.form_error * excess, settings.noise_error
-            )
-            total += min(0.5 * (left / spread) ** 2, settings.decided) * (0.5 if once else 1.0)
+            spread = math.hypot(now[block.name].scatter, settings.form_error * excess, _NOISE_ERROR)
+            total += min(0.5 * (left / spread) ** 2, _DECIDED) * (0.5 if once else 1.0)
     return total
 
 
 def _before(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set loses before any data: its price, and that of every name beyond the first."""
-    further = settings.evidence.further_price * (len(candidate.names) - 1)
+    further = settings.further_price * (len(candidate.names) - 1)
     return price(candidate, settings) + further
 
 
 def room_beside(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: EvidenceSettings
+    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: DiagnosisSettings
 ) -> float:
     """By how much the logarithm of a set's weight could rise with something beside it, which left
     nothing at all.
     """
     share = settings.form_share
     least = sum(
-        0.25 * settings.looks * math.log(1.0 + share * max(0.0, was[block.name].ratio - 1.0))
+        0.25 * _LOOKS * math.log(1.0 + share * max(0.0, was[block.name].ratio - 1.0))
         for was in (baseline.fitted, baseline.held_out)
         for block in suspects
     )
@@ -699,22 +711,19 @@ def paid_for(candidate: Candidate, name: str, settings: DiagnosisSettings) -> fl
     """What a set loses by one of its names before any data: by the parameters of an effect, their
     values and its place, or by how far a parameter of the file is wrong.
     """
-    evidence = settings.evidence
     if name in candidate.wrong:
-        return evidence.wrong_price + candidate.outside_of(name, settings.fit.most_tolerances)
+        return settings.wrong_price + candidate.outside_of(name, settings.most_tolerances)
     own = [n for n in candidate.fit.effect_values if n.partition(".")[0] == name]
     counted = sum(not find_parameter(n).repeats for n in own)
-    rare = sum(_rare(candidate, n, evidence) for n in own)
+    rare = sum(_rare(candidate, n) for n in own)
     places = candidate.places / max(1, len(candidate.effects))
-    return evidence.parameter_price * counted + rare + places
+    return settings.parameter_price * counted + rare + places
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set pays for the parameters of its effects (of events of one kind only the first
     counts), for the places where they could have been, and for a file that is wrong.
     """
-    own = settings.evidence.wrong_price * len(candidate.wrong) + candidate.outside(
-        settings.fit.most_tolerances
-    )
+    own = settings.wrong_price * len(candidate.wrong) + candidate.outside(settings.most_tolerances)
     counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
-    return own + settings.evidence.parameter_price * len(counted) + candidate.places
+    return own + settings.parameter_price * len(counted) + candidate.places

@@ -43,6 +43,8 @@ from pamrs.diagnosis.explain._owners import owners_of_effects, owners_of_paramet
 from pamrs.diagnosis.explain._words import spoiled
 from pamrs.diagnosis.fit import (
     CHOSEN,
+    FINAL_STEP_SHARE,
+    LEAST_START,
     Events,
     Key,
     Problem,
@@ -60,7 +62,6 @@ from pamrs.diagnosis.fit import (
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual, Unjudged
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.settings import DiagnosisSettings, EvidenceSettings, FitSettings
 from pamrs.effects import CATALOGUE, id_of, info_of, is_effect, place_of, term_in
 from pamrs.errors import SimulationError
 from pamrs.findings import (
@@ -85,6 +86,14 @@ from pamrs.recordings import Case
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]
+
+# [noise levels] gap of refit to noise below which nothing is said of how much closes
+_LEAST_GAP = 0.05
+# [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
+_ZERO_DIFFERENCE = 0.1
+# [tolerances] standard deviation below which a parameter counts as determined by the recordings
+_KNOWN_SHARE = 0.7
+
 
 Array = NDArray[np.float64]
 
@@ -113,9 +122,9 @@ def assemble(
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
     models, fit_found, out_found = _sound_models(nominal, fitted, held, groups, noise_level)
     judged, verdict = models.judged, models.verdict
-    probabilities = case_probabilities(judged, settings.verdict)
-    ambiguity = case_ambiguity(judged, settings.verdict)
-    located, part = _located(judged, settings), fitted.losses.part
+    probabilities = case_probabilities(judged)
+    ambiguity = case_ambiguity(judged)
+    located, part = _located(judged), fitted.losses.part
     picture = _picture(located, nominal, fitted, fit_found, noise_level)
     fit_table = _table(fitted, fit_found, noise_level)
     held_table = _table(held, out_found, noise_level) if held is not fitted else {}
@@ -125,20 +134,20 @@ def assemble(
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
-    gap = _gap(table, settings.verdict.least_gap) if changed else None
+    gap = _gap(table, _LEAST_GAP) if changed else None
     blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
     budgeted = partial(budget, judged, held, out_found, noise_level, nominal)
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
     forms = _forms(judged, fitted)
     stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
-    uncertain = _known(models, settings)
+    uncertain = _known(models)
     running = partial(free_run, held, out_found, nominal, models.final, models.events, uncertain)
     nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
     runs, runs_note = part("the free run", running, nothing)
     off = channels_off(runs or [])
     effects = _effects(judged, verdict, fitted)
     likely = partial(_hypotheses, judged, probabilities, nominal, fitted)
-    constants = said_of_constants(runs or [], [effect.id for effect in effects], settings.warnings)
+    constants = said_of_constants(runs or [], [effect.id for effect in effects])
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
@@ -146,7 +155,7 @@ def assemble(
         effects=effects,
         ambiguity=ambiguity,
         probabilities=probabilities,
-        parameters=_parameters(nominal, known, owners, settings.fit),
+        parameters=_parameters(nominal, known, owners),
         fit=FitErrors(fit_table, held_table, gap),
         next_experiment=part(
             "the next experiment",
@@ -155,7 +164,7 @@ def assemble(
             ),
             NextExperiment(""),
         ),
-        warnings=constants + _warnings(case, models, table, settings, same=held is fitted),
+        warnings=constants + _warnings(case, models, table, same=held is fitted),
         rig=models.final
         if verdict == "none"
         else _with_std(models.final, nominal, models.chosen, models.owners),
@@ -168,10 +177,8 @@ def assemble(
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
-        considered=part(
-            "what was asked for", lambda: _considered(judged, settings.evidence, fitted), []
-        ),
-        tested=part("the list of what was tested", lambda: _tested(groups, settings.evidence), []),
+        considered=part("what was asked for", lambda: _considered(judged, fitted), []),
+        tested=part("the list of what was tested", lambda: _tested(groups), []),
         free_run=runs,
         free_run_note=runs_note,
         settings=settings,
@@ -219,7 +226,7 @@ def _sound_models(
         inside = models.residuals(fitted)
         outside = inside if held is fitted else models.residuals(held)
         problem, found = (fitted, inside) if held is fitted else (held, outside)
-        spoilt = spoiled(_table(problem, found, noise_level), settings.warnings)
+        spoilt = spoiled(_table(problem, found, noise_level))
         blamed = _blamed(models.judged, spoilt)
         if not blamed:
             return models, inside, outside
@@ -264,8 +271,8 @@ def _worded(
 ) -> Diagnosis:
     """A diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
-    told, settings = list(dict.fromkeys(forms.values())), diagnosis.settings.warnings
-    return replace(diagnosis, text=words.verdict(diagnosis, case, told, settings, sought=sought))
+    told = list(dict.fromkeys(forms.values()))
+    return replace(diagnosis, text=words.verdict(diagnosis, case, told, sought=sought))
 
 
 def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
@@ -349,11 +356,11 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     return _Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
 
 
-def _known(models: _Models, settings: DiagnosisSettings) -> Known:
+def _known(models: _Models) -> Known:
     """What is known of the values of the final model: as they were fitted, with what goes together,
     and of others what the rig file says.
     """
-    of_file = {n: p for n, p in known_parameters(models.nominal, settings.fit).items() if p.tol > 0}
+    of_file = {n: p for n, p in known_parameters(models.nominal).items() if p.tol > 0}
     names, values, parts = list[str](), list[float](), list[Array]()
     for k, candidate in enumerate(models.chosen):
         found = candidate.fit
@@ -376,21 +383,16 @@ def _warnings(
     case: Case,
     models: _Models,
     table: dict[str, ChannelError],
-    settings: DiagnosisSettings,
     *,
     same: bool,
 ) -> list[str]:
     """What a reader should know before trusting the rest."""
     named = any(j.named or j.wrong for j in models.judged)
     return [
-        *words.absolute(case, settings.warnings),
-        *(
-            words.reservations(models.judged, models.chosen, table, settings.warnings)
-            if named
-            else []
-        ),
-        *(words.worse(table, settings.warnings) if models.added else []),
-        *words.warnings(case, models.judged, same, settings),
+        *words.absolute(case),
+        *(words.reservations(models.judged, models.chosen, table) if named else []),
+        *(words.worse(table) if models.added else []),
+        *words.warnings(case, models.judged, same),
     ]
 
 
@@ -440,9 +442,7 @@ def _tried(groups: list[Group]) -> list[Tried]:
     ]
 
 
-def _considered(
-    judged: list[Judged], settings: EvidenceSettings, fitted: Problem
-) -> list[Considered]:
+def _considered(judged: list[Judged], fitted: Problem) -> list[Considered]:
     """What of each set that the caller asked for acts where a mismatch is, by group of blocks, and
     what it leaves; without blocks where nothing is missing in any.
     """
@@ -457,7 +457,7 @@ def _considered(
             there = next((c for c in group.candidates if set(c.names) == set(acting)), None)
             left = None
             if there is not None:
-                left = share_left(there, group.candidates[0], blocks, settings)
+                left = share_left(there, group.candidates[0], blocks)
             probability = _chance(own, acting)
             found.append(Considered(acting, [b.name for b in blocks], probability, left))
         if len(found) == before:
@@ -471,7 +471,7 @@ def _chance(judged: Judged, names: Sequence[str]) -> float:
     return sum(p for key, p in judged.probabilities.items() if set(key.split("+")) == set(names))
 
 
-def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
+def _tested(groups: list[Group]) -> list[Tested]:
     """Every persistent effect that acts where a mismatch is, its predicted gain and what it leaves
     alone, the best first.
     """
@@ -479,7 +479,7 @@ def _tested(groups: list[Group], settings: EvidenceSettings) -> list[Tested]:
     for group in groups:
         for effect, predicted_gain in group.predicted_gain.items():
             singles = [c for c in group.candidates if c.effects == (effect,)]
-            alone = [share_left(c, group.candidates[0], group.suspects, settings) for c in singles]
+            alone = [share_left(c, group.candidates[0], group.suspects) for c in singles]
             blocks = [b.name for b in group.suspects]
             found.append(
                 Tested(effect, blocks, min(1.0, max(0.0, predicted_gain)), min(alone, default=None))
@@ -495,7 +495,7 @@ def _hypotheses(
     """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
     name; those of an effect with times of its own can predict no other recording.
     """
-    found, least = [], problem.settings.next_experiment.simulated_from
+    found, least = [], problem.settings.simulated_from
     healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
 
     def model(chosen: list[Candidate]) -> Rig:
@@ -546,17 +546,16 @@ def _settled(
             for n, owner in owners.items()
             if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in own.blocks)
         }
-        settings = problem.settings.fit
         own_values = candidate.fit.rig.parameters
         apart = any(
             abs(own_values[n].value - other.values[n])
-            > settings.zero_difference * nominal.parameters[n].tol
+            > _ZERO_DIFFERENCE * nominal.parameters[n].tol
             for n, other in common.items()
         )
         if apart and candidate.fit.events is None:
             effects = candidate.fit.effects
             free, fixed, forms = parts_of(
-                start_of(candidate.fit, effect, settings.least_start) for effect in effects
+                start_of(candidate.fit, effect, LEAST_START) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
             autocorrelation = autocorrelation_of(own, candidate.fit)
@@ -569,7 +568,7 @@ def _settled(
                     autocorrelation,
                     fixed=fixed,
                     warm=candidate.fit,
-                    share=settings.final_step_share,
+                    share=FINAL_STEP_SHARE,
                     settled=settled,
                     freed=candidate.fit.freed,
                     forms=forms,
@@ -627,7 +626,7 @@ def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[
     return rig
 
 
-def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
+def _located(judged: list[Judged]) -> str | None:
     """The block that the answer is about: that with the largest mismatch, of groups with a name or
     without one; else one with a signature below the noise, else one at a wall.
     """
@@ -642,7 +641,7 @@ def _located(judged: list[Judged], settings: DiagnosisSettings) -> str | None:
         if found:
             return max(found)[1]
     for j in sorted(judged, key=lambda j: not j.wrong):
-        moved = symptoms_of(j.group, settings)
+        moved = symptoms_of(j.group)
         worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
         for block in reversed(j.group.blocks):
             if worst and depends(block, worst[0]):
@@ -689,7 +688,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     found: dict[str, tuple[float, Candidate]] = {}
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)
-    in_set = problem.settings.verdict.in_set
+    in_set = problem.settings.in_set
     for j in judged:
         names = {effect for c in j.group.candidates for effect in c.effects}
         listed = {effect for effect in names if id_of(effect) in CATALOGUE}
@@ -731,7 +730,7 @@ def _wrong(
         naming = [j for j in judged if name in j.wrong]
         # of a zero that two groups have, the value is that of the group that knows it best
         own = models.chosen[models.owners[name]].fit
-        known = known_parameters(models.nominal, problem.settings.fit)[name]
+        known = known_parameters(models.nominal)[name]
         value, std = own.values[name], own.std[name]
         told = [
             b
@@ -849,11 +848,11 @@ def _interval(value: float, std: float, lower: float) -> list[float]:
 
 
 def _parameters(
-    nominal: Rig, candidates: list[Candidate], owners: dict[str, int], settings: FitSettings
+    nominal: Rig, candidates: list[Candidate], owners: dict[str, int]
 ) -> dict[str, ParameterFound]:
     """Parameters of the baseline, each as the group has it that knows it best."""
     out: dict[str, ParameterFound] = {}
-    known = known_parameters(nominal, settings)
+    known = known_parameters(nominal)
     for name, k in owners.items():
         p, own = known[name], candidates[k].fit
         out[name] = ParameterFound(
@@ -862,7 +861,7 @@ def _parameters(
             std=own.std[name],
             unit=p.unit,
             moved_sigmas=own.moved[name],
-            identifiable=own.std[name] < settings.known_share * p.tol,
+            identifiable=own.std[name] < _KNOWN_SHARE * p.tol,
         )
     return out
 

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import Judged, significant
 from pamrs.diagnosis.explain._conditions import describe
+from pamrs.diagnosis.explain._words import TELLING_CONDITION
 from pamrs.diagnosis.fit import Key, Problem
 from pamrs.diagnosis.noise import NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual, Unjudged
@@ -93,7 +94,7 @@ def _sizes(
     """
     sizes = {}
     for stage, residuals in found.items():
-        told = excess(block, problem.recordings, residuals, noise_level, problem.settings.noise)
+        told = excess(block, problem.recordings, residuals, noise_level, problem.settings)
         sizes[stage] = MismatchSize(
             told.systematic, told.systematic * told.noise, significant(told)
         )
@@ -212,6 +213,5 @@ def _conditions(
     nominal: Rig,
 ) -> list[Condition]:
     """Under which conditions what is left is largest."""
-    least = problem.settings.warnings.telling_condition
     picture = describe(block, problem.recordings, nominal, residual, None, noise_level)
-    return [c for c in picture.conditions if c.share > least * c.time][:6]
+    return [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:6]

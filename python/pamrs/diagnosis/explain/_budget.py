@@ -41,6 +41,10 @@ from pamrs.rig import Parameter, Rig
 
 __all__ = ["budget"]
 
+# weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
+_BUDGET_DRAWS = 400
+
+
 Array = NDArray[np.float64]
 Stages = dict[str, dict[Key, Residual]]
 Residuals = dict[Key, Residual]
@@ -117,9 +121,7 @@ def budget(
         for block in one.group.blocks:
 
             def kept(residual: Residuals, block: Block = block) -> Excess:
-                return excess(
-                    block, problem.recordings, residual, noise_level, problem.settings.noise
-                )
+                return excess(block, problem.recordings, residual, noise_level, problem.settings)
 
             acting = [(name, r) for name, r in bare if not name or acts_in(name, block)]
             before = kept(acting[0][1])
@@ -169,7 +171,7 @@ def _steps(
             return [refit]
         return [refit, _Step("form", "", found["after"])]
     own = replace(problem, blocks=judged.group.blocks)
-    known = known_parameters(nominal, problem.settings.fit)
+    known = known_parameters(nominal)
 
     @cache
     def kept(present: tuple[str, ...]) -> Residuals | None:
@@ -335,7 +337,7 @@ class _Shares:
     def __init__(self, before: Excess, stages: list[_Stage], settings: DiagnosisSettings) -> None:
         counts = np.array([n for _, n in before.pieces], dtype=np.float64)
         rng = np.random.default_rng(settings.seed)
-        draws = rng.dirichlet(np.ones(counts.size), settings.verdict.budget_draws) * counts
+        draws = rng.dirichlet(np.ones(counts.size), _BUDGET_DRAWS) * counts
         # the first row is the share itself, the others are drawn
         self._weights = np.vstack([counts, draws])
         self._whole = np.maximum(self._excess(before), 1e-12)

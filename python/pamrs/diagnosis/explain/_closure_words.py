@@ -19,6 +19,9 @@ from pamrs.simulation import core_rig, default_step
 
 __all__ = ["describe_closure"]
 
+_SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put into words
+
+
 Array = NDArray[np.float64]
 
 _UNITS = {
@@ -86,11 +89,10 @@ def _sentence(found: Fit, problem: Problem, baseline: Fit, block: Block) -> str:
         kind: found.rig.effects[_index(found.rig, closure)]["parameters"].get(name)
         for kind, name in MEMORY_OF.items()
     }
-    least = problem.settings.closures.spoken_share
     words = [
         _kind_in_words(kind, closure, share, shape)
         for kind, share in shares.items()
-        if _present(kind, used) and abs(share) > least
+        if _present(kind, used) and abs(share) > _SPOKEN_SHARE
     ]
     taken = _percent(_taken(found, baseline, problem, block))
     return (

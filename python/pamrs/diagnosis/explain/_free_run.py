@@ -18,7 +18,6 @@ from scipy.stats import chi2
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
-from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.effects import info_of
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
@@ -27,6 +26,23 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig, differences, replay
 
 __all__ = ["Known", "free_run", "said_of_constants"]
+
+# times more than its block that the whole rig misses of a freed constant before that is said
+_FAR_ALONE = 5.0
+# [noise levels] missed from commands alone from which nothing is settled; true models miss one
+_OFF_NOISES = 5.0
+# chance of values so far from what is known as explain what the whole rig misses
+_OFF_CHANCE = 0.05
+_OFF_LATE = 0.5  # [samples] standard deviation of when a command takes effect, within its sample
+# [K] deviation of a gas's start that nothing tells: filled and vented it is 4 to 28 K off
+_OFF_WARM = 20.0
+# samples of a channel that compare what the whole rig misses: a course of some seconds
+_OFF_ROWS = 2000
+# samples of a log by which missed values are asked: each costs a run of all of them
+_OFF_SAMPLES = 200_000
+# steps in which values as likely as that are looked for by which the whole rig misses less
+_OFF_STEPS = 2
+
 
 Array = NDArray[np.float64]
 
@@ -99,7 +115,7 @@ def free_run(
         try:
             there = _with(final, events, recording)
             run = _of(prepared, problem, found, nominal, there)
-            runs.append(_judged(run, prepared, there, known, problem.settings))
+            runs.append(_judged(run, prepared, there, known))
         except RecordingError as error:  # it lacks a command
             missing.append(str(error))
     if not runs:
@@ -153,31 +169,27 @@ def _judged(
     prepared: Prepared,
     final: Rig,
     known: Known | None,
-    settings: DiagnosisSettings,
 ) -> FreeRun:
     """A free run with what it misses by more than noise and what is known of the values explain."""
-    far, most = settings.warnings.off_noises, settings.warnings.off_samples
     doubtful = [
         name
         for name, e in run.channels.items()
-        if e.noises > far and channel_of(name) not in _FREED
+        if e.noises > _OFF_NOISES and channel_of(name) not in _FREED
     ]
     if known is None or not doubtful:
         return run
     logged, note = _as_logged(prepared.recording), run.note
-    if len(logged) > most:
-        logged = logged.between(stop=float(logged.time[most]))
+    if len(logged) > _OFF_SAMPLES:
+        logged = logged.between(stop=float(logged.time[_OFF_SAMPLES]))
         part = f"whether it is off was asked of its first {logged.duration:.4g} s"
         note = f"{note}; {part}" if note else part
-    left = _left(prepared, logged, final, known, settings.warnings)
-    off = {name for name in doubtful if left.get(name, math.inf) > far}
+    left = _left(prepared, logged, final, known)
+    off = {name for name in doubtful if left.get(name, math.inf) > _OFF_NOISES}
     channels = {n: replace(e, off=n in off) for n, e in run.channels.items()}
     return replace(run, channels=channels, note=note)
 
 
-def _left(
-    prepared: Prepared, logged: Recording, final: Rig, known: Known, settings: WarningSettings
-) -> dict[str, float]:
+def _left(prepared: Prepared, logged: Recording, final: Rig, known: Known) -> dict[str, float]:
     """What a free run misses of each channel [noise levels], at the least, where the values of the
     rig are as far from what is known of them as is likely, its commands come up to a sample earlier
     or later, and its gases begin warmer or colder.
@@ -188,21 +200,21 @@ def _left(
 
     def run(moved: Array) -> dict[str, Array]:
         values = dict(zip(known.names, known.values + known.root @ moved[:count], strict=True))
-        late = _late(logged, settings.off_late * float(moved[count]))
+        late = _late(logged, _OFF_LATE * float(moved[count]))
         warm = zip(begun.items(), moved[count + 1 :].tolist(), strict=True)
         begins = {name: there.kelvin + there.unsure * away for (name, there), away in warm}
         there = with_known(final, values)
-        return _misses(there, late, begins, logged, prepared.noise, settings.off_rows)
+        return _misses(there, late, begins, logged, prepared.noise, _OFF_ROWS)
 
     at, least = np.zeros(count + 1 + len(begun)), dict[str, float]()
     with contextlib.suppress(PamrsError, ArithmeticError):  # a model that leaves its range
-        for _ in range(settings.off_steps + 1):
+        for _ in range(_OFF_STEPS + 1):
             now = run(at)
             sizes = {name: float(np.sqrt(np.mean(v**2))) for name, v in now.items()}
             least = {name: min(size, least.get(name, size)) for name, size in sizes.items()}
-            if max(least.values()) <= settings.off_noises:
+            if max(least.values()) <= _OFF_NOISES:
                 break
-            at = _moved(run, at, now, settings)
+            at = _moved(run, at, now)
     return least
 
 
@@ -210,7 +222,6 @@ def _moved(
     run: Callable[[Array], dict[str, Array]],
     at: Array,
     now: dict[str, Array],
-    settings: WarningSettings,
 ) -> Array:
     """Values, as likely as they may be, at which what a free run misses is least, as far as it is
     linear in them.
@@ -226,8 +237,8 @@ def _moved(
     left, size, right = np.linalg.svd(slopes, full_matrices=False)
     wanted = left.T @ (slopes @ at - here)  # along each axis, as an offset from what is known
     # as far as a draw is in as many directions as are seen
-    seen = int(np.sum(size > settings.off_noises * math.sqrt(here.size / len(now))))
-    most = float(chi2.isf(settings.off_chance, max(1, seen)))
+    seen = int(np.sum(size > _OFF_NOISES * math.sqrt(here.size / len(now))))
+    most = float(chi2.isf(_OFF_CHANCE, max(1, seen)))
 
     def far(ridge: float) -> Array:
         return np.asarray(size * wanted / (size**2 + ridge))
@@ -250,7 +261,7 @@ def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
     """Where each gas with a balance of energy begins, by its chamber: as warm as the room, but
     where its thermometer or its pressure says clearly that it does not.
     """
-    own, off = prepared.settings.prepare, prepared.settings.warnings
+    own = prepared.settings
     room, found = float(rig.tables("gas")[""]["temperature"]), {}
     for name, table in rig.tables("chamber").items():
         if table["gas"] != "energy_balance":
@@ -260,7 +271,7 @@ def _begun(rig: Rig, prepared: Prepared) -> dict[str, _Begins]:
         begins = told if read is None else float(read[0][0])
         away = abs(begins - room) > own.begun_temperature_error
         # a pressure that stands still does not tell
-        unsure = own.begun_temperature_error if away or read is not None else off.off_warm
+        unsure = own.begun_temperature_error if away or read is not None else _OFF_WARM
         found[name] = _Begins(begins if away else room, unsure)
     return found
 
@@ -306,9 +317,7 @@ def _late(recording: Recording, samples: float) -> Recording:
     return replace(recording, channels=recording.channels | moved)
 
 
-def said_of_constants(
-    runs: Sequence[FreeRun], effects: Sequence[str], settings: WarningSettings
-) -> list[str]:
+def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[str]:
     """Channels that the whole rig misses by far more than their blocks do, in words: what is
     constant in a recording is fitted to each, and no block is judged by it.
 
@@ -319,8 +328,6 @@ def said_of_constants(
     effects : sequence of str
         What was found: the free run takes readings as they are, so that those of a sensor explain
         a difference of their own.
-    settings : WarningSettings
-        How far off is worth a sentence.
     """
     if any(info_of(effect).block == "sensors" for effect in effects):
         return []
@@ -330,7 +337,7 @@ def said_of_constants(
             if channel_of(channel) not in _FREED or not error.cut_after:
                 continue
             times = error.after / error.cut_after
-            if times > max(settings.far_alone, worst.get(channel, (0.0, error, ""))[0]):
+            if times > max(_FAR_ALONE, worst.get(channel, (0.0, error, ""))[0]):
                 worst[channel] = (times, error, run.recording)
     return [
         f"{channel} of the whole rig is {error.after:.3g} {error.unit} off in {name!r} (root mean "

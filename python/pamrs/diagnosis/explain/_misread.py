@@ -47,7 +47,7 @@ def misread_diagnosis(
     why = "the unit of what surrounds it is settled first"
     blocks = [Unjudged(block.name, block.covers, why) for block in fitted.blocks]
     text, advice = _told(reading), _advice(reading)
-    most = fitted.settings.evidence.most_probability
+    most = fitted.settings.most_probability
     table = _table(case.rig, fitted, reading)
     channels = list(reading.channels)
     entry = Misread(

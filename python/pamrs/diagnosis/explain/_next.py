@@ -252,7 +252,7 @@ class _Question:
         if names not in self.made:
             found: list[Experiment] = []
             records = [p.recording for p in self.recordings]
-            settings = self.problem.settings.next_experiment
+            settings = self.problem.settings
             with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
                 found = experiments_of(self.nominal, records, settings, names)
             by_name = {experiment.name: experiment for experiment in found}
@@ -480,7 +480,7 @@ def _weight(
         bare = without_term(bare, effect)
     settings = asked.problem.settings
     channels = tuple(asked.recordings[0].recording.channels)
-    noise = {**noise_of(asked.nominal, settings.next_experiment), **asked.noise}
+    noise = {**noise_of(asked.nominal), **asked.noise}
     pair = [("with", own, 0.5), ("without", bare, 0.5)]
     with contextlib.suppress(DiagnosisError, ParameterError, SimulationError):
         return apart(outcome_of(experiment, pair, noise, channels, settings), 0, 1, nested=True)

@@ -8,7 +8,6 @@ from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.evidence import Candidate, Judged, symptoms_of
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.settings import DiagnosisSettings, WarningSettings
 from pamrs.effects import CATALOGUE, id_of
 from pamrs.findings import BlockVerdict, ChannelError, Findings, Where
 from pamrs.recordings import Case
@@ -45,6 +44,22 @@ __all__ = [
     "worse",
 ]
 
+# [noise levels] error of a model with a name from which it is reported with a reservation
+_MISSED_NOISES = 3.0
+_MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
+_SPOILED = 1.2  # error of a channel over that of the model before, from which it is reported
+_MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
+# relative scatter of an effect's size between recordings that is reported, as in evidence
+_SCATTER = 0.35
+# share of the ambient pressure within which a recording that begins at it may be absolute
+_AMBIENT_SHARE = 0.01
+# [Pa] gauge pressure that a channel never exceeds, below which its unit is questioned
+_LEAST_PRESSURE = 1e4
+# probability of no mismatch from which the text says that there may be none
+_NO_MISMATCH_PROBABILITY = 0.1
+# share of the excess over share of the time from which a condition is told
+TELLING_CONDITION = 1.15
+
 
 def unknown_volumes(rig: Rig) -> list[str]:
     """Dotted names of the chambers' volumes that the rig file marks unknown."""
@@ -54,7 +69,6 @@ def unknown_volumes(rig: Rig) -> list[str]:
 
 def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> Where:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
-    settings = problem.settings.warnings
     groups = [j.group for j in judged]
     if located is None:
         text = "After the refit, no block's residual is above the noise level."
@@ -92,7 +106,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"No block's residual is above the noise level, but the residual of the "
             f"{place}{parts} contains the signature of an effect, in held-out recordings too."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > settings.no_mismatch_probability:
+    elif group is not None and group.probabilities.get("", 0.0) > _NO_MISMATCH_PROBABILITY:
         text = (
             f"The residual of the {place}{parts} is barely above the noise level "
             f"({found.systematic:.2g} times it in {spoken_name(block.channel)}). "
@@ -106,7 +120,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     telling = (
         []
         if below_noise
-        else [c for c in picture.conditions if c.share > settings.telling_condition * c.time][:2]
+        else [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:2]
     )
     if telling:
         text += " It is largest under: " + "; ".join(c.text for c in telling) + "."
@@ -126,7 +140,6 @@ def verdict(
     diagnosis: Findings,
     case: Case,
     forms: list[str],
-    settings: WarningSettings,
     *,
     sought: bool,
 ) -> str:
@@ -134,7 +147,7 @@ def verdict(
     what was not judged; ``forms`` say what a mismatch without a name is a function of, if that was
     ``sought``.
     """
-    text = _of_blocks(diagnosis, case, forms, settings, sought=sought)
+    text = _of_blocks(diagnosis, case, forms, sought=sought)
     off = off_sentence(diagnosis)
     if off:
         text = (
@@ -149,7 +162,6 @@ def _of_blocks(
     diagnosis: Findings,
     case: Case,
     forms: list[str],
-    settings: WarningSettings,
     *,
     sought: bool,
 ) -> str:
@@ -163,7 +175,7 @@ def _of_blocks(
         )
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
-        found = _mistaken(diagnosis, case, settings)
+        found = _mistaken(diagnosis, case)
         by = "With this value," if len(diagnosis.wrong_parameters) == 1 else "With these values,"
         return (
             found + _closed(diagnosis, by, case) + _beside(diagnosis, missing, forms, sought=sought)
@@ -212,7 +224,7 @@ def _of_blocks(
     it = "it" if len(diagnosis.effects) == 1 else "them"
     text += _closed(diagnosis, f"With {it},", case)
     if diagnosis.wrong_parameters:
-        text += " " + _mistaken(diagnosis, case, settings)
+        text += " " + _mistaken(diagnosis, case)
     if unknown_volumes(case.rig):
         text += (
             " The chamber's volume is not known. The recording determines the time constant and "
@@ -252,7 +264,7 @@ def _proof(case: Case) -> str:
     )
 
 
-def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str:
+def _mistaken(diagnosis: Findings, case: Case) -> str:
     """Which values of the rig file are wrong, and what that does to the error."""
     told = []
     # the error is that of the model with everything that was found
@@ -260,9 +272,7 @@ def _mistaken(diagnosis: Findings, case: Case, settings: WarningSettings) -> str
     beside = " with all that was found" if several else ""
     for wrong in diagnosis.wrong_parameters:
         mended = {
-            channel: e
-            for channel, e in wrong.held_out.items()
-            if e.after < settings.mended * e.refit
+            channel: e for channel, e in wrong.held_out.items() if e.after < _MENDED * e.refit
         }
         told_by = mended or wrong.held_out
         errors = "; ".join(
@@ -321,16 +331,12 @@ def _capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def warnings(
-    case: Case, judged: list[Judged], no_held_out: bool, settings: DiagnosisSettings
-) -> list[str]:
+def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
     """What a reader should know about the data and the fit."""
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {
-        n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group, settings).items()
-    }
+    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group).items()}
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (
@@ -339,7 +345,7 @@ def warnings(
             ):
                 continue
             largest = float(np.nanmax(np.abs(values[recording.mask[channel]])))
-            if largest < settings.warnings.least_pressure:
+            if largest < _LEAST_PRESSURE:
                 out.append(
                     f"{recording.name}: {channel} never exceeds {largest:.3g} Pa gauge, next to "
                     "nothing for a muscle or a tank: is the unit in its header the one its values "
@@ -366,7 +372,7 @@ def warnings(
         )
     for group in groups:
         best = group.best
-        if best.effects and best.scatter > settings.warnings.scatter:
+        if best.effects and best.scatter > _SCATTER:
             out.append(
                 f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings"
             )
@@ -385,7 +391,7 @@ def warnings(
     return out
 
 
-def absolute(case: Case, settings: WarningSettings) -> list[str]:
+def absolute(case: Case) -> list[str]:
     """Muscle pressures that begin at one atmosphere in every recording: they may not be gauge."""
     ambient = float(case.rig.model["gas"]["ambient_pressure"])
     firsts: dict[str, list[float]] = {}
@@ -399,16 +405,16 @@ def absolute(case: Case, settings: WarningSettings) -> list[str]:
         f"(gas.ambient_pressure = {ambient:g} Pa): are these absolute pressures? Gauge pressures "
         "are needed; what is found below may be no more than the difference"
         for channel, begun in firsts.items()
-        if all(abs(first - ambient) < settings.ambient_share * ambient for first in begun)
+        if all(abs(first - ambient) < _AMBIENT_SHARE * ambient for first in begun)
     ]
 
 
-def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
+def worse(table: dict[str, ChannelError]) -> list[str]:
     """Channels that the model with what was added predicts worse than the nominal one did, or the
     refitted one.
     """
     out = []
-    for channel in spoiled(table, settings):
+    for channel in spoiled(table):
         error = table[channel]
         better, which = min((error.before, "nominal"), (error.refit, "refitted"))
         unit, factor = display_unit(unit_of(channel), error.after)
@@ -420,12 +426,12 @@ def worse(table: dict[str, ChannelError], settings: WarningSettings) -> list[str
     return out
 
 
-def spoiled(table: dict[str, ChannelError], settings: WarningSettings) -> list[str]:
+def spoiled(table: dict[str, ChannelError]) -> list[str]:
     """Channels that the model with what was added predicts worse than the one without it."""
     return [
         channel
         for channel, error in table.items()
-        if error.after > settings.spoiled * max(min(error.before, error.refit), error.noise)
+        if error.after > _SPOILED * max(min(error.before, error.refit), error.noise)
     ]
 
 
@@ -433,7 +439,6 @@ def reservations(
     judged: list[Judged],
     chosen: list[Candidate],
     table: dict[str, ChannelError],
-    settings: WarningSettings,
 ) -> list[str]:
     """What a reader should know of a model with a name: what it still misses where it acts, and
     values that it had to move far.
@@ -444,7 +449,7 @@ def reservations(
             continue
         for channel in dict.fromkeys(b.channel for b in j.group.blocks):
             error = table[channel]
-            if error.after <= settings.missed_noises * error.noise:
+            if error.after <= _MISSED_NOISES * error.noise:
                 continue
             what = "the effect" if j.named else "the other value"
             times = error.after / error.noise
@@ -455,8 +460,9 @@ def reservations(
                 f"times the noise level: {name}{why}, and standard deviations do not include that"
             )
     named = [c for c in chosen if any(id_of(effect) in CATALOGUE for effect in c.effects)]
-    far = settings.moved_tolerances
-    moved = {n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > far}
+    moved = {
+        n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED_TOLERANCES
+    }
     out += [
         (
             f"with the effect the fit moves {n} by {v:+.1f} tolerances: it may compensate for the "

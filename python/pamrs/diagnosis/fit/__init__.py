@@ -15,6 +15,9 @@ from __future__ import annotations
 
 from pamrs.diagnosis.fit._acting import ACTS, acts_in, depends, fits, places_of
 from pamrs.diagnosis.fit._fitting import (
+    FINAL_STEP_SHARE,
+    FIT_BIN_TIME,
+    LEAST_START,
     Events,
     Fit,
     Key,
@@ -39,7 +42,7 @@ from pamrs.diagnosis.fit._held import (
 )
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._offsets import with_offsets
-from pamrs.diagnosis.fit._spread import spread_over_pieces
+from pamrs.diagnosis.fit._spread import PIECE_TIME, spread_over_pieces
 from pamrs.diagnosis.fit._starts import (
     CHOSEN,
     Start,
@@ -53,6 +56,10 @@ from pamrs.diagnosis.fit._starts import (
 from pamrs.diagnosis.fit._transients import events_of, fit_events, look_for_events
 
 __all__ = [
+    "FINAL_STEP_SHARE",
+    "LEAST_START",
+    "FIT_BIN_TIME",
+    "PIECE_TIME",
     "ACTS",
     "CHOSEN",
     "Events",

@@ -22,13 +22,16 @@ from pamrs.diagnosis.fit._held import known_parameters, with_known
 from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._starts import without_term
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
-from pamrs.diagnosis.settings import DiagnosisSettings, FitSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of, usual_values
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
 
 __all__ = [
+    "FINAL_STEP_SHARE",
+    "LEAST_START",
+    "FIT_BIN_TIME",
     "Events",
     "Fit",
     "Problem",
@@ -42,6 +45,19 @@ __all__ = [
     "two_at_a_time",
     "with_priors",
 ]
+
+# multiple of its nominal value, or of other walls, for a freed parameter (decision 25)
+_FREED_MULTIPLE = 10.0
+# share of an effect parameter's usual start that its scale in a fit has at the least
+_LEAST_SCALE = 0.01
+LEAST_START = 1e-3  # share of a typical size from which a parameter goes on that a fit left at zero
+# [s] stable integration step below which a model is not tried: it would take too long
+_LEAST_STEP = 4e-4
+_LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model
+# the same in a fit to its end: one that stopped early looked like physics (decision 22)
+FINAL_STEP_SHARE = 1e-5
+FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
+
 
 Array = NDArray[np.float64]
 Item = TypeVar("Item")
@@ -284,8 +300,7 @@ def _compiled(problem: Problem, rig: Rig) -> _core.Rig:
     """Another model compiled; one so stiff that no fit could afford it is outside the range."""
     with _inside_range():
         core = core_rig(rig, problem.core)
-    settings = problem.settings.fit
-    least = min(settings.least_step, settings.least_step_share * problem.core.stable_step)
+    least = min(_LEAST_STEP, _LEAST_STEP_SHARE * problem.core.stable_step)
     if core.stable_step < least:
         raise SimulationError(
             f"the model needs steps of {core.stable_step:.1e} s; to be fitted it may need "
@@ -301,7 +316,7 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     differentiable = set(core_rig(nominal).parameter_names)
     return [
         name
-        for name, parameter in known_parameters(nominal, problem.settings.fit).items()
+        for name, parameter in known_parameters(nominal).items()
         if name in differentiable
         and 0.0 < parameter.tol < math.inf
         and any(depends(block, name) for block in problem.blocks)
@@ -318,14 +333,14 @@ class Scaling:
         nominal: Rig,
         baseline: Sequence[str],
         starts: dict[str, float],
-        settings: FitSettings,
+        settings: DiagnosisSettings,
         freed: Collection[str] = (),
         forms: Mapping[str, str] | None = None,
     ) -> None:
         self.names = [*baseline, *starts]
         self.forms = dict(forms or {})
         self.nominal, self.baseline, self.starts = nominal, list(baseline), dict(starts)
-        self.known = known = known_parameters(nominal, settings)
+        self.known = known = known_parameters(nominal)
         self.scale = {n: known[n].tol for n in baseline}
         self.centre = {n: known[n].value for n in baseline}
         walls = {n: settings.most_tolerances * known[n].tol for n in baseline}
@@ -345,7 +360,7 @@ class Scaling:
                 upper.append(math.log(min(info.upper, start * 1e3) / start))
             else:
                 # a parameter that starts from next to nothing has the scale of what it may become
-                least = settings.least_scale * max(abs(s) for s in info.starts)
+                least = _LEAST_SCALE * max(abs(s) for s in info.starts)
                 self.scale[name] = max(abs(start), least) or 10.0
                 lower.append(info.lower / self.scale[name])
                 upper.append(info.upper / self.scale[name])
@@ -380,10 +395,12 @@ class Scaling:
         return rig
 
 
-def _reach(parameter: Parameter, settings: FitSettings) -> float:
+def _reach(parameter: Parameter, settings: DiagnosisSettings) -> float:
     """How far a parameter that is freed may move [SI], if its bounds allow it."""
-    farthest = settings.freed_multiple
-    return max(farthest * abs(parameter.value), farthest * settings.most_tolerances * parameter.tol)
+    return max(
+        _FREED_MULTIPLE * abs(parameter.value),
+        _FREED_MULTIPLE * settings.most_tolerances * parameter.tol,
+    )
 
 
 def bin_width(prepared: Prepared, seconds: float) -> int:
@@ -413,15 +430,14 @@ def stacked(
         Derivative of the rows with respect to each parameter, SI; None without parameters.
     """
     rows, slopes = [], []
-    width = problem.settings.noise.fit_bin_time
     for prepared in problem.recordings:
         for block in problem.blocks:
             r = found[block.name, prepared.recording.name]
-            mean, counts = binned(r.value, r.rows, bin_width(prepared, width))
+            mean, counts = binned(r.value, r.rows, bin_width(prepared, FIT_BIN_TIME))
             weight = np.sqrt(counts) / (r.noise * math.sqrt(inflation[block.name]))
             rows.append(mean * weight)
             if r.jacobian is not None:
-                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, width))
+                slope, _ = binned(r.jacobian, r.rows, bin_width(prepared, FIT_BIN_TIME))
                 slopes.append(-slope * weight[:, None])
     return np.concatenate(rows), np.concatenate(slopes) if slopes else None
 
@@ -580,7 +596,7 @@ def fit(
     """
     nominal = with_known(nominal, settled or {})
     baseline = [name for name in free_baseline(problem, nominal) if name not in (settled or {})]
-    own = problem.settings.fit
+    own = problem.settings
     scaling = Scaling(nominal, baseline, starts, own, freed, forms)
     count = len(baseline)
     bound = np.array([0.0 if name in freed else 1.0 for name in baseline])
@@ -606,9 +622,9 @@ def fit(
     for index, name in enumerate(baseline):
         if warm is not None and name in warm.values:
             start[index] = (warm.values[name] - scaling.centre[name]) / scaling.scale[name]
-    limit = own.evaluations if evaluations is None else evaluations
+    limit = own.fit_evaluations if evaluations is None else evaluations
     x, (values, jacobian, found), spent = levenberg_marquardt(
-        evaluate, start, scaling.bounds, limit, own, share
+        evaluate, start, scaling.bounds, limit, share
     )
     covariance: Array = np.zeros((0, 0))
     if x.size:

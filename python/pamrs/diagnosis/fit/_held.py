@@ -8,12 +8,15 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
-from pamrs.diagnosis.settings import FitSettings
 from pamrs.effects import CATALOGUE, EFFECTS, Form
 from pamrs.rig import Parameter, Rig
 from pamrs.rig.schema import qualified
 
 __all__ = ["holdable", "known_parameters", "named_entries", "with_known", "without_passing"]
+
+# least tolerance of a held effect: its deviation came of a lacking model (decision 34)
+_HELD_SHARE = 0.3
+
 
 _FIXED = (*CHOSEN, "threshold")
 """Roles of parameters that stay as the model has them: no fit has a slope in them."""
@@ -51,7 +54,7 @@ def without_passing(rig: Rig) -> Rig:
     return rig
 
 
-def known_parameters(rig: Rig, settings: FitSettings) -> dict[str, Parameter]:
+def known_parameters(rig: Rig) -> dict[str, Parameter]:
     """Parameters of a rig and of the effects that it holds, by dotted name, SI.
 
     What is known of an effect's parameter is the standard deviation of the file, but not less than
@@ -64,7 +67,7 @@ def known_parameters(rig: Rig, settings: FitSettings) -> dict[str, Parameter]:
         known = spread.get(full, {})
         for info in _form(entry).parameters:
             value = entry["parameters"][info.name]
-            least = settings.held_share * abs(value)
+            least = _HELD_SHARE * abs(value)
             tol = 0.0 if info.role in _FIXED else max(known.get(info.name, 0.0), least)
             name = f"{full}.{info.name}"
             found[name] = Parameter(name, value, info.unit, tol, info.lower, info.upper)

@@ -16,10 +16,18 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.settings import FitSettings
 from pamrs.errors import SimulationError
 
 __all__ = ["levenberg_marquardt"]
+
+# [chi-square] predicted gain of a step below which a fit ends: noise makes as much (decision 14)
+_STEP_GAIN = 0.2
+_STEP_SHARE = 2e-3  # the same in a first fit, as a share of the sum of squares (decision 14)
+# evaluations that gain less than a step: as many as damping takes (decision 57)
+_STALL_EVALUATIONS = 5
+_FIRST_DAMPING = 1e-4  # damping with which Levenberg and Marquardt begin (Marquardt (1963))
+_MOST_DAMPING = 1e8  # damping at which they give up
+
 
 Array = NDArray[np.float64]
 T = TypeVar("T")
@@ -30,7 +38,6 @@ def levenberg_marquardt(
     start: Array,
     bounds: tuple[Array, Array],
     evaluations: int,
-    settings: FitSettings,
     share: float | None = None,
 ) -> tuple[Array, tuple[Array, Array, T], int]:
     """Minimise half the sum of squares inside a box.
@@ -46,10 +53,6 @@ def levenberg_marquardt(
         The box.
     evaluations : int
         Limit, the first included.
-    settings : FitSettings
-        Least predicted gain of a step, the same as a share of the sum of squares, damping, and how
-        many evaluations may bring less than such a gain in all: where a model is not smooth, steps
-        promise what they do not keep.
     share : float, optional
         Another share; 0 where the last few units of chi-square count.
 
@@ -85,22 +88,22 @@ def levenberg_marquardt(
             raise SimulationError("the model's sensitivities are too large to be fitted")
         return found, gradient, normal
 
-    least, hardest = settings.step_share if share is None else share, settings.most_damping
+    least = _STEP_SHARE if share is None else share
     x = np.clip(start, low, high)
     best, gradient, normal = evaluated(x)
-    spent, damping = 1, settings.first_damping
+    spent, damping = 1, _FIRST_DAMPING
     reached = [float(best[0] @ best[0])]  # by each evaluation
     while x.size and spent < evaluations:
         rows = best[0]
-        worth = max(settings.step_gain, least * float(rows @ rows))
+        worth = max(_STEP_GAIN, least * float(rows @ rows))
         hard = damping
         step = _step(x, gradient, normal, hard, low, high)
         # a long step that the walls bend may lead uphill: a shorter one meets fewer of them
-        while (gain := _promise(step, gradient, normal)) < worth and hard < hardest:
+        while (gain := _promise(step, gradient, normal)) < worth and hard < _MOST_DAMPING:
             hard = 10.0 * hard
             step = _step(x, gradient, normal, hard, low, high)
-        late = reached[-1 - settings.stall_evaluations :]
-        if gain < worth or (len(late) > settings.stall_evaluations and late[0] - late[-1] < worth):
+        late = reached[-1 - _STALL_EVALUATIONS :]
+        if gain < worth or (len(late) > _STALL_EVALUATIONS and late[0] - late[-1] < worth):
             break
         tried = np.clip(x + step, low, high)
         spent += 1
@@ -122,7 +125,7 @@ def levenberg_marquardt(
             damping = max(damping, 1e-9)
         else:
             damping = max(10.0 * hard, 1e-2)
-            if damping > hardest:
+            if damping > _MOST_DAMPING:
                 break
     return x, best, spent
 

@@ -24,6 +24,22 @@ from pamrs.simulation import core_rig
 
 __all__ = ["with_offsets"]
 
+# deviations from none of a command's offset that is applied: each of a few recordings is asked
+_OFFSET_STDS = 4.0
+# variances left with commands moved, or an offset takes physics: healthy 0.95-1.02, a wall 1.45
+_OFFSET_LEFT = 1.1
+# parts of a sample by which rare commands move: a step at 100 Hz is off by 0.08 ms at most
+_OFFSET_PARTS = 64
+# the same of commands that change more often: each part is a step of the integration
+_OFFSET_FEW_PARTS = 8
+# [s] least time of such a part: no pressure tells finer ones (offset_parts at 100 Hz)
+_LEAST_OFFSET_PART = 1.6e-4
+# [samples] offset left to effects, and its prior deviation: a log sees a command a sample late
+_MOST_OFFSET = 1.0
+# changes of commands with an offset each, which takes two predictions: steps, no controller
+_MOST_OFFSETS = 40
+
+
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
@@ -104,12 +120,10 @@ def _that_pay(
     recordings = [moved.get(k, p) for k, p in enumerate(whole.recordings)]
     tried = replace(whole, recordings=recordings)
     missed, left = _missed(whole, near), _missed(tried, after)
-    own = whole.settings.fit
     return {
         k: p
         for k, p in moved.items()
-        if left[k][0] < missed[k][0] - own.offset_stds**2
-        and left[k][0] < own.offset_left * left[k][1]
+        if left[k][0] < missed[k][0] - _OFFSET_STDS**2 and left[k][0] < _OFFSET_LEFT * left[k][1]
     }
 
 
@@ -140,11 +154,10 @@ def _later(prepared: Prepared, shares: Array) -> Prepared:
     """
     at = _changes(prepared)
     size = next(iter(prepared.held.values())).size
-    own = prepared.settings.fit
-    seldom = at.size * own.offset_few_parts < size
-    most = own.offset_parts if seldom else own.offset_few_parts
+    seldom = at.size * _OFFSET_FEW_PARTS < size
+    most = _OFFSET_PARTS if seldom else _OFFSET_FEW_PARTS
     each = prepared.dt * prepared.n / size
-    parts = min(most, 2 * math.ceil(0.5 * each / own.least_offset_part))  # half of them is whole
+    parts = min(most, 2 * math.ceil(0.5 * each / _LEAST_OFFSET_PART))  # half of them is whole
     moved = np.maximum.accumulate(np.maximum(1, parts * at + np.rint(parts * shares).astype(int)))
     counts = np.diff(np.minimum(moved, size * parts), prepend=0, append=size * parts)
     rows = np.concatenate([[0], at])
@@ -162,11 +175,10 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
         if (at := _changes(p)).size
     ]
     best, spread = _fitted(problem, nominal, all_of)
-    own = problem.settings.fit
     offsets = {
         change.recording: float(offset)
         for change, offset, std in zip(all_of, best, spread, strict=True)
-        if own.offset_stds * std < abs(offset) < own.most_offset
+        if _OFFSET_STDS * std < abs(offset) < _MOST_OFFSET
     }
     recordings = problem.recordings
     return {
@@ -178,14 +190,14 @@ def _moved_alike(problem: Problem, nominal: Rig) -> tuple[dict[int, Prepared], d
 def _moved_each(problem: Problem, nominal: Rig, those: list[int]) -> dict[int, Prepared]:
     """Recordings, by their numbers, in which each change of a command has an offset of its own."""
     counts = {k: _changes(problem.recordings[k]).size for k in those}
-    few = {k: n for k, n in counts.items() if n <= problem.settings.fit.most_offsets}
+    few = {k: n for k, n in counts.items() if n <= _MOST_OFFSETS}
     each = [_Change(k, np.array([i])) for k, n in few.items() for i in range(n)]
     if not each:
         return {}
     best, _ = _fitted(problem, nominal, each)
-    shares, most = {k: np.zeros(n) for k, n in few.items()}, problem.settings.fit.most_offset
+    shares = {k: np.zeros(n) for k, n in few.items()}
     for one, offset in zip(each, best, strict=True):
-        shares[one.recording][one.which] = np.clip(offset, -most, most)
+        shares[one.recording][one.which] = np.clip(offset, -_MOST_OFFSET, _MOST_OFFSET)
     return {k: _later(problem.recordings[k], own) for k, own in shares.items()}
 
 
@@ -194,12 +206,12 @@ def _fitted(problem: Problem, nominal: Rig, moving: Sequence[_Change]) -> tuple[
     the parameters inside their tolerances beside them.
     """
     names = free_baseline(problem, nominal)
-    known = known_parameters(nominal, problem.settings.fit)
+    known = known_parameters(nominal)
     found, core = residuals(problem, nominal, names), core_rig(nominal, problem.core)
     scales = np.array([known[name].tol for name in names])
     size = len(names) + len(moving)
     normal, right, total, count = np.eye(size), np.zeros(size), 0.0, 0  # tolerances are priors
-    normal[len(names) :, len(names) :] /= problem.settings.fit.most_offset**2
+    normal[len(names) :, len(names) :] /= _MOST_OFFSET**2
     for k, prepared in enumerate(problem.recordings):
         own = [(len(names) + j, one.which) for j, one in enumerate(moving) if one.recording == k]
         for block in problem.blocks:

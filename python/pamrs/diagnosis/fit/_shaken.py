@@ -21,6 +21,10 @@ from pamrs.rig import Rig
 
 __all__ = ["Shaken"]
 
+# lines of the spectrum tried for a vibration: two that shake, and what the drive leaves
+_MOST_LINES = 5
+
+
 Array = NDArray[np.float64]
 
 
@@ -156,4 +160,4 @@ def _lines(
     ]
     assert scanned.scan is not None
     low, high, _ = scanned.scan
-    return lines_of(there, low, high, problem.settings.transients.most_lines)
+    return lines_of(there, low, high, _MOST_LINES)

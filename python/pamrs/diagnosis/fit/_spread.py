@@ -6,10 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm, t
 
-from pamrs.diagnosis.fit._fitting import Fit, Key, Problem, bin_width, stacked
+from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME, Fit, Key, Problem, bin_width, stacked
 from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["pieces_of", "pieces_spread", "spread_over_pieces"]
+__all__ = ["PIECE_TIME", "pieces_of", "pieces_spread", "spread_over_pieces"]
+
+# [s] pieces that count as looks: longer than wrong residuals stay alike; arm windows are 2.5 s
+PIECE_TIME = 5.0
+
 
 Array = NDArray[np.float64]
 
@@ -88,16 +92,15 @@ def _pull(root: Array, jacobian: Array, rows: Array) -> Array:
 
 def pieces_of(problem: Problem, found: dict[Key, Residual]) -> list[NDArray[np.intp]]:
     """Rows of the stacked residuals in each piece of a recording, all blocks together."""
-    noise = problem.settings.noise
     count = 0
     pieces: list[NDArray[np.intp]] = []
     for prepared in problem.recordings:
-        width = bin_width(prepared, noise.fit_bin_time)
+        width = bin_width(prepared, FIT_BIN_TIME)
         own: dict[int, list[NDArray[np.intp]]] = {}
         for block in problem.blocks:
             rows = found[block.name, prepared.recording.name].rows
             bins = np.arange(rows.size // width)
-            at = (bins * width * prepared.dt / noise.piece_time).astype(int)
+            at = (bins * width * prepared.dt / PIECE_TIME).astype(int)
             for k in np.unique(at):
                 own.setdefault(int(k), []).append(count + np.flatnonzero(at == k))
             count += bins.size

@@ -35,12 +35,33 @@ from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._shaken import Shaken
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
 from pamrs.diagnosis.prepare import Prepared, Residual
-from pamrs.diagnosis.settings import TransientSettings
 from pamrs.effects import EffectParameter, find_parameter, info_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["events_of", "fit_events", "look_for_events"]
+
+_SPACING = 0.5  # [s] distance of the times that are tried
+_FIRST_TIME = 0.25  # [s] first time that is tried
+_LAST_TIME = 0.5  # [s] time before the end of the recording from which none is tried
+# [s] before an event from which its signature counts: the smoothing of drives reaches back
+_EARLY = 0.1
+_LEAST_DISTANCE = 1.0  # [s] least time between two events
+_LEAST_GAIN = 25.0  # [chi-square] gain from which an event counts (decision 20)
+# share of what the recording's residual is from which an event counts (decision 20)
+_LEAST_SHARE = 0.03
+_TIME_SCALE = 0.2  # [s] scale of an event's time in a fit
+_DURATION_SCALE = 0.4  # [s] scale of its duration
+_RISE_SCALE = 0.2  # [s] scale of the time of its edges
+_FREQUENCY_SCALE = 0.01  # [Hz] scale of a frequency in a fit
+_LEAST_DURATION = 0.05  # [s] shortest duration of an event
+_MOST_DURATION = 5.0  # [s] longest duration of an event
+_LEAST_RISE = 0.02  # [s] shortest edge of an event (a blow)
+_MOST_RISE = 2.0  # [s] longest edge of an event (a hand)
+_MOST_SIZE = 1e3  # [SI] largest size of an event that a fit may reach
+_EVALUATIONS_ALONE = 8  # evaluations of the fit of one recording's events at the most
+_EVALUATIONS_TOGETHER = 12  # evaluations of the fit of baseline and events of all recordings
+
 
 Array = NDArray[np.float64]
 
@@ -80,15 +101,15 @@ def _first_of(effect: str, parameter: str) -> EffectParameter:
     return find_parameter(f"{effect}.{info.repeats}") if info.repeats else info
 
 
-def _scale(effect: str, parameter: str, settings: TransientSettings) -> float:
+def _scale(effect: str, parameter: str) -> float:
     """Scale of an event's parameter in a fit [SI]."""
     scales = {
-        "time": settings.time_scale,
-        "duration": settings.duration_scale,
-        "rise": settings.rise_scale,
+        "time": _TIME_SCALE,
+        "duration": _DURATION_SCALE,
+        "rise": _RISE_SCALE,
     }
     first = _first_of(effect, parameter)
-    usual = settings.frequency_scale if first.unit == "Hz" else _tried(info_of(effect).leading)
+    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _tried(info_of(effect).leading)
     if info_of(effect).own:
         return _tried(first)
     return scales.get(first.role, usual)
@@ -123,7 +144,7 @@ def fit_events(
     timed = not info_of(effect).own
     found = look_for_events(effect, problem, rig, base, inflation) if timed else None
     shaken = None
-    least, last = problem.settings.transients.least_gain, None
+    last = None
     # what repeats begins at frequencies; other events begin where those of the usual form are
     for form in sorted(forms, key=lambda form: form.periodic):
         if form.periodic:
@@ -135,7 +156,7 @@ def fit_events(
             usual = found if last is None else last.events
             begun = usual if usual is None or form is forms[0] else _in_form(usual, form.name)
         again = None if begun is None else _jointly(begun, problem, nominal, baseline, inflation)
-        if again is not None and (last is None or 2.0 * (last.cost - again.cost) > least):
+        if again is not None and (last is None or 2.0 * (last.cost - again.cost) > _LEAST_GAIN):
             last = again
     if last is None:
         return None
@@ -251,7 +272,7 @@ def _drifting(
     """Sizes of an effect that is another one in each recording, by its signature in each; without
     those in which it is not worth it, None where it is in none.
     """
-    info, settings, values = info_of(effect), problem.settings.transients, {}
+    info, values = info_of(effect), {}
     leading = info.leading
     shapes = [
         [(p.name, x) for x in ([known[p.name]] if known and p.name in known else p.starts)]
@@ -262,7 +283,7 @@ def _drifting(
         alone, name = replace(problem, recordings=[prepared]), prepared.recording.name
         own = {key: r for key, r in base.items() if key[1] == name}
         rows, _ = stacked(alone, own, inflation)
-        least = max(settings.least_gain, settings.least_share * float(rows @ rows))
+        least = max(_LEAST_GAIN, _LEAST_SHARE * float(rows @ rows))
         for shape in itertools.product(*shapes):
             tried = {leading.name: _tried(leading), **dict(shape)}
             there = Events(effect, {name: tried}, form).put_into(rig, name)
@@ -288,10 +309,10 @@ def _scan(
     """Where the events of one recording begin, the most telling first; empty where none is worth
     it.
     """
-    settings, slots = problem.settings.transients, len(events_of(effect))
+    slots = len(events_of(effect))
     typical = _tried(info_of(effect).leading)
     length = prepared.n * prepared.dt
-    times = np.arange(settings.first_time, length - settings.last_time, settings.spacing)
+    times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
     rows, _ = stacked(problem, base, inflation)
     signatures: dict[float, Array] = {}
     for group in _apart(times, slots):
@@ -313,7 +334,7 @@ def _scan(
         )
         for place, t in enumerate(group):
             end = group[place + 1] if place + 1 < len(group) else np.inf
-            begins, ends = share >= t - settings.early, share < end - settings.early
+            begins, ends = share >= t - _EARLY, share < end - _EARLY
             signatures[float(t)] = np.where(begins & ends, change, 0.0)
     chosen: list[float] = []
     span, sizes = np.zeros((rows.size, 0)), np.zeros(0)
@@ -322,12 +343,10 @@ def _scan(
         gains = {
             t: _gain(left, signature - span @ (span.T @ signature), scaled=size is None)
             for t, signature in signatures.items()
-            if all(abs(t - s) >= settings.least_distance for s in chosen)
+            if all(abs(t - s) >= _LEAST_DISTANCE for s in chosen)
         }
         best = max(gains, key=lambda t: gains[t], default=0.0)
-        if gains.get(best, 0.0) < max(
-            settings.least_gain, settings.least_share * float(rows @ rows)
-        ):
+        if gains.get(best, 0.0) < max(_LEAST_GAIN, _LEAST_SHARE * float(rows @ rows)):
             break
         chosen.append(best)
         columns = np.stack([signatures[t] for t in chosen], axis=1)
@@ -388,10 +407,9 @@ def _fitted(
     range.
     """
     effect, start = begun.effect, begun.values[prepared.recording.name]
-    settings = alone.settings
     free = [p for p in start if p not in known and _first_of(effect, p).name not in known]
-    scale = np.array([_scale(effect, p, settings.transients) for p in free])
-    limits = [_limits(effect, p, prepared, settings.transients) for p in free]
+    scale = np.array([_scale(effect, p) for p in free])
+    limits = [_limits(effect, p, prepared) for p in free]
     low, high = (np.array([limit[k] for limit in limits]) / scale for k in (0, 1))
 
     def told(x: Array) -> dict[str, float]:
@@ -407,25 +425,22 @@ def _fitted(
         return rows, slope * scale, None
 
     try:
-        most = settings.transients.evaluations_alone
         first = np.array([start[p] for p in free]) / scale
-        x, _, _ = levenberg_marquardt(evaluate, first, (low, high), most, settings.fit)
+        x, _, _ = levenberg_marquardt(evaluate, first, (low, high), _EVALUATIONS_ALONE)
     except SimulationError:
         return None
     return told(x)
 
 
-def _limits(
-    effect: str, parameter: str, prepared: Prepared, settings: TransientSettings
-) -> tuple[float, float]:
+def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, float]:
     """Smallest and largest value of an event's parameter [SI]."""
     info = find_parameter(f"{effect}.{parameter}")
     limits = {
         "time": (0.0, prepared.n * prepared.dt),
-        "duration": (settings.least_duration, settings.most_duration),
-        "rise": (settings.least_rise, settings.most_rise),
+        "duration": (_LEAST_DURATION, _MOST_DURATION),
+        "rise": (_LEAST_RISE, _MOST_RISE),
     }
-    size = max(info.lower, -settings.most_size), min(info.upper, settings.most_size)
+    size = max(info.lower, -_MOST_SIZE), min(info.upper, _MOST_SIZE)
     if info_of(effect).own:
         size = info.lower, info.upper
     return limits.get(_first_of(effect, parameter).role, size)
@@ -441,14 +456,10 @@ def _jointly(
     what a mass does.
     """
     joint = _Joint.of(events, problem, nominal, baseline, inflation)
-    settings, count = problem.settings, len(joint.names)
+    count = len(joint.names)
     try:
         x, (values, jacobian, found), spent = levenberg_marquardt(
-            joint.evaluate,
-            joint.begin(baseline),
-            joint.bounds(),
-            settings.transients.evaluations_together,
-            settings.fit,
+            joint.evaluate, joint.begin(baseline), joint.bounds(), _EVALUATIONS_TOGETHER
         )
     except SimulationError:
         return None
@@ -526,14 +537,14 @@ class _Joint:
         places = [("", p) for p in shared] + [
             (name, p) for name, own in events.values.items() for p in own if p not in shared
         ]
-        scale = np.array([_scale(effect, p, settings.transients) for _, p in places])
+        scale = np.array([_scale(effect, p) for _, p in places])
         kept = []
         for prepared in problem.recordings:
             rows, slope = stacked(
                 replace(problem, recordings=[prepared]), baseline.residuals, inflation
             )
             kept.append(np.zeros((rows.size, 0)) if slope is None else slope[:, : len(names)])
-        scaling = Scaling(nominal, names, {}, settings.fit)
+        scaling = Scaling(nominal, names, {}, settings)
         return _Joint(events, problem, inflation, names, scaling, places, scale, kept)
 
     def told(self, x: Array) -> Events:
@@ -588,10 +599,8 @@ class _Joint:
         """Smallest and largest value of each element."""
         by_name = {p.recording.name: p for p in self.problem.recordings}
         own = [by_name[name] if name else self.problem.recordings[0] for name, _ in self.places]
-        effect, settings = self.events.effect, self.problem.settings.transients
-        limits = [
-            _limits(effect, p, r, settings) for (_, p), r in zip(self.places, own, strict=True)
-        ]
+        effect = self.events.effect
+        limits = [_limits(effect, p, r) for (_, p), r in zip(self.places, own, strict=True)]
         low = np.concatenate(
             [self.scaling.bounds[0], np.array([limit[0] for limit in limits]) / self.scale]
         )

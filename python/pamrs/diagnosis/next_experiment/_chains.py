@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import dotted
 from pamrs.control import OrificeInverse
-from pamrs.diagnosis.settings import NextExperimentSettings
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
@@ -42,6 +41,11 @@ __all__ = [
     "top_of",
     "trial_of",
 ]
+
+BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are found on the model
+# [s] rise of several chains' pressures to find where joints move: slow beside lags
+_RAMP_TIME = 15.0
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -514,7 +518,6 @@ def top_of(rig: Rig, chain: Chain, highest: float | Mapping[str, float] | None) 
 
 def pressure_range(
     rig: Rig,
-    settings: NextExperimentSettings,
     *,
     highest: float | Mapping[str, float] | None = None,
 ) -> Range:
@@ -524,8 +527,6 @@ def pressure_range(
     ----------
     rig : Rig
         A rig of one chain, or a sealed chamber.
-    settings : NextExperimentSettings
-        Bandwidth of the loop that finds them.
     highest : float or mapping, optional
         Gauge pressure that is not to be exceeded [Pa], for example the highest that was recorded.
 
@@ -559,7 +560,7 @@ def pressure_range(
     if not chain.moves:
         return Range(0.1 * top, min(0.75 * top, 7.0e5))
     ramp = np.linspace(0.0, top, 1501)
-    found = _played(rig, {"": ramp}, settings)
+    found = _played(rig, {"": ramp})
     share = _share(rig, chain.moves[0], found)
     pressure = np.maximum.accumulate(found[chain.pressure])
     low = float(pressure[np.argmax(share > 0.05)]) if (share > 0.05).any() else 0.2 * top
@@ -568,12 +569,10 @@ def pressure_range(
     return Range(low, high) if high > low else Range(0.3 * top, top)
 
 
-def _played(
-    rig: Rig, references: Mapping[str, Array], settings: NextExperimentSettings
-) -> Simulation:
+def _played(rig: Rig, references: Mapping[str, Array]) -> Simulation:
     """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
     try:
-        commands = sent_for(rig, references, sample_time=0.01, bandwidth=settings.bandwidth)
+        commands = sent_for(rig, references, sample_time=0.01, bandwidth=BANDWIDTH)
         return simulate(rig, sample_time=0.01, **driving(commands))
     except SimulationError as error:
         raise DiagnosisError(
@@ -615,7 +614,6 @@ class Spans:
 
 def spans_of(
     rig: Rig,
-    settings: NextExperimentSettings,
     *,
     highest: Mapping[str, float] | None = None,
 ) -> Spans:
@@ -626,8 +624,6 @@ def spans_of(
     ----------
     rig : Rig
         A rig of several chains.
-    settings : NextExperimentSettings
-        Bandwidth of the loops that find them, and how slowly the pressures rise.
     highest : mapping of str to float, optional
         Gauge pressures by chain that are not to be exceeded [Pa].
 
@@ -637,12 +633,14 @@ def spans_of(
         If nothing says how high the set pressure of a regulator may go, or the model does not hold
         while the pressures rise.
     """
-    chains, ramp = chains_of(rig), settings.ramp_time
+    chains = chains_of(rig)
     tops = {chain.name: top_of(rig, chain, highest) for chain in chains}
-    time = np.asarray(np.arange(round(ramp / 0.01) + 1) * 0.01, dtype=np.float64)
+    time = np.asarray(np.arange(round(_RAMP_TIME / 0.01) + 1) * 0.01, dtype=np.float64)
     # vented muscles may push like struts: nobody goes below a tenth
-    rising: dict[str, Array] = {name: top * (0.1 + 0.9 * time / ramp) for name, top in tops.items()}
-    found = _played(rig, rising, settings)
+    rising: dict[str, Array] = {
+        name: top * (0.1 + 0.9 * time / _RAMP_TIME) for name, top in tops.items()
+    }
+    found = _played(rig, rising)
     held = {c.name: _free(rig, c, chains, found, tops[c.name]).at(0.5) for c in chains}
     alone = {}
     for chain in chains:
@@ -650,9 +648,11 @@ def spans_of(
             c.name: _line(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
         }
         moving = _line(
-            time, [0.0, 2.0, ramp], [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]]
+            time,
+            [0.0, 2.0, _RAMP_TIME],
+            [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]],
         )
-        found = _played(rig, {**still, chain.name: moving}, settings)
+        found = _played(rig, {**still, chain.name: moving})
         alone[chain.name] = _free(rig, chain, [chain], found, tops[chain.name], first=200)
     return Spans(held, alone)
 

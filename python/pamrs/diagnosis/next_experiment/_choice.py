@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pamrs._losses import Losses
 from pamrs.channels import channel_of, dotted, unit_of
-from pamrs.diagnosis.fit import Key, Problem, acts_in, bin_width, two_at_a_time
+from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
 from pamrs.diagnosis.next_experiment._chains import chains_of, is_sealed
 from pamrs.diagnosis.next_experiment._differences import (
     Left,
@@ -39,9 +39,9 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.next_experiment._experiment import Experiment
 from pamrs.diagnosis.next_experiment._frame import seen_in
-from pamrs.diagnosis.next_experiment._protocols import library
+from pamrs.diagnosis.next_experiment._protocols import LEAST_SAMPLE_TIME, library
 from pamrs.diagnosis.prepare import Prepared
-from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import info_of, is_effect, place_of, term_in
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
@@ -62,6 +62,22 @@ __all__ = [
     "ranked",
     "spoken",
 ]
+
+_LEAST_PROBABILITY = 0.01  # probability below which a given hypothesis is not simulated
+# hypotheses that are simulated, the most probable ones (every pair is compared)
+_MOST_HYPOTHESES = 6
+_SETTLED_ENTROPY = 0.01  # [bit] uncertainty below which no experiment can add to the answer
+# [bit] difference of information that counts; below it the cheaper experiment is better
+_RESOLUTION = 0.02
+_MOST_SHOWN = 5  # experiments in the ranking
+_HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
+_RATE_WINDOW = 0.3  # [s] over which a rate is counted: noise of a length is then a tenth of a mm/s
+_MOST_SAMPLE_TIME = 0.01  # [s] longest sample time
+_LEAST_SEALED_SAMPLE_TIME = 0.05  # [s] shortest sample time of it
+_MOST_SEALED_SAMPLE_TIME = 1.0  # [s] longest sample time of it
+# [Pa] gauge reach of what was never recorded above: moves no muscle, far above its noise
+_LEAST_HIGHEST = 2e4
+
 
 Array = NDArray[np.float64]
 Hypothesis = tuple[str, Rig, float]
@@ -244,7 +260,7 @@ def outcome_of(
         distance[pair] = found.total
     probabilities = [p for _, _, p in hypotheses]
     bits = information(probabilities, distance)
-    effort = experiment.effort + (settings.next_experiment.sensor_effort if sensor else 0.0)
+    effort = experiment.effort + (settings.sensor_effort if sensor else 0.0)
     outcome = Outcome(
         experiment, sensor, bits, list(runs), left, distance, problems, own, weights, effort
     )
@@ -339,19 +355,18 @@ def propose(
     True
     """
     settings = DiagnosisSettings() if settings is None else settings
-    own_settings = settings.next_experiment
-    chosen = _checked(hypotheses, own_settings)
-    usual = noise_of(nominal, own_settings)
-    sound = {**noise_of(nominal, own_settings, noise), **(noise or {})}
+    chosen = _checked(hypotheses)
+    usual = noise_of(nominal)
+    sound = {**noise_of(nominal, noise), **(noise or {})}
     records = [r.recording if isinstance(r, Prepared) else r for r in recordings]
     own = _channels(nominal, records, channels)
     uncertainty = entropy([p for _, _, p in chosen])
-    if len(chosen) < 2 or uncertainty < own_settings.settled_entropy:
+    if len(chosen) < 2 or uncertainty < _SETTLED_ENTROPY:
         text = "One hypothesis is left; no experiment can add to that."
         return NextExperiment(text, {}, 0.0)
     pool = list(experiments or [])
     if experiments is None:
-        pool = experiments_of(nominal, records, own_settings)
+        pool = experiments_of(nominal, records, settings)
     found: list[Outcome] = []
     known: dict[Experiment, list[Simulation] | None] = {}
 
@@ -369,8 +384,8 @@ def propose(
 
     for sensor in ("", *_missing(nominal, own, usual)):
         for experiment in sorted(pool, key=lambda e: e.effort):
-            enough = len(found) >= own_settings.most_shown
-            if enough and max(o.bits for o in found) > uncertainty - 0.5 * own_settings.resolution:
+            enough = len(found) >= _MOST_SHOWN
+            if enough and max(o.bits for o in found) > uncertainty - 0.5 * _RESOLUTION:
                 break  # what is left costs more and cannot tell more
             one = partial(outcome, experiment, sensor)
             told = one() if losses is None else losses.part(f"experiment {experiment.name}", one)
@@ -382,12 +397,12 @@ def propose(
             f"{', '.join(own) or 'no channel'}"
         )
     probabilities = [p for _, _, p in chosen]
-    best_first = ranked(found, probabilities, own_settings.resolution)
+    best_first = ranked(found, probabilities, _RESOLUTION)
     pairs = list(itertools.permutations(range(len(chosen)), 2))
     best = best_first[0] = best_first[0].exactly(pairs, probabilities)
     return NextExperiment(
-        text=_text(best, chosen, uncertainty, own_settings.hopeless_share)
-        + _with_more(best, best_first, own_settings.resolution),
+        text=_text(best, chosen, uncertainty, _HOPELESS_SHARE)
+        + _with_more(best, best_first, _RESOLUTION),
         excitation={
             **best.experiment.excitation,
             **({"sensor": best.sensor} if best.sensor else {}),
@@ -397,10 +412,10 @@ def propose(
             RankedExperiment(
                 o.experiment.name, o.experiment.text, o.sensor, round(o.bits, 3), round(o.effort, 1)
             )
-            for o in best_first[: own_settings.most_shown]
+            for o in best_first[:_MOST_SHOWN]
         ],
         curves=_curves(best, chosen),
-        pairs=_pairs(best_first, chosen, own_settings.resolution),
+        pairs=_pairs(best_first, chosen, _RESOLUTION),
         protocol=protocol_of(best.experiment),
     )
 
@@ -498,9 +513,7 @@ def _with_more(best: Outcome, best_first: Sequence[Outcome], resolution: float) 
     return f" With {most.experiment.needs}, {most.bits:.2f} bit: {most.experiment.text}."
 
 
-def _checked(
-    hypotheses: Sequence[Hypothesis], settings: NextExperimentSettings
-) -> list[Hypothesis]:
+def _checked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
     """The hypotheses that count, the most probable first."""
     if not hypotheses:
         raise ParameterError(
@@ -517,8 +530,8 @@ def _checked(
                 "from 0 to 1"
             )
     ranked = sorted(hypotheses, key=lambda h: -h[2])
-    likely = [h for h in ranked if h[2] >= settings.least_probability]
-    return likely[: settings.most_hypotheses] or ranked[:1]
+    likely = [h for h in ranked if h[2] >= _LEAST_PROBABILITY]
+    return likely[:_MOST_HYPOTHESES] or ranked[:1]
 
 
 def _channels(
@@ -549,7 +562,7 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
 def experiments_of(
     rig: Rig,
     records: Sequence[Recording],
-    settings: NextExperimentSettings,
+    settings: DiagnosisSettings,
     only: Collection[str] | None = None,
 ) -> list[Experiment]:
     """The experiments of the rig (those of some kinds, if they are given), at the sample time and
@@ -562,9 +575,9 @@ def experiments_of(
     """
     if not records:
         return library(rig, settings, only=only)
-    shortest, longest = settings.least_sample_time, settings.most_sample_time
+    shortest, longest = LEAST_SAMPLE_TIME, _MOST_SAMPLE_TIME
     if is_sealed(rig):
-        shortest, longest = settings.least_sealed_sample_time, settings.most_sealed_sample_time
+        shortest, longest = _LEAST_SEALED_SAMPLE_TIME, _MOST_SEALED_SAMPLE_TIME
     step = min(max(min(r.sample_time for r in records), shortest), longest)
     every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
     seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
@@ -577,12 +590,12 @@ def experiments_of(
             if name in r.channels and np.isfinite(r.channels[name]).any()
         ]
         if peaks:  # of one that nobody filled as well: it is filled no further
-            limits[chain] = max(*peaks, settings.least_highest)
+            limits[chain] = max(*peaks, _LEAST_HIGHEST)
     if limits:
         # what has no gauge is moved no higher than what has one
         highest = max(limits.values())
         limits = {chain: limits.get(chain, highest) for chain in seen}
-    shown = seen_in(rig, records, settings.rate_window) if has_frame(rig) else None
+    shown = seen_in(rig, records, _RATE_WINDOW) if has_frame(rig) else None
     return library(rig, settings, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
@@ -633,7 +646,7 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
     labels = [label for label, _, _ in hypotheses]
     prepared = best.problem.recordings[0]
     settings = best.problem.settings
-    width = bin_width(prepared, settings.noise.fit_bin_time)
+    width = bin_width(prepared, FIT_BIN_TIME)
     return Curves(
         experiment=best.experiment.name,
         text=best.experiment.text,
@@ -652,5 +665,5 @@ def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
         left={labels[j]: best.left[0, j].rows[key] for j in others},
         noise=prepared.noise[channel] / math.sqrt(width) * best.weights[key],
         command=best.experiment.command,
-        samples_counted=counted(prepared, block, settings.next_experiment),
+        samples_counted=counted(prepared, block, settings),
     )

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from pamrs._normal import solve_normal
 from pamrs.channels import channel_of
-from pamrs.diagnosis.fit import Key, Problem, bin_width, free_baseline, residuals
+from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, bin_width, free_baseline, residuals
 from pamrs.diagnosis.noise import bins_of, noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -31,7 +31,7 @@ from pamrs.diagnosis.prepare import (
     prepare,
     thermometers_of,
 )
-from pamrs.diagnosis.settings import DiagnosisSettings, NextExperimentSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -55,6 +55,18 @@ __all__ = [
     "weights_of",
 ]
 
+# realisations of the drives' noise for an experiment's noise level: a fifth is enough
+_REPLICATES = 4
+# relative standard deviation of an effect's parameter of which a model says none
+_KNOWN_SHARE = 0.5
+# [Pa] of a pressure where no recording tells: usual 14 bar transducer, 16-bit converter
+_PRESSURE_NOISE = 200.0
+_ANGLE_NOISE = math.radians(0.03)  # [rad] of an angle: usual Hall sensor
+_LENGTH_NOISE = 3e-5  # [m] of a length: usual linear transducer
+_TEMPERATURE_NOISE = 0.1  # [K] of a gas's temperature: usual thermocouple amplifier
+_FORCE_NOISE = 1.0  # [N] of a force: usual load cell of 2 to 5 kN, 0.02 to 0.05 % of its range
+
+
 Array = NDArray[np.float64]
 
 COMMANDS = ("valve_command", "supply_command")
@@ -64,25 +76,23 @@ _MEASURABLE = (*COMMANDS, *_PRESSURES, "joint_angle", "length", "force", "temper
 """Channels that the cut chain uses."""
 
 
-def usual_noise(settings: NextExperimentSettings) -> dict[str, float]:
+def usual_noise() -> dict[str, float]:
     """Sample noise of usual transducers by channel [SI]."""
-    pressures = dict.fromkeys(_PRESSURES, settings.pressure_noise)
+    pressures = dict.fromkeys(_PRESSURES, _PRESSURE_NOISE)
     return pressures | {
-        "joint_angle": settings.angle_noise,
-        "length": settings.length_noise,
-        "force": settings.force_noise,
-        "temperature": settings.temperature_noise,
+        "joint_angle": _ANGLE_NOISE,
+        "length": _LENGTH_NOISE,
+        "force": _FORCE_NOISE,
+        "temperature": _TEMPERATURE_NOISE,
     }
 
 
-def noise_of(
-    rig: Rig, settings: NextExperimentSettings, given: Mapping[str, float] | None = None
-) -> dict[str, float]:
+def noise_of(rig: Rig, given: Mapping[str, float] | None = None) -> dict[str, float]:
     """Sample noise of every channel of a rig that the cut chain uses [SI]: that of usual
     transducers, where none is given for the channel, or for all of its kind.
     """
-    usual = usual_noise(settings) | dict(given or {})
-    names = [name for kind in usual_noise(settings) for name in measurable(rig, kind)]
+    usual = usual_noise() | dict(given or {})
+    names = [name for kind in usual_noise() for name in measurable(rig, kind)]
     return {name: usual.get(name, usual[channel_of(name)]) for name in names}
 
 
@@ -187,7 +197,7 @@ def problem_of(
     DiagnosisError
         If they surround no block.
     """
-    blocks = available_blocks(rig, channels, settings.prepare)
+    blocks = available_blocks(rig, channels)
     if not blocks:
         raise DiagnosisError(
             f"channels = {', '.join(channels) or 'none'} do not surround any block of rig "
@@ -214,7 +224,7 @@ def judged_alike(problems: Sequence[Problem]) -> list[Problem]:
     ]
 
 
-def counted(prepared: Prepared, block: Block, settings: NextExperimentSettings) -> float:
+def counted(prepared: Prepared, block: Block, settings: DiagnosisSettings) -> float:
     """Independent samples that a recording counts as in a block: fewer where its beginning is not
     judged.
     """
@@ -251,8 +261,8 @@ def weights_of(problem: Problem, rig: Rig) -> dict[Key, float]:
     """Noise level of a block's bin means over a recording, as a multiple of its white part: what
     drives' noise adds (>= 1).
     """
-    few = replace(problem.settings.noise, replicates=problem.settings.next_experiment.replicates)
-    fewer = replace(problem, settings=replace(problem.settings, noise=few))
+    few = replace(problem.settings, noise_replicates=_REPLICATES)
+    fewer = replace(problem, settings=few)
     found = noise_levels(fewer, core_rig(rig))
     out = {}
     for prepared in problem.recordings:
@@ -274,7 +284,7 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
         spread = rig.effect_std.get(label, {})
         for parameter, given in effect["parameters"].items():
             name, value = f"{label}.{parameter}", abs(given)
-            std = spread.get(parameter, problem.settings.next_experiment.known_share * value)
+            std = spread.get(parameter, _KNOWN_SHARE * value)
             if name in known and math.isfinite(std) and std > 0.0:
                 out[name] = min(std, 2.0 * value) if value > 0.0 else std
     return out
@@ -346,12 +356,12 @@ def _left(
     problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
 ) -> Left:
     spread = np.array(list(model.free.values()))
-    own_settings = problem.settings.next_experiment
+    own_settings = problem.settings
     rows, slopes, scales = [], [], []
     keys: list[Key] = []
     sizes: dict[Key, float] = {}
     for prepared in problem.recordings:
-        width = bin_width(prepared, problem.settings.noise.fit_bin_time)
+        width = bin_width(prepared, FIT_BIN_TIME)
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)
             r = model.found[key]

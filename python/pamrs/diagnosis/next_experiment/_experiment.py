@@ -33,6 +33,12 @@ __all__ = [
     "within",
 ]
 
+# [Hz] of a multisine, lowest first: from slow creep to the band of an arm's joint
+MULTISINE_FREQUENCIES = (0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1)
+# from one to the next, shared by multisines of several chains: just below their mean, 1.77
+FREQUENCY_RATIO = 1.7
+
+
 Array = NDArray[np.float64]
 Points = list[tuple[float, float]]
 

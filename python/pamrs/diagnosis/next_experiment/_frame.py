@@ -17,12 +17,21 @@ from numpy.typing import NDArray
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.next_experiment._chains import Chain, Range, Spans, chains_of, top_of
-from pamrs.diagnosis.settings import NextExperimentSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import reading, simulate
 
 __all__ = ["Frame", "Seen", "frame_of", "seen_in"]
+
+# stroke, share of the length: well beyond presliding, well inside what muscles do
+_LEAST_STROKE = 0.1
+_WORTH_STROKE = 0.01  # least stroke worth moving, share of the length: a few times presliding
+# share of the pull at its longest or fullest from which a muscle is not slack
+_PULLING_SHARE = 0.05
+# place between shortest and longest length held: near the long end muscles pull early
+_HELD_SHARE = 0.7
+
 
 Array = NDArray[np.float64]
 
@@ -102,8 +111,6 @@ class Frame:
     ----------
     rig : Rig
         The rig that it is a part of.
-    settings : NextExperimentSettings
-        From where on a muscle pulls, and a stroke is one.
     lengths : Range
         Shortest and longest length [m].
     rate : float
@@ -117,7 +124,6 @@ class Frame:
     """
 
     rig: Rig
-    settings: NextExperimentSettings
     lengths: Range
     rate: float
     held: float
@@ -130,16 +136,15 @@ class Frame:
         """
         pressures = {name: span.at(share) for name, span in self.spans.alone.items()}
         chambers = {chain.chamber: pressures[chain.name] for chain in chains_of(self.rig)}
-        own = self.settings
-        low = _shortest(self.rig, chambers, self.lengths, own.pulling_share)
-        if self.lengths.high - low < own.worth_stroke * self.lengths.high:
+        low = _shortest(self.rig, chambers, self.lengths, _PULLING_SHARE)
+        if self.lengths.high - low < _WORTH_STROKE * self.lengths.high:
             return None
         return Range(low, self.lengths.high)
 
 
 def frame_of(
     rig: Rig,
-    settings: NextExperimentSettings,
+    settings: DiagnosisSettings,
     highest: float | Mapping[str, float] | None = None,
     seen: Seen | None = None,
 ) -> Frame:
@@ -154,7 +159,7 @@ def frame_of(
     ----------
     rig : Rig
         A rig with a frame and chains.
-    settings : NextExperimentSettings
+    settings : DiagnosisSettings
         Rates of a plain testing machine, and the least stroke.
     highest : float or mapping of str to float, optional
         Gauge pressures that are not to be exceeded [Pa].
@@ -173,13 +178,13 @@ def frame_of(
     longest = min(load["max_length"], rest if seen is None else seen.lengths.high)
     whole = Range(min(load["min_length"], longest), longest)
     half = {c.chamber: 0.5 * tops[c.name] for c in chains}
-    shortest = _shortest(rig, half, whole, settings.pulling_share)
+    shortest = _shortest(rig, half, whole, _PULLING_SHARE)
     if seen is not None:
-        least = longest - settings.least_stroke * rest
+        least = longest - _LEAST_STROKE * rest
         shortest = max(whole.low, min(seen.lengths.low, max(shortest, least)))
     lengths = Range(shortest, longest)
-    held = lengths.at(settings.held_share)
-    share = _lowest(rig, chains, tops, held, settings.pulling_share)
+    held = lengths.at(_HELD_SHARE)
+    share = _lowest(rig, chains, tops, held, _PULLING_SHARE)
     alone = {}
     for chain in chains:
         top = tops[chain.name]
@@ -189,7 +194,6 @@ def frame_of(
         alone[chain.name] = Range(low, top)
     return Frame(
         rig,
-        settings,
         lengths,
         max(settings.length_rate, 0.0 if seen is None else seen.rate),
         held,

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from pamrs._normal import solve_normal
 from pamrs.diagnosis.fit import (
+    FIT_BIN_TIME,
     Key,
     Problem,
     Start,
@@ -50,7 +51,7 @@ from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
-from pamrs.diagnosis.settings import DiagnosisSettings, PlanSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, info_of, term_of
 from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
 from pamrs.report.text import spoken_name
@@ -59,6 +60,17 @@ from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
 __all__ = ["plan_diagnosis"]
+
+# [noise levels] from which an arm, which scatters most, is suspect (decision 14)
+_SUSPECT_FROM = math.sqrt(0.45)
+# cosine of two signatures from which their effects are one (isolability as in Ding (2013))
+_SAME_COSINE = 0.95
+# [noise levels] what must be left of an effect when another one explains all that it can
+_APART = 1.0
+_MOST_MULTIPLE = 1e4  # [typical sizes] largest size of an effect that is worth telling
+# halvings of a size until a rig can have it: below a hundredth it is another effect
+_MOST_HALVINGS = 8
+
 
 Array = NDArray[np.float64]
 
@@ -195,15 +207,15 @@ def plan_diagnosis(
     _check_rig(rig)
     settings = DiagnosisSettings() if settings is None else settings
     own = checked_channels(rig, tuple(channels))
-    sound = _noise(rig, noise, settings)
+    sound = _noise(rig, noise)
     say = progress or (lambda _: None)
     every = measurable(rig)
-    whole = available_blocks(rig, every, settings.prepare)
-    pool = {e.name: e for e in library(rig, settings.next_experiment)}
+    whole = available_blocks(rig, every)
+    pool = {e.name: e for e in library(rig, settings)}
     chosen = _chosen(rig, pool, experiments)
-    starts = _starts(rig, whole, settings.plan.most_halvings)
+    starts = _starts(rig, whole, _MOST_HALVINGS)
     parts: dict[_Place, _Part] = {}
-    layers = _layers(rig, own, every, settings)
+    layers = _layers(rig, own, every)
     together = [block for _, blocks in layers for block in blocks]
     free = free_baseline(Problem(together, [], core_rig(rig), settings), rig)
     usable = {}
@@ -220,7 +232,7 @@ def plan_diagnosis(
             continue  # the cut chain leaves the range of the model there
         usable[name] = experiment
     chosen = [name for name in chosen if name in usable]
-    blocks = available_blocks(rig, own, settings.prepare)
+    blocks = available_blocks(rig, own)
     assumed = _Assumed(rig, parts, starts, settings)
     now = assumed.picture(blocks, chosen)
     order = list(now.sights)
@@ -259,9 +271,7 @@ class _Assumed:
 
     def blocks(self, channels: tuple[str, ...]) -> list[Block]:
         """Blocks that some channels tell apart."""
-        return available_blocks(
-            self.rig, checked_channels(self.rig, channels), self.settings.prepare
-        )
+        return available_blocks(self.rig, checked_channels(self.rig, channels))
 
     def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
         """What some blocks over some experiments show."""
@@ -319,11 +329,9 @@ def _check_rig(rig: Rig) -> None:
         )
 
 
-def _noise(
-    rig: Rig, given: Mapping[str, float] | None, settings: DiagnosisSettings
-) -> dict[str, float]:
+def _noise(rig: Rig, given: Mapping[str, float] | None) -> dict[str, float]:
     """Sample noise of every channel [SI]."""
-    usual, own = usual_noise(settings.next_experiment), noise_of(rig, settings.next_experiment)
+    usual, own = usual_noise(), noise_of(rig)
     for name, value in (given or {}).items():
         if name not in usual and name not in own:
             raise ParameterError(
@@ -335,7 +343,7 @@ def _noise(
                 f"noise of {name} = {value} is not allowed: a finite number > 0 is needed"
             )
     told = {name: float(value) for name, value in (given or {}).items()}
-    return noise_of(rig, settings.next_experiment, told)
+    return noise_of(rig, told)
 
 
 def _chosen(
@@ -395,7 +403,7 @@ def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
 
 
 def _layers(
-    rig: Rig, own: tuple[str, ...], every: tuple[str, ...], settings: DiagnosisSettings
+    rig: Rig, own: tuple[str, ...], every: tuple[str, ...]
 ) -> list[tuple[tuple[str, ...], list[Block]]]:
     """Every block that some channels surround, with these channels: all of them, those at hand, and
     these with one more (two where they surround none). With a gauge less, a block may be driven by
@@ -403,11 +411,11 @@ def _layers(
     """
     lacking = [c for c in every if c not in own]
     few = [every, own, *((*own, channel) for channel in lacking)]
-    if not available_blocks(rig, own, settings.prepare):
+    if not available_blocks(rig, own):
         few += [(*own, *several) for several in itertools.combinations(lacking, 2)]
     layers: list[tuple[tuple[str, ...], list[Block]]] = []
     for channels in few:
-        blocks = available_blocks(rig, channels, settings.prepare)
+        blocks = available_blocks(rig, channels)
         new = [b for b in blocks if all(b not in there for _, there in layers)]
         if new:
             layers.append((channels, new))
@@ -447,9 +455,9 @@ def _parts(
     problem = Problem(blocks, [prepared], core_rig(stands), settings)
     base = residuals(problem, stands, baseline)
     weights = weights_of(problem, stands)
-    known = known_parameters(stands, settings.fit)
+    known = known_parameters(stands)
     spread = np.array([known[name].tol for name in baseline])
-    width = bin_width(prepared, settings.noise.fit_bin_time)
+    width = bin_width(prepared, FIT_BIN_TIME)
     scale, slopes, moved = {}, {}, {}
     for block in blocks:
         key = (block.name, experiment.name)
@@ -458,7 +466,7 @@ def _parts(
             np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
         )
         noise_level = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
-        effective = counted(prepared, block, settings.next_experiment)
+        effective = counted(prepared, block, settings)
         scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
@@ -497,7 +505,6 @@ def _picture(
         if block in blocks and name in experiments
     }
     effects = list(dict.fromkeys(s.effect for s in starts))
-    own_settings = settings.plan
     if not used:
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
     shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
@@ -513,7 +520,7 @@ def _picture(
                 0.0,
                 None,
             )
-            / settings.next_experiment.effective_samples
+            / settings.effective_samples
         )
         for key, p in used.items()
     }
@@ -528,7 +535,7 @@ def _picture(
             key=lambda pair: float(sizes[pair[1]][pair[0]]),
         )
         best[effect] = index
-        sights[effect] = _sight(starts[index], float(sizes[key][index]), key, own_settings)
+        sights[effect] = _sight(starts[index], float(sizes[key][index]), key, settings)
     shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in effects}
     cosine, unseparated = {}, set()
     for first, second in itertools.combinations(effects, 2):
@@ -540,8 +547,8 @@ def _picture(
             sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)),
             sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
         )
-        seen = min(sights[first].left, sights[second].left) >= own_settings.seen
-        alike = cosine[first, second] > own_settings.same_cosine or left < own_settings.apart
+        seen = min(sights[first].left, sights[second].left) >= settings.seen
+        alike = cosine[first, second] > _SAME_COSINE or left < _APART
         if seen and alike:
             unseparated.add((first, second))
     chosen = [best[e] for e in effects]
@@ -549,11 +556,11 @@ def _picture(
     return _Picture(sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0))
 
 
-def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight:
+def _sight(start: Start, left: float, key: Key, settings: DiagnosisSettings) -> Sight:
     """How an effect shows from the start that shows most."""
     if left < 1e-6:
         return Sight(start.effect, 0.0)
-    marginal = left >= settings.suspect_from
+    marginal = left >= _SUSPECT_FROM
     verdict = "seen" if left >= settings.seen else "marginal" if marginal else "not seen"
     if not start.scalable:
         return Sight(start.effect, left, *key, verdict=verdict)
@@ -562,7 +569,7 @@ def _sight(start: Start, left: float, key: Key, settings: PlanSettings) -> Sight
     found = start.scaled(size).free[leading]
     # one that its bounds hold shows less than that
     whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
-    smallest = abs(found) if size < settings.most_multiple and not whole else math.nan
+    smallest = abs(found) if size < _MOST_MULTIPLE and not whole else math.nan
     return Sight(start.effect, left, *key, leading, typical, smallest, verdict)
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import dotted
 from pamrs.diagnosis.next_experiment._chains import (
+    BANDWIDTH,
     Range,
     can_shut,
     chains_of,
@@ -26,6 +26,7 @@ from pamrs.diagnosis.next_experiment._chains import (
     trial_of,
 )
 from pamrs.diagnosis.next_experiment._experiment import (
+    MULTISINE_FREQUENCIES,
     Experiment,
     Points,
     in_bar,
@@ -40,13 +41,20 @@ from pamrs.diagnosis.next_experiment._frame import Seen, frame_of
 from pamrs.diagnosis.next_experiment._several import several_library
 from pamrs.diagnosis.next_experiment._stand import Stand
 from pamrs.diagnosis.next_experiment._strokes import stroke_library
-from pamrs.diagnosis.settings import NextExperimentSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
 __all__ = ["library"]
+
+_SAMPLE_TIME = 0.005  # [s] sample time of an experiment where no recording tells
+LEAST_SAMPLE_TIME = 0.002  # [s] shortest sample time
+_SEALED_SAMPLE_TIME = 0.1  # [s] sample time for a chamber without a valve, which changes slowly
+# samples of a pressure that blows over, which may take 1 s to 60 s (20 ms at most)
+_MOST_BLOWN_SAMPLES = 3000
+
 
 Array = NDArray[np.float64]
 
@@ -57,9 +65,9 @@ _SHUTTING = ("sealed_hold", "step_and_shut", "null_ramp", "holds_both_sides")
 class _Maker:
     """Builds the experiments of one rig."""
 
-    def __init__(self, stand: Stand, span: Range, settings: NextExperimentSettings) -> None:
+    def __init__(self, stand: Stand, span: Range) -> None:
         self.stand, self.rig, self.dt, self.span = stand, stand.rig, stand.sample_time, span
-        self.bandwidth, self.frequencies = settings.bandwidth, settings.multisine_frequencies
+        self.bandwidth, self.frequencies = BANDWIDTH, MULTISINE_FREQUENCIES
         (self.chain,) = stand.chains
         regulated = stand.regulated
         self.what = "the regulator's set pressure" if regulated else "the muscle pressure"
@@ -314,7 +322,7 @@ class _Maker:
         )
 
 
-def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> list[Experiment]:
+def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experiment]:
     """Fills of all chambers, shut off and left alone; where lines join several chambers, also of
     one, which then blows over into the others.
     """
@@ -336,7 +344,7 @@ def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> 
             "that moment"
         )
         begin = {dotted("muscle_pressure", chamber): pressure for chamber in chambers}
-        out.append(_left_alone(name, text, begin, seconds, settings.sealed_sample_time))
+        out.append(_left_alone(name, text, begin, seconds, sample_time))
     for chamber in chambers:
         reached = joined(rig, qualified("chamber", chamber))
         if not reached:
@@ -344,14 +352,14 @@ def _sealed_library(rig: Rig, settings: NextExperimentSettings, span: Range) -> 
         begin = {dotted("muscle_pressure", other): span.low for other in chambers}
         begin[dotted("muscle_pressure", chamber)] = span.high
         try:
-            seconds = _equalised(rig, begin, [chamber, *reached], settings)
+            seconds = _equalised(rig, begin, [chamber, *reached])
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
         text = (
             f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
             f"bar, open what lies between and record {seconds:.2g} s from that moment"
         )
-        step = max(settings.least_sample_time, seconds / settings.most_blown_samples)
+        step = max(LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
 
@@ -366,13 +374,11 @@ def _outlets(rig: Rig) -> bool:
     return any(ends["to"] == "ambient" for ends in rig.ports("line").values())
 
 
-def _equalised(
-    rig: Rig, begin: dict[str, float], joining: Collection[str], settings: NextExperimentSettings
-) -> float:
+def _equalised(rig: Rig, begin: dict[str, float], joining: Collection[str]) -> float:
     """Three times as long as chambers that lines join take to come within a hundredth of each other
     [s], from 1 s to 60 s.
     """
-    found = simulate(rig, sample_time=settings.sample_time, duration=20.0, initial=begin)
+    found = simulate(rig, sample_time=_SAMPLE_TIME, duration=20.0, initial=begin)
     each = np.array([found[dotted("muscle_pressure", name)] for name in joining])
     apart = each.max(axis=0) - each.min(axis=0)
     late = np.flatnonzero(apart > 0.01 * apart[0])
@@ -394,7 +400,7 @@ def _left_alone(
 
 def library(
     rig: Rig,
-    settings: NextExperimentSettings,
+    settings: DiagnosisSettings,
     *,
     sample_time: float | None = None,
     highest: float | Mapping[str, float] | None = None,
@@ -408,7 +414,7 @@ def library(
     rig : Rig
         A rig with valves or regulators, with or without arms or a load; a load frame that sets the
         pressures itself; or chambers that nobody sends a command to.
-    settings : NextExperimentSettings
+    settings : DiagnosisSettings
         Sample time where none is given, and bandwidth of the pressure loop.
     sample_time : float, optional
         Time between samples [s].
@@ -445,25 +451,24 @@ def library(
             f"highest has {unknown[0]!r}, which is not allowed: of rig {rig.name!r} one of "
             f"{', '.join(map(repr, names))}"
         )
-    step = settings.sample_time if sample_time is None else sample_time
+    usual = _SAMPLE_TIME if chains else _SEALED_SAMPLE_TIME
+    step = usual if sample_time is None else sample_time
     if not chains:
-        if sample_time is not None:
-            settings = replace(settings, sealed_sample_time=sample_time)
-        span = pressure_range(rig, settings, highest=highest)
-        sealed = _sealed_library(rig, settings, span)
+        span = pressure_range(rig, highest=highest)
+        sealed = _sealed_library(rig, span, step)
         return [e for e in sealed if only is None or e.name in only or e.kind in only]
     frame = frame_of(rig, settings, highest, seen) if has_frame(rig) else None
-    stand = Stand(rig, chains, step, settings.bandwidth, frame)
+    stand = Stand(rig, chains, step, BANDWIDTH, frame)
     if len(chains) > 1:
         if not isinstance(highest, Mapping):
             highest = {} if highest is None else {c.name: highest for c in chains}
-        makers = several_library(stand, settings, highest)
+        makers = several_library(stand, highest)
     elif frame is not None:
-        makers = _of_one(_Maker(stand, frame.spans.alone[""], settings))
+        makers = _of_one(_Maker(stand, frame.spans.alone[""]))
     else:
-        span = pressure_range(rig, settings, highest=highest)
-        makers = _of_one(_Maker(stand, span, settings))
-    makers |= stroke_library(stand, settings)
+        span = pressure_range(rig, highest=highest)
+        makers = _of_one(_Maker(stand, span))
+    makers |= stroke_library(stand)
     out = []
     for name, maker in makers.items():
         if only is not None and name not in only and name.partition(".")[0] not in only:

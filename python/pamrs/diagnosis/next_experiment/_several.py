@@ -23,6 +23,8 @@ from pamrs.diagnosis.next_experiment._chains import (
     spans_of,
 )
 from pamrs.diagnosis.next_experiment._experiment import (
+    FREQUENCY_RATIO,
+    MULTISINE_FREQUENCIES,
     Experiment,
     Points,
     in_bar,
@@ -35,7 +37,6 @@ from pamrs.diagnosis.next_experiment._experiment import (
     within,
 )
 from pamrs.diagnosis.next_experiment._stand import Stand
-from pamrs.diagnosis.settings import NextExperimentSettings
 
 __all__ = ["several_library"]
 
@@ -43,7 +44,7 @@ Array = NDArray[np.float64]
 
 
 def several_library(
-    stand: Stand, settings: NextExperimentSettings, highest: Mapping[str, float]
+    stand: Stand, highest: Mapping[str, float]
 ) -> dict[str, Callable[[], Experiment | None]]:
     """What makes each experiment of a rig of several chains, by its name.
 
@@ -51,12 +52,10 @@ def several_library(
     ----------
     stand : Stand
         The rig with all of its chains.
-    settings : NextExperimentSettings
-        How pressures are found, and frequencies.
     highest : mapping of str to float
         Gauge pressures by chain that are not to be exceeded [Pa].
     """
-    make, rig, chains = _Several(stand, settings, highest), stand.rig, stand.chains
+    make, rig, chains = _Several(stand, highest), stand.rig, stand.chains
     all_shut = all(can_shut(rig, chain) for chain in chains)
     makers: dict[str, Callable[[], Experiment | None]] = {"multisine": make.multisine}
     if all_shut:
@@ -80,12 +79,10 @@ def several_library(
 class _Several:
     """Builds the experiments of one rig of several chains."""
 
-    def __init__(
-        self, stand: Stand, settings: NextExperimentSettings, highest: Mapping[str, float]
-    ) -> None:
+    def __init__(self, stand: Stand, highest: Mapping[str, float]) -> None:
         self.stand, self.driven = stand, stand.driven
         self.rig, self.chains, self.dt = stand.rig, stand.chains, stand.sample_time
-        self.settings, self.highest = settings, highest
+        self.highest = highest
         self.what = "set pressure" if stand.regulated else "pressure"
 
     @cached_property
@@ -93,7 +90,7 @@ class _Several:
         """Between which pressures the chains move; found with the first experiment."""
         if self.stand.frame is not None:
             return self.stand.frame.spans
-        return spans_of(self.rig, self.settings, highest=self.highest)
+        return spans_of(self.rig, highest=self.highest)
 
     def alone(
         self,
@@ -166,10 +163,11 @@ class _Several:
 
     def multisine(self) -> Experiment:
         time = np.asarray(np.arange(round(30.0 / self.dt) + 1) * self.dt, dtype=np.float64)
-        usual, ratio = self.settings.multisine_frequencies, self.settings.frequency_ratio
         references, used = {}, {}
         for k, chain in enumerate(self.chains):
-            frequencies = np.array(usual) * ratio ** (k / len(self.chains))
+            frequencies = np.array(MULTISINE_FREQUENCIES) * FREQUENCY_RATIO ** (
+                k / len(self.chains)
+            )
             wave = waves(frequencies, time, 2.0 * k)
             span, begin = self.reach(chain), chain.before(self.rig)
             moved = span.at(0.5) + 0.5 * wave / np.abs(wave).max() * (span.high - span.low)
@@ -179,7 +177,8 @@ class _Several:
         words, numbers = self.levels()
         text = (
             f"drive every {self.what} as a multisine of its own, with no frequency in common, of "
-            f"{usual[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, for 30 s"
+            f"{MULTISINE_FREQUENCIES[0]:g} to {max(f[-1] for f in used.values()):.2g} Hz: {words}, "
+            "for 30 s"
         )
         return self.driven("multisine", text, {"frequencies_hz": used, **numbers}, references)
 

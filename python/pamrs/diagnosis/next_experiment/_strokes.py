@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.next_experiment._chains import Range, can_shut
 from pamrs.diagnosis.next_experiment._experiment import (
+    FREQUENCY_RATIO,
     MM,
+    MULTISINE_FREQUENCIES,
     Experiment,
     Points,
     in_bar,
@@ -27,28 +29,26 @@ from pamrs.diagnosis.next_experiment._experiment import (
 )
 from pamrs.diagnosis.next_experiment._frame import Frame
 from pamrs.diagnosis.next_experiment._stand import Stand
-from pamrs.diagnosis.settings import NextExperimentSettings
 
 __all__ = ["stroke_library"]
+
+_FILLING_TIME = 3.0  # [s] before a load frame moves: 1 s to fill a muscle, the rest to settle
+
 
 Array = NDArray[np.float64]
 
 
-def stroke_library(
-    stand: Stand, settings: NextExperimentSettings
-) -> dict[str, Callable[[], Experiment | None]]:
+def stroke_library(stand: Stand) -> dict[str, Callable[[], Experiment | None]]:
     """What makes each experiment in which a load frame moves the length, by its name.
 
     Parameters
     ----------
     stand : Stand
         A rig with a frame.
-    settings : NextExperimentSettings
-        Frequencies of multisines.
     """
     if stand.frame is None:
         return {}
-    make = _Strokes(stand, stand.frame, settings)
+    make = _Strokes(stand, stand.frame)
     makers: dict[str, Callable[[], Experiment | None]] = {
         "slow_strokes": make.slow,
         "length_steps": make.steps,
@@ -66,9 +66,9 @@ def stroke_library(
 class _Strokes:
     """Builds them for one rig."""
 
-    def __init__(self, stand: Stand, frame: Frame, settings: NextExperimentSettings) -> None:
-        self.stand, self.frame, self.settings = stand, frame, settings
-        self.fill = settings.filling_time
+    def __init__(self, stand: Stand, frame: Frame) -> None:
+        self.stand, self.frame = stand, frame
+        self.fill = _FILLING_TIME
         self.dt = stand.sample_time
 
     def quickest(self, stroke: Range) -> float:
@@ -262,9 +262,9 @@ class _Strokes:
         rows = round((seconds + self.fill) / self.dt) + 1
         time = np.asarray(np.arange(rows) * self.dt, dtype=np.float64)
         faded = np.clip(time / self.fill, 0.0, 1.0)
-        usual, ratio = np.array(self.settings.multisine_frequencies), self.settings.frequency_ratio
+        usual = np.array(MULTISINE_FREQUENCIES)
         count = len(self.stand.chains) + 1
-        each = [usual * ratio ** (k / count) for k in range(count)]
+        each = [usual * FREQUENCY_RATIO ** (k / count) for k in range(count)]
         # a machine is slower than a valve: the length has the lower half, down to half of it
         middle, reach = stroke.at(0.5), 0.45 * (stroke.high - stroke.low)
         each[0] = each[0][: max(1, each[0].size // 2)]

@@ -7,10 +7,11 @@ Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `correlatio
 
 from __future__ import annotations
 
-from pamrs.diagnosis.noise._autocorrelation import correlation_time, inflation
+from pamrs.diagnosis.noise._autocorrelation import CORRELATED_VARIANCE, correlation_time, inflation
 from pamrs.diagnosis.noise._levels import Excess, NoiseLevel, bins_of, excess, noise_levels
 
 __all__ = [
+    "CORRELATED_VARIANCE",
     "Excess",
     "NoiseLevel",
     "bins_of",

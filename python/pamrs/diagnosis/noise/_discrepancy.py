@@ -16,6 +16,10 @@ from pamrs.errors import SimulationError
 
 __all__ = ["Stated", "curves", "visited", "whitening"]
 
+# waves of a stated error: a shift, one to fifteen half periods over the visited (decision 95)
+_CURVE_WAVES = 16
+
+
 Array = NDArray[np.float64]
 Stated = Mapping[str, Mapping[str, float]]
 Ranges = Mapping[str, tuple[float, float]]
@@ -82,7 +86,7 @@ def curves(
         What each wave, one standard deviation high, does to the bin means, in the channel's unit;
         None where no error acts here.
     """
-    waves = _waves(prepared.settings.noise.curve_waves)
+    waves = _waves(_CURVE_WAVES)
 
     def over(name: str) -> list[Array]:
         low, wide = ranges[name]

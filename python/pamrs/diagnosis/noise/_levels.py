@@ -15,13 +15,24 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from pamrs import _core
-from pamrs.diagnosis.fit import Key, Problem, bin_width
+from pamrs.diagnosis.fit import PIECE_TIME, Key, Problem, bin_width
 from pamrs.diagnosis.noise._discrepancy import Stated, curves, visited, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
-from pamrs.diagnosis.settings import NoiseSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import SimulationError
 
 __all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
+
+_BIN_TIME = 0.1  # [s] bins of residuals against noise: what is missing is slower (decision 14)
+_LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
+# variance over the noise's that is a mismatch however that scatters (decision 22)
+_MOST_LIMIT = 2.5
+# numbers of a stated error, as its square scatters: bumps of a force curve over a stroke
+_STATED_FREEDOM = 4.0
+# share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
+_CURVE_REST = 0.02
+_MOST_LOG_LIMIT = 1.0  # largest logarithm of what the scatter adds to the margin
+
 
 Array = NDArray[np.float64]
 
@@ -95,8 +106,7 @@ class Excess:
 
 def bins_of(prepared: Prepared) -> int:
     """Samples in a bin for the excess."""
-    settings = prepared.settings.noise
-    return max(settings.least_bin_samples, bin_width(prepared, settings.bin_time))
+    return max(_LEAST_BIN_SAMPLES, bin_width(prepared, _BIN_TIME))
 
 
 def noise_levels(
@@ -128,7 +138,7 @@ def noise_levels(
             rows = base.rows
             _, counts = binned(base.value, rows, width)
             seen = counts > 0
-            for _ in range(settings.noise.replicates if seen.any() else 0):
+            for _ in range(settings.noise_replicates if seen.any() else 0):
                 shaken = np.zeros(prepared.n)
                 with contextlib.suppress(
                     SimulationError
@@ -162,7 +172,7 @@ def noise_levels(
             if known:
                 bent = curves(block, core, base, prepared, ranges[block.name], known, width)
             error = 0.0 if bent is None else _power(bent[seen])
-            rest = settings.noise.curve_rest * error
+            rest = _CURVE_REST * error
             found[key] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
                 math.sqrt(noise + error),
@@ -226,7 +236,7 @@ def excess(
     recordings: list[Prepared],
     found: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
-    settings: NoiseSettings,
+    settings: DiagnosisSettings,
 ) -> Excess:
     """Pool a block's residual over recordings and compare it with its noise level.
 
@@ -280,7 +290,7 @@ def _pooled(
     bins: Bins,
     found: dict[Key, Residual],
     noise_level: dict[Key, NoiseLevel],
-    settings: NoiseSettings,
+    settings: DiagnosisSettings,
 ) -> Excess:
     """Bin means of a block over its recordings against their noise levels."""
     keys: list[Key] = []
@@ -288,7 +298,7 @@ def _pooled(
     pieces: list[tuple[float, int]] = []
     for prepared, (key, (means, counts)) in zip(recordings, bins.items(), strict=True):
         r = found[key]
-        length = max(1, round(settings.piece_time / (bins_of(prepared) * prepared.dt)))
+        length = max(1, round(PIECE_TIME / (bins_of(prepared) * prepared.dt)))
         own = noise_level[key].binned ** 2
         for first in range(0, means.size, length):
             there = means[first : first + length][counts[first : first + length] > 0]
@@ -304,21 +314,22 @@ def _pooled(
         squares.append(float(np.mean(r.value[r.rows] ** 2)))
         noises.append(noise_level[key].sample ** 2)
     if not ratios:
-        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.margin)
+        return Excess(1.0, 0.0, 1.0, float("nan"), float("nan"), settings.noise_margin)
     ratio = float(np.average(ratios, weights=weights))
     shares = np.array(weights) / sum(weights)
     # noise levels are means of as many realisations, and their scatter is known from no more
     random = [(1.0 - noise_level[key].stated) * noise_level[key].scatter for key in keys]
     pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
-    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.replicates))
-    chance = t(len(keys) * (settings.replicates - 1))
-    beyond = min(settings.most_log_limit, float(chance.isf(settings.chance)) * scatter)
+    scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.noise_replicates))
+    chance = t(len(keys) * (settings.noise_replicates - 1))
+    beyond = min(_MOST_LOG_LIMIT, float(chance.isf(settings.noise_chance)) * scatter)
     # the model has one error, the same in all recordings, and its square is that of a few numbers
     stated = float(np.sum(shares * [noise_level[key].stated for key in keys]))
-    few = settings.stated_freedom
-    larger = 1.0 + stated * (float(chi2.isf(settings.chance, few)) / few - 1.0)
-    scatter = math.hypot(scatter, stated * math.sqrt(2.0 / few))
-    margin = settings.margin * larger
+    larger = 1.0 + stated * (
+        float(chi2.isf(settings.noise_chance, _STATED_FREEDOM)) / _STATED_FREEDOM - 1.0
+    )
+    scatter = math.hypot(scatter, stated * math.sqrt(2.0 / _STATED_FREEDOM))
+    margin = settings.noise_margin * larger
     noise = math.sqrt(float(np.average(noises, weights=weights)))
     return Excess(
         ratio,
@@ -326,7 +337,7 @@ def _pooled(
         float(chance.sf(math.log(max(ratio, 1e-300) / margin) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         noise,
-        min(settings.most_limit * larger, margin * math.exp(beyond)),
+        min(_MOST_LIMIT * larger, margin * math.exp(beyond)),
         scatter,
         tuple(pieces),
     )

@@ -7,12 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from pamrs.channels import channel_of
-from pamrs.diagnosis.settings import PlausibilitySettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Parameter, Rig
 
 __all__ = ["AMBIENT", "AMBIENT_PRESSURE", "at_ambient"]
+
+# [tolerances] of a room from that of the rig file, from which it may be another one
+_ROOM_TOLERANCES = 3.0
+# [K] between recordings' rooms, taken for one: it moves a valve's flow by one percent
+_MOST_ROOM_SPREAD = 3.0
+
 
 AMBIENT = "ambient_temperature"
 AMBIENT_PRESSURE = "ambient_pressure"
@@ -23,7 +29,7 @@ _SAME = 0.1
 
 
 def at_ambient(
-    rig: Rig, recordings: Sequence[Recording], settings: PlausibilitySettings
+    rig: Rig, recordings: Sequence[Recording], settings: DiagnosisSettings
 ) -> tuple[Rig, list[str]]:
     """A rig at the ambient temperature of its recordings.
 
@@ -37,7 +43,7 @@ def at_ambient(
     recordings : sequence of Recording
         Those of a case; any of them may have the channel ``ambient_temperature``, of which masked
         samples do not count.
-    settings : PlausibilitySettings
+    settings : DiagnosisSettings
         Which temperatures rooms have, and how far from that of the rig file they may be.
 
     Returns
@@ -80,7 +86,7 @@ def at_ambient(
         *_doubted(value, before, settings),
     ]
     low, high = min(one for _, one in found), max(one for _, one in found)
-    if high - low > settings.most_room_spread:
+    if high - low > _MOST_ROOM_SPREAD:
         said.append(
             f"{AMBIENT} differs between the recordings, from {low:.1f} to {high:.1f} K; all of "
             f"them are judged at {value:.5g} K"
@@ -88,13 +94,13 @@ def at_ambient(
     return moved, said
 
 
-def _doubted(value: float, stated: Parameter, settings: PlausibilitySettings) -> list[str]:
+def _doubted(value: float, stated: Parameter, settings: DiagnosisSettings) -> list[str]:
     """A sentence where a measured temperature is far from what the rig file states of it."""
     if not stated.known:
         return []
     limits = [settings.most_room_change]
     if stated.tol > 0.0:
-        limits.append(settings.room_tolerances * stated.tol)
+        limits.append(_ROOM_TOLERANCES * stated.tol)
     away = abs(value - stated.value)
     if away <= min(limits):
         return []

@@ -11,11 +11,15 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of
 from pamrs.diagnosis.prepare._blocks import Block
 from pamrs.diagnosis.prepare._signals import COMMANDS, held
-from pamrs.diagnosis.settings import PrepareSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 
 __all__ = ["averaged", "averaged_to_need"]
+
+# [s] sample time that is needed where every block is a sealed chamber, which hardly moves
+_NEEDED_SEALED_SAMPLE_TIME = 0.1
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -25,7 +29,7 @@ _HELD = (*COMMANDS, "reference")
 
 
 def averaged_to_need(
-    recordings: Sequence[Recording], blocks: Sequence[Block], case: str, settings: PrepareSettings
+    recordings: Sequence[Recording], blocks: Sequence[Block], case: str, settings: DiagnosisSettings
 ) -> tuple[list[Recording], list[int]]:
     """Recordings of a case at the rate that its blocks need.
 
@@ -40,7 +44,7 @@ def averaged_to_need(
         The blocks that are judged.
     case : str
         Its name, for the message.
-    settings : PrepareSettings
+    settings : DiagnosisSettings
         What is needed, and how much is too much.
 
     Returns
@@ -55,7 +59,7 @@ def averaged_to_need(
         If there are more than `most_samples` even so.
     """
     sealed = bool(blocks) and all(block.window is None for block in blocks)
-    needed = settings.needed_sealed_sample_time if sealed else settings.needed_sample_time
+    needed = _NEEDED_SEALED_SAMPLE_TIME if sealed else settings.needed_sample_time
     counts = [
         _odd(min(needed / r.sample_time, len(r) / settings.ample_samples)) for r in recordings
     ]

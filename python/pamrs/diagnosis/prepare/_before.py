@@ -12,6 +12,10 @@ from pamrs.diagnosis.prepare._signals import Prepared
 
 __all__ = ["Before"]
 
+# [Pa] how far a pressure is followed back to before a recording: a rate at its edge is uncertain
+_MOST_MOVED = 2e4
+
+
 Array = NDArray[np.float64]
 
 _PRESSURES: Final = ("muscle_pressure", "supply_pressure", "line_pressure")
@@ -42,14 +46,13 @@ class Before(NamedTuple):
     ) -> dict[str, tuple[Array, Array]]:
         """Channels and their time derivatives with those before them."""
         back = prepared.dt * np.minimum(np.arange(self.samples, 0, -1), self.moving)
-        most = prepared.settings.prepare.most_moved
         found = {}
         for name, (value, slope) in own.items():
             first, rate = (float(array[0]) for array in prepared.begun(name, [0]))
             was = np.full(self.samples, first)
             if channel_of(name) in _PRESSURES:
-                was -= np.clip(rate * back, -most, most)
-                was = np.maximum(was, min(first, -most))
+                was -= np.clip(rate * back, -_MOST_MOVED, _MOST_MOVED)
+                was = np.maximum(was, min(first, -_MOST_MOVED))
             found[name] = (
                 np.concatenate([was, value]),
                 np.concatenate([np.gradient(was, prepared.dt), slope]),

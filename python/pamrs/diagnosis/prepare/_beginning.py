@@ -20,12 +20,38 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.channels import dotted
 from pamrs.diagnosis.prepare._before import Before
-from pamrs.diagnosis.prepare._blocks import Block, Tube, predicted, residual
+from pamrs.diagnosis.prepare._blocks import (
+    WINDOW_SAMPLES_PER_STATE,
+    Block,
+    Tube,
+    predicted,
+    residual,
+)
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
 
 __all__ = ["begun_alike", "said_of_beginnings"]
+
+# Newton steps, of one number, to the temperature at which a gas begins that is not at rest
+_BEGUN_STEPS = 6
+# [noise levels] move of a sample by an unmeasured beginning: all move the same way (decision 92)
+_OUTLET_NOISES = 0.3
+# [delays of the tube] flow before a recording that begins not at rest, until it is steady
+_FLOW_DELAYS = 20.0
+# [delays of the tube] how long its ends moved by then: a flow swings on (decision 109)
+_MOVING_DELAYS = 0.5
+# [delays of the tube] its ends hear nothing of each other: a front is smeared (decision 109)
+_SILENT_DELAYS = 0.6
+# [delays of the tube] how long its ends are looked at for whether they stand still
+_STILL_DELAYS = 4.0
+# [noise levels] flow before, ends seen at rest: 3 to 6 at rest, 65 in a flow (decision 109)
+_STILL_NOISES = 10.0
+# [standard deviations] trend of a pressure that is seen as its recording begins
+_STILL_DEVIATIONS = 3.0
+# times likelier rest than flow as a tube is opened: e^75 there, e^5 at a turn (decision 109)
+_REST_LIKELIHOOD = 1000.0
+
 
 Array = NDArray[np.float64]
 
@@ -69,15 +95,15 @@ def _began_at(block: Block, rest: float, core: _core.Rig, prepared: Prepared) ->
     is not linear, so that the first windows begin where they tell, and are freed of the rest: a
     pressure stands still on warm gas too, behind an open valve.
     """
-    settings = prepared.settings.prepare
-    early = 2 * settings.window_samples_per_state
+    settings = prepared.settings
+    early = 2 * WINDOW_SAMPLES_PER_STATE
     rows = np.flatnonzero(prepared.recording.mask[block.channel][:early])
-    if rows.size < settings.window_samples_per_state:
+    if rows.size < WINDOW_SAMPLES_PER_STATE:
         return rest
-    if abs(_trend(prepared, block.channel, rows)) <= settings.still_deviations:
+    if abs(_trend(prepared, block.channel, rows)) <= _STILL_DEVIATIONS:
         return rest
     found = rest
-    for _ in range(settings.begun_steps):
+    for _ in range(_BEGUN_STEPS):
         there = replace(prepared, temperatures={block.channel: found})
         try:
             first = residual(block, core, there, [])
@@ -113,7 +139,7 @@ class _Beginnings:
 
     def _last(self, block: Block, apart: Array) -> int:
         """Samples up to the last one at which two predictions can be told apart."""
-        most = self.prepared.settings.prepare.outlet_noises * self.prepared.noise[block.channel]
+        most = _OUTLET_NOISES * self.prepared.noise[block.channel]
         seen = np.flatnonzero(np.abs(apart) > most)
         return int(seen[-1]) + 1 if seen.size else 0
 
@@ -133,8 +159,7 @@ class _Beginnings:
         """What it makes that air flowed through tubes before; nothing where it did not."""
         try:
             apart = self._from(block, moving=True) - self._from(block, moving=False)
-            most = self.prepared.settings.prepare.still_noises
-            little = np.abs(apart).max() <= most * self.prepared.noise[block.channel]
+            little = np.abs(apart).max() <= _STILL_NOISES * self.prepared.noise[block.channel]
             at_rest = all(
                 (little and self._stands_still(tube)) or self._waits(tube) for tube in block.tubes
             )
@@ -144,15 +169,16 @@ class _Beginnings:
 
     def _stands_still(self, tube: Tube) -> bool:
         """Whether neither end of a tube is seen to move as the recording begins."""
-        recording, settings = self.prepared.recording, self.prepared.settings.prepare
-        least = settings.window_samples_per_state
-        early = max(2 * least, int(settings.still_delays * tube.delay / self.prepared.dt))
+        recording = self.prepared.recording
+        early = max(
+            2 * WINDOW_SAMPLES_PER_STATE, int(_STILL_DELAYS * tube.delay / self.prepared.dt)
+        )
         names = [name for name in (tube.beginning, tube.end) if name in recording.channels]
         for name in names:
             rows = np.flatnonzero(recording.mask[name][:early])
-            if rows.size < least:
+            if rows.size < WINDOW_SAMPLES_PER_STATE:
                 return False
-            if abs(_trend(self.prepared, name, rows)) > settings.still_deviations:
+            if abs(_trend(self.prepared, name, rows)) > _STILL_DEVIATIONS:
                 return False
         return bool(names)
 
@@ -160,15 +186,14 @@ class _Beginnings:
         """Whether a tube at rest is opened as the recording begins: until its ends hear of each
         other, `to` stands still, and neither moves as it would in a flow.
         """
-        settings = self.prepared.settings.prepare
-        early = int(settings.silent_delays * tube.delay / self.prepared.dt)
+        early = int(_SILENT_DELAYS * tube.delay / self.prepared.dt)
         ends = [name for name in (tube.end, tube.beginning) if name in self.at]
         tells = [told for name in ends if (told := self._tells(name, early)) is not None]
         if tube.end not in ends or len(tells) < len(ends):
             return False
         fits, _ = tells[0]
         likely = [more for _, more in tells]
-        least = math.log(settings.rest_likelihood)
+        least = math.log(_REST_LIKELIHOOD)
         return fits and min(likely) > least
 
     def _tells(self, channel: str, early: int) -> tuple[bool, float] | None:
@@ -176,7 +201,7 @@ class _Beginnings:
         rather than those of a flow; None where there are too few of them.
         """
         rows = self.prepared.recording.mask[channel][:early]
-        if rows.sum() < self.prepared.settings.prepare.window_samples_per_state:
+        if rows.sum() < WINDOW_SAMPLES_PER_STATE:
             return None
         read = self.prepared.recording.channels[channel][:early][rows]
 
@@ -192,10 +217,9 @@ class _Beginnings:
         key = (block.name, moving)
         if key not in self._kept:
             longest = max((tube.delay for tube in block.tubes), default=0.0) / self.prepared.dt
-            settings = self.prepared.settings.prepare
             before = Before(
-                math.ceil(settings.flow_delays * longest),
-                math.ceil(settings.moving_delays * longest),
+                math.ceil(_FLOW_DELAYS * longest),
+                math.ceil(_MOVING_DELAYS * longest),
             )
             self._kept[key] = predicted(
                 block, self.core, self.prepared, before=before if moving else None

@@ -16,7 +16,6 @@ from pamrs import _core
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
-from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -34,6 +33,20 @@ __all__ = [
     "residual",
     "unjudged_blocks",
 ]
+
+# [s] a joint's windows: its start has faded, a wrong break-away spoils no more (decision 14)
+_ARM_WINDOW = 2.5
+_SUPPLY_WINDOW = 4.0  # [s] windows of a tank or a regulator
+_CHAMBER_WINDOW = 2.0  # [s] windows of a chamber that is fed; a sealed one is one window
+# usable samples of a window for each state whose start is projected out, or it is not used
+WINDOW_SAMPLES_PER_STATE = 4
+# [s] longest step of joints and loads: an error of 0.03 noises, 0.17 at most (decision 57)
+_ARM_STEP = 5e-3
+# [s] the same of tanks and chambers, divided until stable: 0.003 noises (decision 57)
+_GAS_STEP = 1e-2
+# [s] the same of a sealed chamber: an error below the noise (docs/convergence.md)
+_SEALED_STEP = 0.025
+
 
 Array = NDArray[np.float64]
 
@@ -248,8 +261,7 @@ def _ways(rig: Rig, has: frozenset[str]) -> list[_Way]:
 class _Map:
     """Which channels and parameters belong to which block of a rig."""
 
-    def __init__(self, rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> None:
-        self.settings = settings
+    def __init__(self, rig: Rig, channels: tuple[str, ...]) -> None:
         self.rig, self.has = rig, frozenset(channels)
         self.thermometers = {n: c for n, c in thermometers_of(rig).items() if c in self.has}
         self.ways = _ways(rig, self.has)
@@ -415,14 +427,13 @@ class _Map:
         }
         for node in nodes:
             names |= self.of_ways(node) | self.zeros(self.chambers_at(node), ())
-        window, step = self.settings.supply_window, self.settings.gas_step
         return Block(
             full,
             self.pressure(full),
             drives,
-            window,
+            _SUPPLY_WINDOW,
             frozenset(names),
-            step,
+            _GAS_STEP,
             covers,
             ("supply",) if unread else (),
             tubes=self.tubes_at(full),
@@ -465,8 +476,8 @@ class _Map:
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
             | self.zeros(self.chambers_at(full), joints or [""])
         )
-        step = self.settings.gas_step if fed else self.settings.sealed_step
-        window = self.settings.chamber_window if fed else None
+        step = _GAS_STEP if fed else _SEALED_STEP
+        window = _CHAMBER_WINDOW if fed else None
         return Block(
             full,
             self.pressure(full),
@@ -532,9 +543,9 @@ class _Map:
             full,
             self.pressure(full),
             drives,
-            self.settings.chamber_window,
+            _CHAMBER_WINDOW,
             frozenset(names),
-            self.settings.gas_step,
+            _GAS_STEP,
             covers,
             ("supply",) if unread else (),
             self.tubes_at(full),
@@ -560,9 +571,14 @@ class _Map:
             f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK
         }
         names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
-        window, step = self.settings.arm_window, self.settings.arm_step
         return Block(
-            name, dotted("joint_angle", joint), drives, window, frozenset(names), step, covers
+            name,
+            dotted("joint_angle", joint),
+            drives,
+            _ARM_WINDOW,
+            frozenset(names),
+            _ARM_STEP,
+            covers,
         )
 
     def load(self) -> Block | Unjudged:
@@ -577,8 +593,7 @@ class _Map:
             f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
         }
         names |= self.zeros(self.pulling.values(), ())
-        window, step = self.settings.arm_window, self.settings.arm_step
-        return Block("load", "length", drives, window, frozenset(names), step, covers)
+        return Block("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
 
     def pull(self, joint: str) -> Block | None:
         """The block of what the muscles put on a joint or a load, where that is measured: their
@@ -598,7 +613,7 @@ class _Map:
             (*drives, *moving),
             None,  # nothing is integrated that could drift
             frozenset(names),
-            self.settings.arm_step,
+            _ARM_STEP,
             "muscle" + _called(joint),
         )
 
@@ -607,7 +622,7 @@ def _called(name: str) -> str:
     return f" of {name}" if name else ""
 
 
-def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSettings) -> list[Block]:
+def available_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     """The blocks that these channels can tell apart: supplies, inlets of lines, chambers, gases
     with a thermometer, then joints or the load, each in the order of the rig file.
 
@@ -625,36 +640,30 @@ def available_blocks(rig: Rig, channels: tuple[str, ...], settings: PrepareSetti
         The nominal model.
     channels : tuple of str
         What every recording has, by the names of the core.
-    settings : PrepareSettings
-        Windows and integration steps.
 
     Returns
     -------
     list of Block
     """
-    return [block for block in _all_blocks(rig, channels, settings) if isinstance(block, Block)]
+    return [block for block in _all_blocks(rig, channels) if isinstance(block, Block)]
 
 
-def unjudged_blocks(
-    rig: Rig, channels: tuple[str, ...], settings: PrepareSettings
-) -> list[Unjudged]:
+def unjudged_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Unjudged]:
     """The blocks of a rig that these channels cannot tell apart, each with the reason; arguments as
     of :func:`available_blocks`.
 
     What nobody has to measure (the inlet of a line, a force, the temperature of a gas) and what the
     rig file settles (a constant supply) is none of them.
     """
-    return [block for block in _all_blocks(rig, channels, settings) if isinstance(block, Unjudged)]
+    return [block for block in _all_blocks(rig, channels) if isinstance(block, Unjudged)]
 
 
-def _all_blocks(
-    rig: Rig, channels: tuple[str, ...], settings: PrepareSettings
-) -> list[Block | Unjudged]:
+def _all_blocks(rig: Rig, channels: tuple[str, ...]) -> list[Block | Unjudged]:
     """Every block of a rig, judged or not."""
-    have = _Map(rig, channels, settings)
+    have = _Map(rig, channels)
     # what a small flow adds up to is seen from the valve on: two gauges at a tube hardly tell it
     closed = tuple(name for name in channels if channel_of(name) != "line_pressure")
-    whole = _Map(rig, closed, settings)
+    whole = _Map(rig, closed)
 
     def chamber(name: str) -> Block | Unjudged:
         found = whole.chamber(name)
@@ -850,7 +859,7 @@ def _shown(block: Block, start: Array, at: int, prepared: Prepared) -> Array:
     gas began, once that is forgotten, or where it is known to have begun at rest; of a temperature
     without where a thermometer stood that is not late.
     """
-    noise, settings = prepared.noise[block.channel], prepared.settings.prepare
+    noise, settings = prepared.noise[block.channel], prepared.settings
     if block.warm is not None:
         if at > 0 and not prepared.clear(block.drives)[at - 1]:
             # what drove the gas in the hole before is not known
@@ -928,7 +937,6 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     """
     core = _there(core, prepared)
     starts = prepared.starts(block.window, block.drives)
-    least = prepared.settings.prepare.window_samples_per_state
     # without parameters a free null direction is still wanted for the window's start: ask for one
     # parameter
     own = _own(core, prepared)
@@ -971,7 +979,7 @@ def residual(block: Block, core: _core.Rig, prepared: Prepared, parameters: list
     for a, b in zip(starts, [*starts[1:], prepared.n], strict=True):
         slopes = jacobian[a:b, :k]
         start = _shown(block, jacobian[a:b, k:], a, prepared)
-        if np.count_nonzero(rows[a:b]) < least * start.shape[1]:
+        if np.count_nonzero(rows[a:b]) < WINDOW_SAMPLES_PER_STATE * start.shape[1]:
             rows[a:b] = False
             value[a:b] = 0.0
             slopes[:] = 0.0

@@ -19,10 +19,50 @@ from scipy.interpolate import CubicSpline
 from scipy.ndimage import uniform_filter1d
 
 from pamrs.channels import channel_of
-from pamrs.diagnosis.settings import OverlapSettings
 from pamrs.recordings import Recording
 
 __all__ = ["Alignment", "Channels", "Told", "is_set", "told"]
+
+# correlation of noise in chance deviations: repetitions reach 5.3, copies 9.2 (decision 111)
+_LEAST_PEAK = 6.5
+# the correlation itself: corners of a command leave 0.15, a noisy copy 0.3 (decision 111)
+_LEAST_CORRELATION = 0.2
+# that over other lags': a command repeats a period away, noise never does (decision 111)
+_PEAK_RATIO = 1.5
+# correlation of a window's noise with the other's from which it is shared: copies 1, chance 0.1
+_FOLLOW_SHARE = 0.5
+# the same of most shared windows; below it own noise covers the copy, all that meets is shared
+_CLEAR_SHARE = 0.75
+# the same in chance deviations, of windows with few samples: some 1e-5 for a window
+_CHANCE_SHARE = 4.5
+# converter step over noise, rounding included, that a repetition repeats (decision 111)
+_COARSE_STEP = 2.2
+# [noise levels] beyond which a sample is a step that repeats: one in two thousand by chance
+_STEP_NOISES = 3.5
+# lone flips of a converter from which two are compared: twelve others by chance 1e-5
+_LEAST_FLIPS = 12.0
+# samples on different steps over flips: 0 for a copy, 1 for a repetition (decision 111)
+_FLIP_SHARE = 0.35
+_CLOCK = 0.05  # share by which the clock of a copy may go faster or slower
+_RATE_BLOCKS = 3  # blocks that say how it goes
+# samples from the beginning in which those blocks lie: seconds for a million samples
+_MOST_SEARCHED = 16384
+_PHASES = 12  # offsets between the samples of two rates that are tried
+# [sample times] error of the time between two recordings' samples that makes odd and even ones
+_BETWEEN_ERROR = 0.02
+# what two such leave in a window, over their noise: chance of some 1e-3 with ten windows
+_BETWEEN_LEFT = 1.6
+# share of a window that has to move: at rest on one step recordings are equal by chance
+_LEAST_ALIVE = 0.2
+# samples of a window in which noise is compared: its mean differs by a tenth by chance
+WINDOW_SAMPLES = 64
+LEAST_SAMPLES = 192  # samples that are shared at the least: three windows
+_LAGS = 8  # shifts in time that are looked at
+# neighbours on either side by which a sample is told without the other recording
+_BESIDE_SAMPLES = 4
+# samples of a block that is looked for in a recording whose clock goes otherwise
+_BLOCK_SAMPLES = 256
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -90,8 +130,7 @@ class _Channel(NamedTuple):
 class Channels:
     """Channels of recordings with their deviations, each found once."""
 
-    def __init__(self, settings: OverlapSettings) -> None:
-        self.settings = settings
+    def __init__(self) -> None:
         self._found: dict[tuple[Recording, str], _Channel] = {}
 
     def of(self, recording: Recording, names: Sequence[str]) -> dict[str, _Channel]:
@@ -99,7 +138,7 @@ class Channels:
         for name in names:
             if (recording, name) not in self._found:
                 values, known = recording.channels[name], recording.mask[name]
-                self._found[recording, name] = _channel(values, known, self.settings)
+                self._found[recording, name] = _channel(values, known)
         return {name: self._found[recording, name] for name in names}
 
 
@@ -122,38 +161,40 @@ def told(slow: Recording, fast: Recording, names: list[str], channels: Channels)
     ------
     Told
     """
-    settings, own, there = channels.settings, channels.of(slow, names), channels.of(fast, names)
+    own, there = channels.of(slow, names), channels.of(fast, names)
     ratio = slow.sample_time / fast.sample_time
     some = False
-    for rate, start in _clocks(slow, fast, own, there, settings):
+    for rate, start in _clocks(slow, fast, own, there):
         if some and rate not in (1.0, -1.0):
             return
-        phases = min(settings.phases, max(1, round(abs(rate) * ratio)))
+        phases = min(_PHASES, max(1, round(abs(rate) * ratio)))
         for mean in (False, True) if abs(rate) * ratio > 1.5 else (False,):
             for phase in range(phases):
                 way = Alignment(rate, start + phase * fast.sample_time, mean)
-                for one in _at(slow, fast, (own, there), way, settings):
+                for one in _at(slow, fast, (own, there), way):
                     some = True
                     yield one
     if not some:
-        yield from _between(slow, fast, own, there, settings)
+        yield from _between(slow, fast, own, there)
 
 
 # ------------------------------------------------------------------ channels
 
 
-def _channel(values: Array, known: Mask, settings: OverlapSettings) -> _Channel:
+def _channel(values: Array, known: Mask) -> _Channel:
     """A channel and what its neighbours do not tell of each sample."""
-    index, beside = np.arange(values.size), settings.beside_samples
+    index = np.arange(values.size)
     nothing = np.zeros(values.size)
-    if known.sum() < 4 * beside or not np.ptp(values[known]) > 0.0:
+    if known.sum() < 4 * _BESIDE_SAMPLES or not np.ptp(values[known]) > 0.0:
         return _Channel(nothing, known, nothing, 0.0)
     filled = values if known.all() else np.interp(index, index[known], values[known])
-    centred, own = filled - filled.mean(), np.r_[-beside:0, 1 : beside + 1]
-    inner = known & (index >= beside) & (index < values.size - beside)
+    centred, own = filled - filled.mean(), np.r_[-_BESIDE_SAMPLES:0, 1 : _BESIDE_SAMPLES + 1]
+    inner = known & (index >= _BESIDE_SAMPLES) & (index < values.size - _BESIDE_SAMPLES)
     flat = np.diff(centred) == 0.0
     moves = inner & ~(np.r_[False, flat] & np.r_[flat, False])
-    counted = moves if moves.sum() > 4 * beside else inner  # a rest says nothing of the noise
+    counted = (
+        moves if moves.sum() > 4 * _BESIDE_SAMPLES else inner
+    )  # a rest says nothing of the noise
     use, left, weights = counted, centred, np.zeros(own.size)
     for _ in range(4):  # steps of the signal do not say how noise is told
         if use.sum() < 2 * own.size:
@@ -161,15 +202,15 @@ def _channel(values: Array, known: Mask, settings: OverlapSettings) -> _Channel:
         weights, follows = _followed(centred, own, centred, use)
         left = centred - follows
         size = 1.25 * float(np.mean(np.abs(left[use])))
-        use = counted & (np.abs(left) <= settings.step_noises * size)
+        use = counted & (np.abs(left) <= _STEP_NOISES * size)
     size = float(np.sqrt(np.mean(left[use] ** 2))) if use.any() else 0.0
     step = _step(filled[known])
     noise = size / float(np.sqrt(1.0 + weights @ weights))
-    coarse = step if step > settings.coarse_step * noise else 0.0
+    coarse = step if step > _COARSE_STEP * noise else 0.0
     if not size > 1e-12 * float(np.abs(centred).max()):
         return _Channel(filled, known, nothing, coarse)
     # a step of the signal is left in all samples beside it
-    steps = uniform_filter1d((counted & ~use).astype(float), 4 * beside + 1) > 1e-6
+    steps = uniform_filter1d((counted & ~use).astype(float), 4 * _BESIDE_SAMPLES + 1) > 1e-6
     return _Channel(filled, known, np.where(inner & ~steps, left / size, 0.0), coarse)
 
 
@@ -201,35 +242,31 @@ def _step(values: Array) -> float:
     return step if np.mean(np.abs(off - np.round(off)) < 0.02) > 0.99 else 0.0
 
 
-def _moved(
-    fast: Recording, name: str, one: _Channel, at: Array, width: float, settings: OverlapSettings
-) -> _Channel:
+def _moved(fast: Recording, name: str, one: _Channel, at: Array, width: float) -> _Channel:
     """A channel at times [s], which may be its own, from either end."""
     for way in (1, -1):
         apart = at - fast.time[::way] if at.size == len(fast) else np.inf
         if np.max(np.abs(apart)) < 1e-6 * fast.sample_time:  # but for rounding
             return one.at(np.arange(len(fast))[::way])
-    return _seen(fast, name, at, width, settings)._replace(step=one.step)
+    return _seen(fast, name, at, width)._replace(step=one.step)
 
 
-def _seen(
-    fast: Recording, name: str, at: Array, width: float, settings: OverlapSettings
-) -> _Channel:
+def _seen(fast: Recording, name: str, at: Array, width: float) -> _Channel:
     """A channel at times [s]; means over a width [s] above its sample time. What lies between two
     samples or is a mean is on no step of a converter, and has its pattern all the same.
     """
     index, mask, dt = np.arange(len(fast)), fast.mask[name], fast.sample_time
     if not mask.any():
-        return _channel(np.zeros(at.size), np.zeros(at.size, dtype=bool), settings)
+        return _channel(np.zeros(at.size), np.zeros(at.size, dtype=bool))
     values = np.interp(index, index[mask], fast.channels[name][mask])
     inside = (at > -0.5 * dt) & (at < fast.duration + 0.5 * dt)
     known = inside & (np.interp(at, fast.time, mask.astype(float)) > 0.99)
     if width <= 1.5 * dt:
-        return _channel(np.interp(at, fast.time, values), known, settings)
+        return _channel(np.interp(at, fast.time, values), known)
     edges = dt * (np.arange(values.size + 1) - 0.5)
     total = np.concatenate([[0.0], np.cumsum(values) * dt])
     high, low = (np.interp(at + half, edges, total) for half in (0.5 * width, -0.5 * width))
-    return _channel((high - low) / width, known, settings)
+    return _channel((high - low) / width, known)
 
 
 # ------------------------------------------------------------------ clocks and lags
@@ -240,7 +277,6 @@ def _clocks(
     fast: Recording,
     own: dict[str, _Channel],
     there: dict[str, _Channel],
-    settings: OverlapSettings,
 ) -> Iterator[tuple[float, float]]:
     """How fast the clock of the slower recording may go in the other one, and from when [1, s]: as
     both say; backwards; sample by sample; as blocks of it say that are found there.
@@ -248,9 +284,9 @@ def _clocks(
     yield 1.0, 0.0
     yield -1.0, fast.duration
     ratio = fast.sample_time / slow.sample_time
-    if 1.0 - settings.clock < ratio < 1.0:
+    if 1.0 - _CLOCK < ratio < 1.0:
         yield ratio, 0.0
-    found = _rate(slow, fast, own, there, settings)
+    found = _rate(slow, fast, own, there)
     if found is not None:
         yield found, 0.0
 
@@ -260,30 +296,28 @@ def _rate(
     fast: Recording,
     own: dict[str, _Channel],
     there: dict[str, _Channel],
-    settings: OverlapSettings,
 ) -> float | None:
     """The rate at which the deviations of blocks are found in the other recording; None where they
     are not.
     """
-    size, most = settings.block_samples, settings.clock
     ratio = fast.sample_time / slow.sample_time
-    if len(slow) < 2 * size or ratio < 0.5:
+    if len(slow) < 2 * _BLOCK_SAMPLES or ratio < 0.5:
         return None
-    seen = min(len(slow), settings.most_searched)
-    starts = np.linspace(0, seen - size, settings.rate_blocks).astype(int)
-    step = 0.5 / size
-    rates = 1.0 + step * np.arange(2, int(most / step) + 1)
-    best, found = settings.least_peak, None
+    seen = min(len(slow), _MOST_SEARCHED)
+    starts = np.linspace(0, seen - _BLOCK_SAMPLES, _RATE_BLOCKS).astype(int)
+    step = 0.5 / _BLOCK_SAMPLES
+    rates = 1.0 + step * np.arange(2, int(_CLOCK / step) + 1)
+    best, found = _LEAST_PEAK, None
     for name, channel in own.items():
-        other = there[name].deviations[: 2 * settings.most_searched]
-        length = next_fast_len(other.size + 2 * size, real=True)
+        other = there[name].deviations[: 2 * _MOST_SEARCHED]
+        length = next_fast_len(other.size + 2 * _BLOCK_SAMPLES, real=True)
         spectrum = rfft(_single(other), length)
         for rate in (*rates, *(2.0 - rates)):
-            rows = np.arange(0.0, size - 1.0, ratio / rate)
+            rows = np.arange(0.0, _BLOCK_SAMPLES - 1.0, ratio / rate)
             peaks, places = [], []
             for start in starts:
-                part = channel.deviations[start : start + size]
-                block = np.interp(rows, np.arange(size), part)
+                part = channel.deviations[start : start + _BLOCK_SAMPLES]
+                block = np.interp(rows, np.arange(_BLOCK_SAMPLES), part)
                 cross = irfft(spectrum * np.conj(rfft(_single(block), length)), length)
                 place = int(np.argmax(np.abs(cross)))
                 peaks.append(abs(float(cross[place])) / (float(np.linalg.norm(block)) + _TINY))
@@ -300,7 +334,6 @@ def _at(
     fast: Recording,
     channels: tuple[dict[str, _Channel], dict[str, _Channel]],
     way: Alignment,
-    settings: OverlapSettings,
 ) -> Iterator[Told]:
     """Alignments of one rate at which some channel's deviations are those of the other one."""
     own, there = channels
@@ -308,27 +341,27 @@ def _at(
     count = int(fast.duration / abs(step) + 1.5)
     at: Array = way.lag + step * np.arange(count, dtype=np.float64)
     width = abs(step) if way.mean else 0.0
-    other = {name: _moved(fast, name, one, at, width, settings) for name, one in there.items()}
+    other = {name: _moved(fast, name, one, at, width) for name, one in there.items()}
     between = abs(step) / fast.sample_time
     whole = abs(between - round(between)) < 1e-6  # what lies between samples is on no step
-    lags = {name: _lags(channel, other[name], settings) for name, channel in own.items()}
+    lags = {name: _lags(channel, other[name]) for name, channel in own.items()}
     for lag in dict.fromkeys(lag for found in lags.values() for lag in found):
         rows = np.arange(max(0, -lag), min(len(slow), count - lag))
         pairs = {n: (one.at(rows), other[n].at(rows + lag)) for n, one in own.items()}
         copied = {n: lags[n].get(lag, 0.0) for n in pairs}
-        flips = {n for n, pair in pairs.items() if whole and _same_flips(*pair, settings)}
+        flips = {n for n, pair in pairs.items() if whole and _same_flips(*pair)}
         if not (flips or any(copied.values())):
             continue
         inside, same, others = np.zeros((3, len(slow)), dtype=bool)
         inside[rows] = True
         for name, (a, b) in pairs.items():
-            alike, unlike, clear = _by_window(a, b, settings)
-            if copied[name] and clear and alike.sum() >= settings.least_samples:
+            alike, unlike, clear = _by_window(a, b)
+            if copied[name] and clear and alike.sum() >= LEAST_SAMPLES:
                 same[rows] |= alike
-            elif copied[name] > settings.least_correlation or name in flips:
+            elif copied[name] > _LEAST_CORRELATION or name in flips:
                 same[rows] |= a.known & b.known
             others[rows] |= unlike
-        if same.sum() >= settings.least_samples:
+        if same.sum() >= LEAST_SAMPLES:
             here = Alignment(way.rate, way.lag + lag * step, way.mean)
             yield Told(here, inside, same, others & ~same)
 
@@ -338,7 +371,7 @@ def _single(values: Array) -> NDArray[np.float32]:
     return values.astype(np.float32)
 
 
-def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, float]:
+def _lags(a: _Channel, b: _Channel) -> dict[int, float]:
     """Rows by which one channel may run behind in the other one, and the correlation of their
     deviations where these go together there and nowhere else, 0 elsewhere: a command that is
     repeated has its periods too.
@@ -346,7 +379,7 @@ def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, floa
     found: dict[int, float] = {}
     pairs = [(a.deviations, b.deviations, 1)]
     if a.step or b.step:  # flips of a converter tell more than what neighbours leave of them
-        pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), settings.lags))
+        pairs.append((np.sign(np.diff(a.values)), np.sign(np.diff(b.values)), _LAGS))
     for one, other, most in pairs:
         length = next_fast_len(max(one.size + other.size, 2), real=True)
         cross, power = (
@@ -354,15 +387,15 @@ def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, floa
             for x, y in ((one, other), (one * one, other * other))
         )
         peaks = np.abs(cross) / np.sqrt(np.maximum(power, 1.0))
-        peaks[power < settings.least_alive * settings.least_samples] = 0.0
+        peaks[power < _LEAST_ALIVE * LEAST_SAMPLES] = 0.0
         for _ in range(most):
             place = int(np.argmax(peaks))
             peak = float(peaks[place])
             if not peak > 0.0:
                 break
-            beside = np.arange(place - settings.window_samples, place + settings.window_samples + 1)
+            beside = np.arange(place - WINDOW_SAMPLES, place + WINDOW_SAMPLES + 1)
             peaks[beside % length] = 0.0
-            alone = peak > max(settings.least_peak, settings.peak_ratio * float(peaks.max()))
+            alone = peak > max(_LEAST_PEAK, _PEAK_RATIO * float(peaks.max()))
             lag = place if place < other.size else place - length
             told = most == 1 and alone and not (a.step and b.step)
             share = peak / float(np.sqrt(max(power[place], 1.0))) if told else 0.0
@@ -370,11 +403,11 @@ def _lags(a: _Channel, b: _Channel, settings: OverlapSettings) -> dict[int, floa
     return found
 
 
-def _by_window(a: _Channel, b: _Channel, settings: OverlapSettings) -> tuple[Mask, Mask, bool]:
+def _by_window(a: _Channel, b: _Channel) -> tuple[Mask, Mask, bool]:
     """Rows about which the deviations of one channel follow those of the other one, rows about
     which they do not, and whether the two differ so clearly that windows can be told apart.
     """
-    wanted, size = a.deviations, settings.window_samples
+    wanted = a.deviations
     offsets = np.arange(-_TAPS, _TAPS + 1)
     if wanted.size < 4 * offsets.size or not (wanted.any() and b.deviations.any()):
         nothing = np.zeros(wanted.size, dtype=bool)
@@ -382,7 +415,7 @@ def _by_window(a: _Channel, b: _Channel, settings: OverlapSettings) -> tuple[Mas
     use = wanted != 0.0
     _, follows = _followed(b.deviations, offsets, wanted, use)
     product, own, other, alive = (
-        uniform_filter1d(part, size, mode="nearest")
+        uniform_filter1d(part, WINDOW_SAMPLES, mode="nearest")
         for part in (
             wanted * follows,
             wanted**2,
@@ -391,28 +424,28 @@ def _by_window(a: _Channel, b: _Channel, settings: OverlapSettings) -> tuple[Mas
         )
     )
     share = product / np.sqrt(np.maximum(own * other, _TINY))
-    says = alive > settings.least_alive
-    chance = settings.chance_share / np.sqrt(np.maximum(alive * size, 1.0))
-    alike = says & (share > np.maximum(settings.follow_share, chance))
-    clear = bool(alike.any()) and float(np.median(share[alike])) > settings.clear_share
-    return alike, says & (share <= settings.follow_share), clear
+    says = alive > _LEAST_ALIVE
+    chance = _CHANCE_SHARE / np.sqrt(np.maximum(alive * WINDOW_SAMPLES, 1.0))
+    alike = says & (share > np.maximum(_FOLLOW_SHARE, chance))
+    clear = bool(alike.any()) and float(np.median(share[alike])) > _CLEAR_SHARE
+    return alike, says & (share <= _FOLLOW_SHARE), clear
 
 
-def _same_flips(a: _Channel, b: _Channel, settings: OverlapSettings) -> bool:
+def _same_flips(a: _Channel, b: _Channel) -> bool:
     """Whether two channels on the steps of a converter flip in the same samples, where noise of
     their own would let them flip in others.
     """
     step = max(a.step, b.step)
     known = a.known & b.known
-    if not step > 0.0 or known.sum() < settings.least_samples:
+    if not step > 0.0 or known.sum() < LEAST_SAMPLES:
         return False
     zero = float((a if a.step >= b.step else b).values[known].min())
     for origin in (zero, zero + 0.5 * step):  # rounded, or cut off
         levels = [np.round((one.values[known] - origin) / step) for one in (a, b)]
         expected = 0.5 * sum(_flips(level) for level in levels)
-        if expected < settings.least_flips:
+        if expected < _LEAST_FLIPS:
             continue
-        if np.count_nonzero(levels[0] != levels[1]) < settings.flip_share * expected:
+        if np.count_nonzero(levels[0] != levels[1]) < _FLIP_SHARE * expected:
             return True
     return False
 
@@ -435,7 +468,6 @@ def _between(
     fast: Recording,
     own: dict[str, _Channel],
     other: dict[str, _Channel],
-    settings: OverlapSettings,
 ) -> Iterator[Told]:
     """Samples of one run that were dealt out to two recordings: those of one lie at a whole
     fraction between those of the other one and differ by noise alone, and no command that is
@@ -445,11 +477,11 @@ def _between(
     if abs(dt - fast.sample_time) > 1e-3 * dt or _repeats(slow, fast):
         return
     for name, channel in own.items():
-        lag = _fraction(channel, other[name], dt, settings)
+        lag = _fraction(channel, other[name], dt)
         if lag is None:
             continue
         inside = (slow.time + lag >= 0.0) & (slow.time + lag <= fast.duration)
-        if inside.sum() >= settings.least_samples:
+        if inside.sum() >= LEAST_SAMPLES:
             yield Told(Alignment(1.0, lag), inside, inside, np.zeros(inside.size, dtype=bool))
             return
 
@@ -466,17 +498,17 @@ def _repeats(slow: Recording, fast: Recording) -> bool:
     return False
 
 
-def _fraction(a: _Channel, b: _Channel, dt: float, settings: OverlapSettings) -> float | None:
+def _fraction(a: _Channel, b: _Channel, dt: float) -> float | None:
     """Time [s] between the samples of two channels where it is a whole fraction of the sample time
     and nothing but noise is left between the two; None elsewhere.
     """
     size = min(a.values.size, b.values.size)
-    if size < settings.least_samples or a.step or b.step:
+    if size < LEAST_SAMPLES or a.step or b.step:
         return None
     index = np.arange(size, dtype=float)
     smooth, curve = uniform_filter1d(b.values[:size], _SOON), CubicSpline(index, b.values[:size])
     inner = (index > 2.0) & (index < size - 3.0) & a.known[:size] & b.known[:size]
-    if inner.sum() < settings.least_samples:
+    if inner.sum() < LEAST_SAMPLES:
         return None
     slope, lag, left = np.gradient(smooth), 0.0, np.zeros(size)
     for _ in range(8):
@@ -488,11 +520,11 @@ def _fraction(a: _Channel, b: _Channel, dt: float, settings: OverlapSettings) ->
     noise = float(np.std(left[inner]))
     unsure = noise / np.sqrt(max(power, _TINY))
     whole = min((round(lag * n) / n for n in (2, 3)), key=lambda part: abs(part - lag))
-    off = abs(whole - lag) > max(3.0 * unsure, settings.between_error)
-    if off or unsure > settings.between_error or abs(whole - round(whole)) < 1e-9:
+    off = abs(whole - lag) > max(3.0 * unsure, _BETWEEN_ERROR)
+    if off or unsure > _BETWEEN_ERROR or abs(whole - round(whole)) < 1e-9:
         return None
-    blocks = left[inner][: inner.sum() // settings.window_samples * settings.window_samples]
-    means = blocks.reshape(-1, settings.window_samples).mean(axis=1)
+    blocks = left[inner][: inner.sum() // WINDOW_SAMPLES * WINDOW_SAMPLES]
+    means = blocks.reshape(-1, WINDOW_SAMPLES).mean(axis=1)
     rough = np.diff(left[inner]).std() / np.sqrt(2.0)
-    chance = rough / np.sqrt(settings.window_samples)
-    return whole * dt if np.sqrt(np.mean(means**2)) < settings.between_left * chance else None
+    chance = rough / np.sqrt(WINDOW_SAMPLES)
+    return whole * dt if np.sqrt(np.mean(means**2)) < _BETWEEN_LEFT * chance else None

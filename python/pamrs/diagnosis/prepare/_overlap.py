@@ -13,11 +13,26 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.prepare._deviations import Alignment, Channels, Told, is_set, told
-from pamrs.diagnosis.settings import OverlapSettings
+from pamrs.diagnosis.prepare._deviations import (
+    LEAST_SAMPLES,
+    WINDOW_SAMPLES,
+    Alignment,
+    Channels,
+    Told,
+    is_set,
+    told,
+)
 from pamrs.recordings import Recording
 
 __all__ = ["Overlap", "overlap", "without_copies"]
+
+_COPY_SHARE = 0.5  # share of a recording that is in another one of its role before it is left out
+# [s] between what is shared and what is kept: within it a joint's past fades (decision 111)
+_GAP = 2.5
+# [s] of a held-out recording that is kept as a proof: two long windows (decision 111)
+_LEAST_LEFT = 8.0
+_MOST_RATE_RATIO = 50.0  # ratio of sample times up to which recordings are compared
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,9 +59,7 @@ class Overlap:
     free: tuple[tuple[float, float], ...] = field(default=(), repr=False)
 
 
-def without_copies(
-    recordings: Sequence[Recording], settings: OverlapSettings
-) -> tuple[list[Recording], list[str]]:
+def without_copies(recordings: Sequence[Recording]) -> tuple[list[Recording], list[str]]:
     """Recordings that prove something, and what was left out, in words.
 
     Of a held-out recording that shares samples with a fitted one only the stretches are kept that
@@ -57,8 +70,6 @@ def without_copies(
     ----------
     recordings : sequence of Recording
         All of a case.
-    settings : OverlapSettings
-        What counts as the same, and what is long enough to be kept.
 
     Returns
     -------
@@ -69,7 +80,7 @@ def without_copies(
     """
     places = range(len(recordings))
     kept: dict[int, list[Recording]] = {}  # by place: one recording may be listed twice
-    said, channels = list[str](), Channels(settings)
+    said, channels = list[str](), Channels()
     for place in sorted(places, key=lambda k: recordings[k].role != "fit"):
         before = [one for parts in kept.values() for one in parts]
         kept[place], told = _new_in(recordings[place], before, channels)
@@ -81,11 +92,10 @@ def _new_in(
     recording: Recording, before: Sequence[Recording], channels: Channels
 ) -> tuple[list[Recording], list[str]]:
     """What of a recording is not in others, and a sentence where that is not all of it."""
-    settings = channels.settings
     for other in before:
-        found = overlap(recording, other, settings, channels)
+        found = overlap(recording, other, channels)
         across = recording.role != other.role
-        if found is None or not (across or found.share > settings.copy_share):
+        if found is None or not (across or found.share > _COPY_SHARE):
             continue
         same = (
             f"{_called(recording)} holds the same samples as {_called(other)}, noise included "
@@ -123,15 +133,14 @@ def _left_of(
     channels: Channels,
 ) -> list[tuple[float, float]]:
     """Stretches that share nothing with any recording of another role, long enough for a proof."""
-    settings = channels.settings
-    least = max(settings.least_left, settings.least_samples * recording.sample_time)
+    least = max(_LEAST_LEFT, LEAST_SAMPLES * recording.sample_time)
     found: list[tuple[float, float]] = []
     for start, stop in free:
         if stop - start < least:
             continue
         part = recording.between(start, stop)
         others = (o for o in before if o.role != recording.role)
-        shared = (overlap(part, other, settings, channels) for other in others)
+        shared = (overlap(part, other, channels) for other in others)
         again = next((one for one in shared if one is not None), None)
         if again is None:
             found.append((start, stop))
@@ -148,7 +157,6 @@ def _called(recording: Recording) -> str:
 def overlap(
     one: Recording,
     other: Recording,
-    settings: OverlapSettings,
     channels: Channels | None = None,
 ) -> Overlap | None:
     """The stretch that two recordings share, noise included; None where there is none.
@@ -159,8 +167,6 @@ def overlap(
     ----------
     one, other : Recording
         In any order.
-    settings : OverlapSettings
-        What counts as the same.
     channels : Channels, optional
         What was found of the recordings before.
 
@@ -171,15 +177,13 @@ def overlap(
     """
     names = [name for name in one.channels if name in other.channels and not is_set(name)]
     slow, fast = (one, other) if one.sample_time >= other.sample_time else (other, one)
-    if not names or slow.sample_time > settings.most_rate_ratio * fast.sample_time:
+    if not names or slow.sample_time > _MOST_RATE_RATIO * fast.sample_time:
         return None
-    each = told(slow, fast, names, channels or Channels(settings))
+    each = told(slow, fast, names, channels or Channels())
     found = max(each, key=lambda one: int(one.same.sum()), default=None)
     if found is None:
         return None
-    runs = [
-        (float(slow.time[a]), float(slow.time[b - 1])) for a, b in _runs(_taken(found, settings))
-    ]
+    runs = [(float(slow.time[a]), float(slow.time[b - 1])) for a, b in _runs(_taken(found))]
     rows = np.flatnonzero(found.same)
     at = (float(slow.time[rows[0]]), float(slow.time[rows[-1]]))
     there = _in_other(found.way, at)
@@ -194,7 +198,7 @@ def overlap(
         / max(at[1] - at[0], 1e-300)
         / max(one.duration, 1e-300),
     )
-    margin = settings.gap + settings.window_samples * slow.sample_time
+    margin = _GAP + WINDOW_SAMPLES * slow.sample_time
     return Overlap(own, away, share, _gaps(one.duration, runs, margin))
 
 
@@ -204,17 +208,17 @@ def _in_other(way: Alignment, run: tuple[float, float]) -> tuple[float, float]:
     return min(first, last), max(first, last)
 
 
-def _taken(found: Told, settings: OverlapSettings) -> Mask:
+def _taken(found: Told) -> Mask:
     """Rows that two recordings share: those that are told, and all beside them that are not denied
     over three windows or more.
     """
     shared, own = found.same.copy(), np.zeros(found.same.size, dtype=bool)
     for first, last in _runs(found.other):
-        own[first:last] = last - first >= settings.least_samples
+        own[first:last] = last - first >= LEAST_SAMPLES
     for first, last in _runs(~own & ~shared & found.inside):
         beside = own[[k for k in (first - 1, last) if 0 <= k < own.size]]
         # what cannot be told is new where noise of its own is on both sides; so is part of a window
-        part = last - first < settings.window_samples
+        part = last - first < WINDOW_SAMPLES
         new = beside.any() if part else beside.size == 2 and beside.all()
         shared[first:last] = not new
     return shared

@@ -13,11 +13,15 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.diagnosis.prepare._blocks import Block, residual
 from pamrs.diagnosis.prepare._signals import Prepared
-from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.errors import SimulationError
 from pamrs.report.text import format_number
 
 __all__ = ["said_of_own", "with_own_values"]
+
+# steps to find a recording's own value, each at most a factor 3: 3 orders and a few to settle
+_OWN_STEPS = 12
+_OWN_APART = 1.5  # ratio of such values between recordings from which it is said
+
 
 Array = NDArray[np.float64]
 
@@ -60,7 +64,7 @@ def with_own_values(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
 
     values = np.array([own[name].value for name in names])
     best, (size, rows, slopes) = at(values), left(at(values))
-    for _ in range(prepared.settings.prepare.own_steps):
+    for _ in range(_OWN_STEPS):
         scale = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
         step = np.linalg.lstsq(slopes / scale, rows, rcond=1e-9)[0] / scale
         # what is positive stays so: by no more than to a third or to three times at once
@@ -79,7 +83,7 @@ def with_own_values(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
     return best
 
 
-def said_of_own(recordings: Sequence[Prepared], settings: PrepareSettings) -> list[str]:
+def said_of_own(recordings: Sequence[Prepared]) -> list[str]:
     """Values that recordings have of their own, in words, and how far they are from each other."""
     found: dict[str, dict[str, float]] = {}
     for name, recording in {p.recording.name: p.recording for p in recordings}.items():
@@ -92,7 +96,7 @@ def said_of_own(recordings: Sequence[Prepared], settings: PrepareSettings) -> li
         told = ", ".join(f"{format_number(v, unicode=False)} in {n}" for n, v in values.items())
         apart = (
             f"; the largest is {high / low:.2g} times the smallest"
-            if low > 0.0 and high / low > settings.own_apart
+            if low > 0.0 and high / low > _OWN_APART
             else ""
         )
         said.append(f"{parameter} is free in each recording: {told} (SI){apart}")

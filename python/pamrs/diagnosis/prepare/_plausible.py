@@ -23,7 +23,7 @@ from pamrs._stretches import stretches
 from pamrs.channels import channel_of, dotted
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
-from pamrs.diagnosis.settings import PlausibilitySettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, SimulationError, joined
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
@@ -37,6 +37,54 @@ __all__ = [
     "without_impossible",
 ]
 
+# [Pa] gauge pressure that a channel exceeds somewhere: bar under a heading in Pa does not
+_LEAST_PRESSURE = 100.0
+# [Pa] no pressure is lower: a vacuum is at -101 kPa, and a transducer errs
+_LEAST_GAUGE_PRESSURE = -1.1e5
+# multiple of the largest pressure of the rig file that is allowed above that
+_MOST_RATED_MULTIPLE = 5.0
+# highest measured supply pressure over that of the rig file, at the least
+_SUPPLY_LEAST_SHARE = 0.05
+_SUPPLY_MOST_SHARE = 5.0  # highest measured supply pressure over that of the rig file, at the most
+# share of the supply's pressure by which a muscle's may exceed it (errors of two transducers)
+_ORDER_MARGIN = 0.05
+_ORDER_OFFSET = 1e4  # [Pa] pressure by which it may exceed it besides (zeros of two transducers)
+_ORDER_TIME_SHARE = 0.5  # share of the time for which it may exceed it by more
+_LEAST_ANGLE_MARGIN = 0.1  # [rad] by which a joint may leave its range at the least
+_LEAST_LENGTH_MARGIN = 0.01  # [m] by which a load may leave its range at the least
+_RANGE_TIME_SHARE = 0.2  # share of the time for which it may leave its range by more
+_FASTEST_LOAD = 20.0  # [m/s] speed of a load that one sample in a hundred may exceed
+# [Pa] change of a muscle's pressure while its tank cannot read one and the same value
+_FROZEN_TANK_CHANGE = 2e4
+# relative change of pressures during which what they move cannot read one and the same value
+_FROZEN_MOTION_SHARE = 0.1
+# share of a pressure's change against its command; motion and leaks do some of it as well
+_OPPOSED_SHARE = 0.6
+_OPPOSED_CORRELATION = -0.2  # correlation of command and change below which that counts
+# [rad] change of an angle up to which the muscles' volume hardly moves their pressure
+_STILL_ANGLE = 0.02
+_STILL_LENGTH = 1e-3  # [m] change of a load's length up to which volume hardly moves pressure
+# [half ranges] distance of a command from its null beyond which it is another column or unit
+_COMMAND_SPAN = 2.0
+# [s] rest and change that one value of a valve's command cannot have made: leaks are slower
+_DEAD_COMMAND_TIME = 0.5
+# share of an absolute pressure that it changes at rest: beyond the noise of a gauge
+_DEAD_COMMAND_STILL = 0.02
+# ratio of absolute pressures then: moving a shut muscle changes its volume by less
+_DEAD_COMMAND_RATIO = 1.5
+# quantile of a regulator's command that is its largest; above are a logger's spikes
+_COMMAND_QUANTILE = 0.995
+_COMMAND_TIME_SHARE = 0.5  # share of the time for which a command may be beyond that
+_SENSE_TIME = 0.1  # [s] time over which a change of pressure is compared with the command
+_SENSE_LEAST_CHANGE = 2e4  # [Pa] range of a muscle's pressure below which its sense is not tested
+# [noise levels] standard deviation of an angle below which its unit and sign are not tested
+_SENSE_LEAST_NOISES = 3.0
+# [standard deviations] misfit of an angle as recorded from which its unit or sign may be wrong
+_SENSE_WRONG = 1.0
+# [standard deviations] misfit in another unit or sign below which that is the right one
+_SENSE_RIGHT = 0.4
+
+
 Array = NDArray[np.float64]
 
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
@@ -46,7 +94,7 @@ _TOLD = 12
 
 
 def check_plausible(
-    recordings: Sequence[Recording], rig: Rig, case: str, settings: PlausibilitySettings
+    recordings: Sequence[Recording], rig: Rig, case: str, settings: DiagnosisSettings
 ) -> None:
     """Refuse recordings whose units or columns cannot be right.
 
@@ -58,7 +106,7 @@ def check_plausible(
         The nominal model.
     case : str
         Name of the case, for the message.
-    settings : PlausibilitySettings
+    settings : DiagnosisSettings
         What is allowed.
 
     Raises
@@ -85,7 +133,7 @@ def _refuse(case: str, found: list[str]) -> None:
     )
 
 
-def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> list[str]:
+def implausible(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> list[str]:
     """Everything about a recording that cannot be, in words.
 
     Parameters
@@ -94,7 +142,7 @@ def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) 
         SI values with masks.
     rig : Rig
         The nominal model.
-    settings : PlausibilitySettings
+    settings : DiagnosisSettings
         What is allowed.
 
     Returns
@@ -105,19 +153,19 @@ def implausible(recording: Recording, rig: Rig, settings: PlausibilitySettings) 
     return [
         *_clock(recording, rig, settings),
         *_pressures(recording, rig, settings),
-        *_frozen_tanks(recording, rig, settings),
-        *_order(recording, rig, settings),
+        *_frozen_tanks(recording, rig),
+        *_order(recording, rig),
         *_motion(recording, rig, settings),
-        *_valves(recording, rig, settings),
+        *_valves(recording, rig),
         *(
             f"{told}: a command that was not logged; map the right column, or leave this one out"
-            for told in _dead(recording, rig, settings).values()
+            for told in _dead(recording, rig).values()
         ),
     ]
 
 
 def without_impossible(
-    recordings: Sequence[Recording], rig: Rig, settings: PlausibilitySettings
+    recordings: Sequence[Recording], rig: Rig, settings: DiagnosisSettings
 ) -> tuple[list[Recording], list[str]]:
     """Recordings whose samples beyond what the rig allows are masked, so that nothing starts there.
 
@@ -129,7 +177,7 @@ def without_impossible(
         SI values with masks.
     rig : Rig
         The nominal model.
-    settings : PlausibilitySettings
+    settings : DiagnosisSettings
         What is allowed.
 
     Returns
@@ -146,7 +194,7 @@ def without_impossible(
         for name in recording.channels:
             low, high = limits.get(name, (-math.inf, math.inf))
             if channel_of(name) in (*_PRESSURES, "supply_command"):
-                low, high = settings.least_gauge_pressure, settings.most_pressure
+                low, high = _LEAST_GAUGE_PRESSURE, settings.most_pressure
             bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
             table = rig.tables("valve").get(name.partition(".")[2])
             if channel_of(name) == "valve_command" and table is not None:
@@ -165,7 +213,7 @@ def without_impossible(
 
 
 def _lost(
-    values: Array, mask: NDArray[np.bool_], table: Mapping[str, Any], settings: PlausibilitySettings
+    values: Array, mask: NDArray[np.bool_], table: Mapping[str, Any], settings: DiagnosisSettings
 ) -> tuple[NDArray[np.bool_], float, float]:
     """Samples that a logger lost of a valve's command, and the range [V] beyond which they are.
 
@@ -173,7 +221,7 @@ def _lost(
     or stays there by many values. What was lost is one value, entered from inside the range and
     left to inside it.
     """
-    span = settings.command_span * table["half_range"]
+    span = _COMMAND_SPAN * table["half_range"]
     low, high = table["null_voltage"] - span, table["null_voltage"] + span
     off = np.where(mask, values, table["null_voltage"]) - table["null_voltage"]
     beyond, inside = np.abs(off) > span, np.abs(off) <= table["half_range"]
@@ -210,7 +258,7 @@ def _values(recording: Recording, name: str) -> Array:
     return np.asarray(recording.channels[name][recording.mask[name]], dtype=np.float64)
 
 
-def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _clock(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """A sample time at which motion can be followed."""
     longest = settings.longest_sample_time
     if _moving(rig, settings) and recording.sample_time > longest:
@@ -221,12 +269,12 @@ def _clock(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
         )
 
 
-def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """Sizes of pressures, by themselves and beside the rig file or a regulator's command."""
     rated = {
         dotted("supply_pressure", supply): told
         for supply in rig.tables("supply")
-        if (told := _set_to(recording, rig, supply, settings)) is not None
+        if (told := _set_to(recording, rig, supply)) is not None
     }
     largest = max(
         [
@@ -235,11 +283,7 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
         ],
         default=0.0,
     )
-    low, top = (
-        settings.least_pressure,
-        max(settings.most_pressure, settings.most_rated_multiple * largest),
-    )
-    least, most = settings.supply_least_share, settings.supply_most_share
+    top = max(settings.most_pressure, _MOST_RATED_MULTIPLE * largest)
     for name in recording.channels:
         values = _values(recording, name)
         if (
@@ -248,11 +292,11 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
         ):
             continue
         high = float(np.quantile(np.abs(values), 0.995))
-        if 0.0 < high < low and np.ptp(values) > 0.0:
+        if 0.0 < high < _LEAST_PRESSURE and np.ptp(values) > 0.0:
             yield (
-                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds {low:g} Pa "
-                "somewhere: are its values in bar (or is it another column, an angle or a voltage) "
-                "under a heading in Pa?"
+                f"{name} never exceeds {high:.3g} Pa gauge; a pressure of air exceeds "
+                f"{_LEAST_PRESSURE:g} Pa somewhere: are its values in bar (or is it another "
+                "column, an angle or a voltage) under a heading in Pa?"
             )
         elif high > top:
             yield (
@@ -262,11 +306,14 @@ def _pressures(recording: Recording, rig: Rig, settings: PlausibilitySettings) -
         elif name in rated:
             size, command = rated[name]
             source = f"the largest {command} is" if command else "the rig file has"
-            low_end = least * min(size, _in_front(recording, rig, name.partition(".")[2]))
-            if size > 0.0 and not low_end <= high <= most * size:
+            low_end = _SUPPLY_LEAST_SHARE * min(
+                size, _in_front(recording, rig, name.partition(".")[2])
+            )
+            if size > 0.0 and not low_end <= high <= _SUPPLY_MOST_SHARE * size:
                 yield (
                     f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
-                    f"{low_end:.3g} to {most * size:.3g} Pa is allowed: right column and unit?"
+                    f"{low_end:.3g} to {_SUPPLY_MOST_SHARE * size:.3g} Pa is allowed: right "
+                    "column and unit?"
                 )
 
 
@@ -287,9 +334,7 @@ def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
     return max(0.0, float(known.min())) if known.size else told
 
 
-def _set_to(
-    recording: Recording, rig: Rig, supply: str, settings: PlausibilitySettings
-) -> tuple[float, str] | None:
+def _set_to(recording: Recording, rig: Rig, supply: str) -> tuple[float, str] | None:
     """About the highest pressure [Pa gauge] that a supply should have, and the command that says
     so; no command where the rig file does.
 
@@ -301,10 +346,10 @@ def _set_to(
         return float(table["initial_pressure"]), ""
     command = dotted("supply_command", supply)
     known = _values(recording, command)
-    return (float(np.quantile(known, settings.command_quantile)), command) if known.size else None
+    return (float(np.quantile(known, _COMMAND_QUANTILE)), command) if known.size else None
 
 
-def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _frozen_tanks(recording: Recording, rig: Rig) -> Iterator[str]:
     """Tanks that read one value although they are drawn from."""
     valves = rig.ports("valve")
     for supply, table in rig.tables("supply").items():
@@ -321,7 +366,7 @@ def _frozen_tanks(recording: Recording, rig: Rig, settings: PlausibilitySettings
             for c in rig.tables("chamber")
             if (v := _values(recording, dotted("muscle_pressure", c))).size
         ]
-        if any(float(np.ptp(v)) > settings.frozen_tank_change for v in moved):
+        if any(float(np.ptp(v)) > _FROZEN_TANK_CHANGE for v in moved):
             yield (
                 f"{name} has the one value {values[0]:.6g} Pa throughout although its tank is "
                 "drawn from: a frozen transducer; leave "
@@ -343,7 +388,7 @@ def fed_by(rig: Rig) -> dict[str, list[str]]:
     return found
 
 
-def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _order(recording: Recording, rig: Rig) -> Iterator[str]:
     """A muscle is not at a higher pressure than what feeds it, nor a regulator than its inlet."""
     fed = {dotted("muscle_pressure", chamber): found for chamber, found in fed_by(rig).items()}
     for regulator in rig.tables("supply"):
@@ -354,7 +399,7 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
         for supply in supplies:
             if name not in recording.channels:
                 continue
-            highest = _highest(recording, rig, supply, settings)
+            highest = _highest(recording, rig, supply)
             if highest is None:
                 continue
             source, rows, limit = highest
@@ -362,21 +407,21 @@ def _order(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> It
             limit = limit[rows]
             if rows.sum() < 16:
                 continue
-            allowed = limit + settings.order_margin * np.abs(limit) + settings.order_offset
+            allowed = limit + _ORDER_MARGIN * np.abs(limit) + _ORDER_OFFSET
             above = recording.channels[name][rows] > allowed
             share = float(np.mean(above))
-            if share > settings.order_time_share:
+            if share > _ORDER_TIME_SHARE:
                 yield (
                     f"{name} is above {source} for {100 * share:.0f} % of the time (medians "
                     f"{float(np.median(recording.channels[name][rows])):.3g} and "
                     f"{float(np.median(limit)):.3g} Pa); at most "
-                    f"{100 * settings.order_time_share:.0f} % is allowed: are the two columns "
+                    f"{100 * _ORDER_TIME_SHARE:.0f} % is allowed: are the two columns "
                     "swapped, or one of their units wrong?"
                 )
 
 
 def _highest(
-    recording: Recording, rig: Rig, supply: str, settings: PlausibilitySettings
+    recording: Recording, rig: Rig, supply: str
 ) -> tuple[str, NDArray[np.bool_], Array] | None:
     """What a supply's pressure is told by, where that is known, and the highest that it can be.
 
@@ -386,7 +431,7 @@ def _highest(
     full = dotted("supply_pressure", supply)
     if full in recording.channels:
         return full, recording.mask[full], recording.channels[full]
-    told = _set_to(recording, rig, supply, settings)
+    told = _set_to(recording, rig, supply)
     if told is None:
         return None
     size, command = told
@@ -409,7 +454,7 @@ class _Moving:
     pulled: tuple[str, ...]
 
 
-def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
+def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     """The joints of a rig, or its hanging load."""
     ends = rig.ports("muscle").values()
     found = []
@@ -418,7 +463,7 @@ def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
         pulled = tuple(
             e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint)
         )
-        margin = max(settings.least_angle_margin, settings.range_margin * (high - low))
+        margin = max(_LEAST_ANGLE_MARGIN, settings.range_margin * (high - low))
         found.append(
             _Moving(
                 dotted("joint_angle", joint),
@@ -434,12 +479,12 @@ def _moving(rig: Rig, settings: PlausibilitySettings) -> list[_Moving]:
     if load and load["kind"] == "mass":
         low, high = float(load["min_length"]), float(load["max_length"])
         pulled = tuple(e["chamber"].partition(".")[2] for e in ends)
-        margin = max(settings.least_length_margin, settings.range_margin * (high - low))
-        found.append(_Moving("length", "m", low, high, margin, settings.fastest_load, pulled))
+        margin = max(_LEAST_LENGTH_MARGIN, settings.range_margin * (high - low))
+        found.append(_Moving("length", "m", low, high, margin, _FASTEST_LOAD, pulled))
     return found
 
 
-def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _motion(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Iterator[str]:
     """Range, rate and life of joint angles and of a load's length."""
     for moving in _moving(rig, settings):
         name, unit = moving.channel, moving.unit
@@ -449,7 +494,7 @@ def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         share = float(
             np.mean((values < moving.low - moving.margin) | (values > moving.high + moving.margin))
         )
-        if share > settings.range_time_share:
+        if share > _RANGE_TIME_SHARE:
             whose, units = (
                 ("its joint's range", "deg or rad")
                 if unit == "rad"
@@ -479,7 +524,7 @@ def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
             values.size >= 16
             and np.ptp(values) == 0.0
             and any(
-                float(np.ptp(v)) > settings.frozen_motion_share * float(np.abs(v).max()) > 1e3
+                float(np.ptp(v)) > _FROZEN_MOTION_SHARE * float(np.abs(v).max()) > 1e3
                 for v in pressures
             )
         ):
@@ -495,9 +540,9 @@ def _motion(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
             )
 
 
-def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> Iterator[str]:
+def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
     """Commands inside the valve's range, and pressures that rise when they say fill."""
-    still_by = {"joint_angle": settings.still_angle, "length": settings.still_length}
+    still_by = {"joint_angle": _STILL_ANGLE, "length": _STILL_LENGTH}
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
     for valve, ends in rig.ports("valve").items():
         name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
@@ -511,8 +556,8 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         if np.ptp(recording.channels[name][both]) == 0.0:
             continue
         opening = (recording.channels[name] - table["null_voltage"]) / table["half_range"]
-        beyond = float(np.mean(np.abs(opening[both]) > settings.command_span))
-        if beyond > settings.command_time_share:
+        beyond = float(np.mean(np.abs(opening[both]) > _COMMAND_SPAN))
+        if beyond > _COMMAND_TIME_SHARE:
             yield (
                 f"{name} is beyond twice its valve's range for {100 * beyond:.0f} % of the time "
                 f"(median {float(np.median(recording.channels[name][both])):.3g} V); "
@@ -522,7 +567,7 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
             continue
         if sum(e["to"] == ends["to"] for e in rig.ports("valve").values()) > 1:
             continue  # another valve may fill while this one vents
-        width = max(2, round(settings.sense_time / recording.sample_time))
+        width = max(2, round(_SENSE_TIME / recording.sample_time))
         rows = np.flatnonzero(both[:-width] & both[width // 2 : -width + width // 2] & both[width:])
         # what swings moves the pressure by its volume, whatever the valve does
         for place, still in (
@@ -538,18 +583,18 @@ def _valves(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> I
         )
         if (
             rows.size < 32
-            or moved < settings.sense_least_change
+            or moved < _SENSE_LEAST_CHANGE
             or not np.ptp(towards) > 0.0
             or not np.ptp(change) > 0.0
         ):
             continue
         against = float(np.abs(change)[towards * change < 0.0].sum() / np.abs(change).sum())
         correlation = float(np.corrcoef(towards, change)[0, 1])
-        if against > settings.opposed_share and correlation < settings.opposed_correlation:
+        if against > _OPPOSED_SHARE and correlation < _OPPOSED_CORRELATION:
             yield (
                 f"{100 * against:.0f} % of the change of {pressure} goes against {name} (rises "
                 "while it says vent, falls while it says fill); at most "
-                f"{100 * settings.opposed_share:.0f} % is allowed: is the command's sign, unit or "
+                f"{100 * _OPPOSED_SHARE:.0f} % is allowed: is the command's sign, unit or "
                 "column right?"
             )
 
@@ -572,7 +617,7 @@ def _commanded(rig: Rig) -> Iterator[tuple[str, str]]:
             yield from ((command, filled(end)) for end in direct)
 
 
-def _dead(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> dict[str, str]:
+def _dead(recording: Recording, rig: Rig) -> dict[str, str]:
     """Commands of one value beside a pressure that stands still and then is filled or vented, with
     the evidence. At one opening, or one set pressure, it comes to rest once, and what moves changes
     it by less.
@@ -584,28 +629,28 @@ def _dead(recording: Recording, rig: Rig, settings: PlausibilitySettings) -> dic
             continue
         there = recording.valid(command, pressure)
         values = recording.channels[command][there]
-        width = max(2, round(settings.dead_command_time / recording.sample_time))
+        width = max(2, round(_DEAD_COMMAND_TIME / recording.sample_time))
         if values.size < 32 or np.ptp(values) > 0.0 or len(recording) <= 3 * width:
             continue
         mask = recording.mask[pressure]
         absolute = np.where(mask, recording.channels[pressure] + ambient, np.nan)
         before, now, later = absolute[: -2 * width], absolute[width:-width], absolute[2 * width :]
         with np.errstate(invalid="ignore", divide="ignore"):
-            still = np.abs(now / before - 1.0) < settings.dead_command_still
+            still = np.abs(now / before - 1.0) < _DEAD_COMMAND_STILL
             change = np.exp(np.abs(np.log(later / now)))
         largest = float(np.nanmax(np.where(still, change, np.nan), initial=1.0))
-        if largest > settings.dead_command_ratio:
+        if largest > _DEAD_COMMAND_RATIO:
             found[command] = (
                 f"{command} has one value throughout ({values[0]:g} "
                 f"{recording.units.get(command) or 'SI'}) while {pressure} stands still and then "
-                f"changes {largest:.3g}-fold (absolute) within {settings.dead_command_time:g} s; "
-                f"at most {settings.dead_command_ratio:g}-fold can be of one command"
+                f"changes {largest:.3g}-fold (absolute) within {_DEAD_COMMAND_TIME:g} s; "
+                f"at most {_DEAD_COMMAND_RATIO:g}-fold can be of one command"
             )
     return found
 
 
 def without_dead_commands(
-    recordings: Sequence[Recording], rig: Rig, settings: PlausibilitySettings
+    recordings: Sequence[Recording], rig: Rig
 ) -> tuple[list[Recording], list[Faulty]]:
     """Recordings without commands of one value that the pressures behind them contradict.
 
@@ -618,8 +663,6 @@ def without_dead_commands(
         SI values with masks.
     rig : Rig
         The nominal model.
-    settings : PlausibilitySettings
-        What is allowed.
 
     Returns
     -------
@@ -632,7 +675,7 @@ def without_dead_commands(
         return list(recordings), []
     kept, said = list(recordings), list[Faulty]()
     for command in dict.fromkeys(command for command, _ in _commanded(rig)):
-        found = {r.name: _dead(r, rig, settings).get(command) for r in kept}
+        found = {r.name: _dead(r, rig).get(command) for r in kept}
         dead = {name: text for name, text in found.items() if text}
         # what has that one value elsewhere was not logged there either
         live = [r for r in kept if r.name not in dead and _moves(r, command)]
@@ -685,11 +728,10 @@ def check_sense(
         With every finding.
     """
     found = []
-    settings = [p.settings.plausibility for p in recordings]
     for block in (b for b in blocks if channel_of(b.channel) == "joint_angle"):
-        for prepared, own in zip(recordings, settings, strict=True):
+        for prepared in recordings:
             try:
-                text = _sense(block, core, prepared, own)
+                text = _sense(block, core, prepared)
             except SimulationError:
                 continue
             if text:
@@ -699,9 +741,7 @@ def check_sense(
         _refuse(case, found)
 
 
-def _sense(
-    block: Block, core: _core.Rig, prepared: Prepared, settings: PlausibilitySettings
-) -> str | None:
+def _sense(block: Block, core: _core.Rig, prepared: Prepared) -> str | None:
     """What would make the model's angle that of the recording: another unit, the other sign, two
     pressures in each other's place.
     """
@@ -713,8 +753,8 @@ def _sense(
         prepared.recording.channels[block.channel][rows],
         predicted(block, core, prepared)[rows],
     )
-    quiet = float(np.std(measured)) < settings.sense_least_noises * prepared.noise[block.channel]
-    if quiet or _misfit(measured, model) < settings.sense_wrong:
+    quiet = float(np.std(measured)) < _SENSE_LEAST_NOISES * prepared.noise[block.channel]
+    if quiet or _misfit(measured, model) < _SENSE_WRONG:
         return None
     signals, name = prepared.signals, block.channel
     value, slope = signals[name]
@@ -763,7 +803,7 @@ def _sense(
             expected, model = expected - expected.mean(), model - model.mean()
         found.append((_misfit(expected, model), text))
     best, text = min(found, default=(math.inf, ""))
-    return f"{shown}; {text}" if best < settings.sense_right else None
+    return f"{shown}; {text}" if best < _SENSE_RIGHT else None
 
 
 def _misfit(measured: Array, model: Array) -> float:

@@ -9,19 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation
 
-from pamrs.diagnosis.settings import PlausibilitySettings
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.units import parse_unit
 
 __all__ = ["without_rails"]
 
+# samples beside one at its sensor's end, masked as well: their noise is cut off on one side
+_RAIL_SAMPLES = 3
+
+
 Array = NDArray[np.float64]
 
 
-def without_rails(
-    recordings: Sequence[Recording], settings: PlausibilitySettings
-) -> tuple[list[Recording], list[Faulty]]:
+def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], list[Faulty]]:
     """Recordings without the samples that a sensor reads at the end of its range.
 
     A sensor ends where it ends: the end that one recording shows, by staying there for long, is
@@ -32,8 +33,6 @@ def without_rails(
     ----------
     recordings : sequence of Recording
         Those of a case.
-    settings : PlausibilitySettings
-        How many samples beside one at the end are not trusted.
 
     Returns
     -------
@@ -57,7 +56,7 @@ def without_rails(
             for k, recording in enumerate(found):
                 if channel not in recording.channels:
                     continue
-                bad = _beyond(recording, channel, rail, settings.rail_samples)
+                bad = _beyond(recording, channel, rail, _RAIL_SAMPLES)
                 if bad.any():
                     counts[recording.name] = int(bad.sum())
                     found[k] = _masked(recording, channel, bad)

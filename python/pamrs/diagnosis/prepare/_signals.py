@@ -12,7 +12,7 @@ from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
 from pamrs.channels import channel_of, dotted
-from pamrs.diagnosis.settings import DiagnosisSettings, PrepareSettings
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import info_of
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
@@ -33,6 +33,35 @@ __all__ = [
     "thermometers_of",
     "warm_chambers",
 ]
+
+# chance that noise alone shortens the filter: a corner has to miss more (decision 22)
+_SMOOTHING_ODDS = 1e-3
+# samples of each spectrum in which a band quieter than the noise is sought (decision 22)
+_SPECTRUM_SAMPLES = 64
+# spectra without a sample that was left out, from which bands are compared (decision 22)
+_LEAST_SPECTRA = 16
+# variance share below which the quietest band is the noise: white noise has 0.38 (decision 22)
+_QUIET_SHARE = 0.25
+# [s] stretches beside a start that give value and slope; the longest that fits (decision 22)
+_START_REACHES = (0.04, 0.08, 0.16)
+# variance over that of the noise up to which a cubic fits such a stretch (decision 22)
+_START_MISFIT = 1.1
+# deviations of that variance allowed beside it, for the shortest stretch (decision 22)
+_START_FIRST_STDS = 2.0
+_START_LONGER_STDS = 1.5  # deviations allowed for longer stretches (decision 22)
+# deviations by which slopes of two stretches may differ (Lepski 1991, decision 22)
+_START_SLOPE_STDS = 2.0
+_START_LEAST_SAMPLES = 8  # fewest samples of a stretch: a cubic takes four
+_BRIDGED_SAMPLES = 3  # longest hole in a driving signal that is bridged by a line
+# share of repeated samples from which values step by a converter; corners of triangles give 1 %
+_ROUNDED_STILL = 0.03
+# noise in converter steps below which rounding is not white; at half a step it nearly is
+_ROUNDED_SHARE = 0.5
+# fewest samples of a recording: noise takes eleven, a leak of a shut chamber shows in sixteen
+_LEAST_SAMPLES = 12
+_LEAST_CHANNEL_SAMPLES = 11  # fewest usable samples of a channel
+_LEAST_CHANNEL_SHARE = 0.2  # share of a channel's samples that must be usable
+
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -123,12 +152,12 @@ class Prepared:
         ones are cut out together with what the smoothing carries over their edges.
         """
         if drives not in self._clear:
-            settings = self.settings.prepare
+            settings = self.settings
             reach = round(0.5 * settings.smoothing_time / self.dt)
             out = np.ones(self.n, dtype=bool)
             measured = [name for name in drives if name not in self.simulated]
             mask = self.recording.valid(*measured) if measured else out
-            for a, b in _long_holes(mask, settings.bridged_samples):
+            for a, b in _long_holes(mask, _BRIDGED_SAMPLES):
                 out[max(0, a - reach) : b + reach] = False
             out.flags.writeable = False
             self._clear[drives] = out
@@ -155,7 +184,6 @@ class Prepared:
         one cubic all of it.
         """
         key = (channel, tuple(starts))
-        settings = self.settings.prepare
         if key not in self._begun:
             value, slope = (array.copy() for array in self.signals[channel])
             for at in starts if self.lengths[channel].any() else []:
@@ -165,7 +193,6 @@ class Prepared:
                     self.noise[channel],
                     self.dt,
                     at,
-                    settings,
                 )
                 if state is not None:
                     value[at], slope[at] = state
@@ -192,7 +219,7 @@ class Prepared:
         return rows & self.recording.mask[output]
 
 
-def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: int) -> float:
+def noise_level(values: Array, mask: Mask, *, seed: int) -> float:
     """Standard deviation of white sample noise, from third differences, robust; at least that of
     quantisation.
 
@@ -206,8 +233,6 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
         Samples on a uniform grid.
     mask : (n,) bool array
         Which may be used.
-    settings : PrepareSettings
-        Samples of a spectrum, and how quiet a band has to be.
     seed : int
         Of the dither on a quantised channel.
 
@@ -219,14 +244,14 @@ def noise_level(values: Array, mask: Mask, settings: PrepareSettings, *, seed: i
     ok = mask[:-3] & mask[1:-2] & mask[2:-1] & mask[3:]
     if ok.sum() < 8:
         return 0.0
-    rounded = _stays(values, mask, settings)
+    rounded = _stays(values, mask)
     lattice = _lattice(values[mask]) if rounded else 0.0
     # the median of differences of whole steps moves by whole steps: as much noise as the lattice
     # brings smears them, and is taken off
     dithered = values + np.random.default_rng(seed).uniform(-0.5, 0.5, values.size) * lattice
     variance = (1.4826 * float(np.median(np.abs(np.diff(dithered, 3)[ok])))) ** 2 / 20.0
-    quiet = _quietest_band(values, mask, settings)
-    if quiet < settings.quiet_share * variance:
+    quiet = _quietest_band(values, mask)
+    if quiet < _QUIET_SHARE * variance:
         # what jumps from sample to sample shows no small step in time, and a finer lattice
         finer = _lattice(np.unique(values[mask])) if rounded else 0.0
         return float(np.sqrt(max(quiet, finer**2 / 12.0)))
@@ -240,30 +265,30 @@ def _lattice(values: Array) -> float:
     return float(steps.min()) if steps.size else 0.0
 
 
-def _stays(values: Array, mask: Mask, settings: PrepareSettings) -> bool:
+def _stays(values: Array, mask: Mask) -> bool:
     """Whether a channel stays on a number from sample to sample, as one that a converter rounds
     does: an even stroke that is sampled evenly has numbers as evenly apart, and rounds nothing.
     """
     both = mask[1:] & mask[:-1]
     equal = np.diff(values)[both] == 0.0
-    return bool(equal.size) and float(np.mean(equal)) > settings.rounded_still
+    return bool(equal.size) and float(np.mean(equal)) > _ROUNDED_STILL
 
 
-def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> float:
+def _quietest_band(values: Array, mask: Mask) -> float:
     """Variance of white noise that would be as loud everywhere as the quietest band of a signal is;
     infinite where too few samples stand side by side.
     """
-    length, lines = settings.spectrum_samples, settings.spectrum_samples // 16
-    if values.size < length:
+    lines = _SPECTRUM_SAMPLES // 16
+    if values.size < _SPECTRUM_SAMPLES:
         return math.inf
     every, usable = (
-        np.lib.stride_tricks.sliding_window_view(part, length)[:: length // 2]
+        np.lib.stride_tricks.sliding_window_view(part, _SPECTRUM_SAMPLES)[:: _SPECTRUM_SAMPLES // 2]
         for part in (values, mask)
     )
     pieces = every[usable.all(axis=1)]
-    if len(pieces) < settings.least_spectra:
+    if len(pieces) < _LEAST_SPECTRA:
         return math.inf
-    window = np.hanning(length)
+    window = np.hanning(_SPECTRUM_SAMPLES)
     pieces = pieces - pieces.mean(axis=1, keepdims=True)
     power = np.abs(np.fft.rfft(pieces * window, axis=1)) ** 2 / float(window @ window)
     # the lowest eighth is motion, the last line has half as many numbers
@@ -271,12 +296,12 @@ def _quietest_band(values: Array, mask: Mask, settings: PrepareSettings) -> floa
     return float(np.median(bands, axis=0).min())
 
 
-def filter_length(dt: float, settings: PrepareSettings) -> int:
+def filter_length(dt: float, settings: DiagnosisSettings) -> int:
     """Samples of the smoothing filter at a sample time [s]: odd, at least seven."""
     return max(7, round(settings.smoothing_time / dt) | 1)
 
 
-def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings) -> Lengths:
+def lengths_of(values: Array, noise: float, dt: float, settings: DiagnosisSettings) -> Lengths:
     """Samples over which each sample of a channel can be smoothed: the longest filter to which a
     cubic fits but for the noise, 1 where none does; 0 where one cubic fits the whole channel.
 
@@ -292,7 +317,7 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
         Standard deviation of its noise.
     dt : float
         Sample time [s].
-    settings : PrepareSettings
+    settings : DiagnosisSettings
         Length of the filter, and how seldom noise alone may shorten it.
 
     Returns
@@ -300,7 +325,7 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
     (n,) array of int
     """
     shortest, length = filter_length(math.inf, settings), filter_length(dt, settings)
-    if _is_one_cubic(values, noise, length, settings):
+    if _is_one_cubic(values, noise, length):
         return np.zeros(values.size, dtype=np.intp)
     found = np.ones(values.size, dtype=np.intp)
     for count in sorted({shortest, max(shortest, round(0.5 * length) | 1), length}):
@@ -308,12 +333,12 @@ def lengths_of(values: Array, noise: float, dt: float, settings: PrepareSettings
         frames = np.lib.stride_tricks.sliding_window_view(values - values.mean(), count)
         missed = np.sum((frames - (frames @ basis) @ basis.T) ** 2, axis=1) / (count - 4)
         usual = max(noise**2, float(np.median(missed)))
-        fits = missed <= usual * chi2.isf(settings.smoothing_odds, count - 4) / (count - 4)
+        fits = missed <= usual * chi2.isf(_SMOOTHING_ODDS, count - 4) / (count - 4)
         found[np.pad(fits, count // 2, mode="edge")] = count
     return found
 
 
-def _is_one_cubic(values: Array, noise: float, length: int, settings: PrepareSettings) -> bool:
+def _is_one_cubic(values: Array, noise: float, length: int) -> bool:
     """Whether one cubic fits a whole channel but for its noise: what is held, or drifts.
 
     Noise of such a channel would drive a model, and an effect that makes the model answer less to
@@ -323,14 +348,14 @@ def _is_one_cubic(values: Array, noise: float, length: int, settings: PrepareSet
     """
     missed = values - _cubic(values)(np.arange(values.size))
     pieces = missed[: values.size // length * length].reshape(-1, length)
-    count, odds = len(pieces), settings.smoothing_odds
+    count = len(pieces)
     if count <= _TERMS:
         return False
     means = pieces.mean(axis=1) * (math.sqrt(length) / noise)
-    spread = 1.0 + 2.0 * float(norm.isf(odds)) * math.sqrt(2.0 / values.size)
+    spread = 1.0 + 2.0 * float(norm.isf(_SMOOTHING_ODDS)) * math.sqrt(2.0 / values.size)
     return bool(
-        means @ means <= chi2.isf(odds, count - _TERMS)
-        and np.abs(means).max() <= norm.isf(0.5 * odds / count)
+        means @ means <= chi2.isf(_SMOOTHING_ODDS, count - _TERMS)
+        and np.abs(means).max() <= norm.isf(0.5 * _SMOOTHING_ODDS / count)
         and float(np.mean(missed**2)) <= spread * noise**2
     )
 
@@ -377,7 +402,7 @@ def _long_holes(mask: Mask, bridged: int) -> list[tuple[int, int]]:
 
 
 def _state(
-    values: Array, mask: Mask, noise: float, dt: float, at: int, settings: PrepareSettings
+    values: Array, mask: Mask, noise: float, dt: float, at: int
 ) -> tuple[float, float] | None:
     """Value and slope at a sample by the longest stretch around it, free of long holes, that a
     cubic fits but for the noise.
@@ -386,11 +411,11 @@ def _state(
     1991): at the edge of a recording a cubic that hardly misses the samples may miss the slope by
     far. None where no cubic fits.
     """
-    holes, least = _long_holes(mask, settings.bridged_samples), settings.start_least_samples
+    holes = _long_holes(mask, _BRIDGED_SAMPLES)
     first = max((b for _, b in holes if b <= at), default=0)
     last = min((a for a, _ in holes if a >= at), default=values.size)
     state, spread = None, math.inf
-    for reach in sorted({max(round(s / dt), least // 2) for s in settings.start_reaches}):
+    for reach in sorted({max(round(s / dt), _START_LEAST_SAMPLES // 2) for s in _START_REACHES}):
         # a side that is cut off makes the other longer
         low, high = max(first, at - reach), min(last, at + reach + 1)
         low, high = (
@@ -399,19 +424,17 @@ def _state(
         )
         rows = low + np.flatnonzero(mask[low:high])
         count = rows.size
-        if count < least:
+        if count < _START_LEAST_SAMPLES:
             continue
         powers = np.vander((rows - at) / count, 4, increasing=True)
         inverse = np.linalg.inv(powers.T @ powers)
         found = inverse @ (powers.T @ values[rows])
         left = values[rows] - powers @ found
         slope = float(found[1]) / (count * dt)
-        scatters = settings.start_longer_stds if state is not None else settings.start_first_stds
-        most = settings.start_misfit + scatters * math.sqrt(2.0 / (count - 4))
+        scatters = _START_LONGER_STDS if state is not None else _START_FIRST_STDS
+        most = _START_MISFIT + scatters * math.sqrt(2.0 / (count - 4))
         rough = float(left @ left) > most * (count - 4) * noise**2
-        if state is not None and (
-            rough or abs(slope - state[1]) > settings.start_slope_stds * spread
-        ):
+        if state is not None and (rough or abs(slope - state[1]) > _START_SLOPE_STDS * spread):
             break
         if not rough:
             state, spread = (
@@ -449,8 +472,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             f"recording {recording.name!r} has no channel {' or '.join(wanted)}, without which no "
             f"block can be cut out; it has: {', '.join(recording.channels)}"
         )
-    own = settings.prepare
-    length = max(own.least_samples, filter_length(recording.sample_time, own))
+    length = max(_LEAST_SAMPLES, filter_length(recording.sample_time, settings))
     if len(recording) < length:
         raise DiagnosisError(
             f"recording {recording.name!r} has {len(recording)} samples; at least {length} are "
@@ -464,20 +486,20 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
         if name not in recording.channels:
             continue  # what is measured of a block that the rig does not have is left alone
         mask = recording.mask[name]
-        if few_usable(mask, own):
+        if few_usable(mask):
             raise DiagnosisError(
                 f"recording {recording.name!r}: only {int(mask.sum())} of {mask.size} samples of "
                 f"{name} are usable"
             )
         raw[name] = filled = _bridged(recording.channels[name], mask)
         noise[name] = _noise_of(recording, name, settings)
-        rounded = _stays(recording.channels[name], mask, own)
+        rounded = _stays(recording.channels[name], mask)
         step = _lattice(_as_logged(recording, name)) if rounded else 0.0
-        if noise[name] < own.rounded_share * step:
+        if noise[name] < _ROUNDED_SHARE * step:
             steps[name] = step
         if noise[name] <= 0:
             noise[name] = max(1e-9, 1e-6 * float(np.ptp(filled)))
-        lengths[name] = lengths_of(filled, noise[name], recording.sample_time, own)
+        lengths[name] = lengths_of(filled, noise[name], recording.sample_time, settings)
         signals[name] = smoothed(filled, recording.sample_time, lengths[name])
     commands = {name: _command(recording, rig, name) for name in core.inputs}
     logged = max((v.size for v in recording.commands.values()), default=0) // len(recording) or 1
@@ -494,13 +516,13 @@ def _noise_of(recording: Recording, name: str, settings: DiagnosisSettings) -> f
     What is interpolated between samples that are farther apart than the grid's is far smoother
     than they are: their own noise counts, as that of so many independent samples as were recorded.
     """
-    own, seed = settings.prepare, settings.seed
+    seed = settings.seed
     values, mask = recording.channels[name], recording.mask[name]
     if name not in recording.logged:
-        return noise_level(values, mask, own, seed=seed)
+        return noise_level(values, mask, seed=seed)
     apart, logged = recording.logged[name]
     there = np.isfinite(logged)
-    single = noise_level(np.where(there, logged, 0.0), there, own, seed=seed)
+    single = noise_level(np.where(there, logged, 0.0), there, seed=seed)
     return single * math.sqrt(max(1.0, apart / recording.sample_time))
 
 
@@ -512,9 +534,9 @@ def _as_logged(recording: Recording, name: str) -> Array:
     return np.unique(values[np.isfinite(values)])
 
 
-def few_usable(mask: Mask, settings: PrepareSettings) -> bool:
+def few_usable(mask: Mask) -> bool:
     """Whether too few samples of a channel are usable for a diagnosis."""
-    least = max(settings.least_channel_samples, settings.least_channel_share * mask.size)
+    least = max(_LEAST_CHANNEL_SAMPLES, _LEAST_CHANNEL_SHARE * mask.size)
     return bool(mask.sum() < least)
 
 

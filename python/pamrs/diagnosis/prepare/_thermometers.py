@@ -8,15 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from pamrs.diagnosis.prepare._signals import few_usable, thermometers_of
-from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 
 __all__ = ["without_poor_thermometers"]
 
+# share of new samples (no repeats, no lines) from which a thermometer keeps up with the log
+_LEAST_NEW_SHARE = 0.5
+
 
 def without_poor_thermometers(
-    recordings: Sequence[Recording], rig: Rig, settings: PrepareSettings
+    recordings: Sequence[Recording], rig: Rig
 ) -> tuple[list[Recording], list[str]]:
     """Recordings without the temperatures of gases that cannot be judged in each of them, and
     sentences that say so.
@@ -30,15 +32,13 @@ def without_poor_thermometers(
         What there is.
     rig : Rig
         The model.
-    settings : PrepareSettings
-        How many samples a channel needs.
     """
     said = []
     for name in thermometers_of(rig).values():
         faults = [
             f"in {r.name!r} {fault}"
             for r in recordings
-            if name in r.channels and (fault := _fault(r, name, settings))
+            if name in r.channels and (fault := _fault(r, name))
         ]
         if faults:
             said.append(f"{name} is not judged: {'; '.join(faults)}")
@@ -46,14 +46,14 @@ def without_poor_thermometers(
     return list(recordings), said
 
 
-def _fault(recording: Recording, name: str, settings: PrepareSettings) -> str:
+def _fault(recording: Recording, name: str) -> str:
     """Why a temperature cannot be judged; empty where it can."""
     values, mask = recording.channels[name], recording.mask[name]
-    if few_usable(mask, settings):
+    if few_usable(mask):
         return f"only {int(mask.sum())} of {mask.size} samples are usable"
     bends = np.abs(np.diff(values[mask], 2))
     new = float(np.mean(bends > 1e-6 * float(np.ptp(values[mask]))))
-    if 0.0 < new < settings.least_new_share:
+    if 0.0 < new < _LEAST_NEW_SHARE:
         return (
             f"one sample in {1.0 / new:.1f} is new, the others repeat or lie on lines between: log "
             "it as fast as the pressures, or the pressures as slowly"

@@ -11,7 +11,6 @@ from pamrs import _core
 from pamrs.channels import dotted
 from pamrs.diagnosis.prepare._blocks import Block, available_blocks, predicted
 from pamrs.diagnosis.prepare._signals import Prepared
-from pamrs.diagnosis.settings import PrepareSettings
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
@@ -19,7 +18,7 @@ from pamrs.rig.schema import qualified
 __all__ = ["blocks_beside_tanks", "said_of_tanks", "unread_tanks", "with_tanks"]
 
 
-def unread_tanks(rig: Rig, channels: Sequence[str], settings: PrepareSettings) -> list[str]:
+def unread_tanks(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Channels of tanks that nobody measured and whose pressure can be simulated, since what they
     feed and what is commanded there is recorded.
 
@@ -29,26 +28,22 @@ def unread_tanks(rig: Rig, channels: Sequence[str], settings: PrepareSettings) -
         The nominal model.
     channels : sequence of str
         What every recording has.
-    settings : PrepareSettings
-        Windows and integration steps.
     """
     tanks = [name for name, table in rig.tables("supply").items() if table["kind"] == "tank"]
     gauges = [dotted("supply_pressure", name) for name in tanks]
     missing = [gauge for gauge in gauges if gauge not in channels]
-    there = {b.channel for b in available_blocks(rig, (*channels, *missing), settings)}
+    there = {b.channel for b in available_blocks(rig, (*channels, *missing))}
     return [gauge for gauge in missing if gauge in there]
 
 
-def blocks_beside_tanks(
-    rig: Rig, channels: tuple[str, ...], settings: PrepareSettings
-) -> list[Block]:
+def blocks_beside_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     """The blocks that these channels can tell apart (:func:`available_blocks`), those driven by the
     simulated pressure of a tank included, the tank itself not.
     """
-    tanks = unread_tanks(rig, channels, settings)
+    tanks = unread_tanks(rig, channels)
     return [
         replace(block, floating=tuple(name for name in block.drives if name in tanks))
-        for block in available_blocks(rig, (*channels, *tanks), settings)
+        for block in available_blocks(rig, (*channels, *tanks))
         if block.channel not in tanks
     ]
 
@@ -82,7 +77,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
             lengths=prepared.lengths | {tank: np.zeros(prepared.n, dtype=np.intp)},
             simulated=(*prepared.simulated, tank),
         )
-        found = available_blocks(rig, (*names, *flat.simulated), prepared.settings.prepare)
+        found = available_blocks(rig, (*names, *flat.simulated))
         (own,) = [replace(b, window=None) for b in found if b.name == full]
         try:
             value = predicted(own, core, flat)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from pamrs.diagnosis.screen._leave_one_out import left_out
 from pamrs.diagnosis.screen._resampling import inclusion
 from pamrs.diagnosis.screen._screening import (
+    STRONG_SIZES,
     Score,
     Screen,
     Stand,
@@ -21,6 +22,7 @@ from pamrs.diagnosis.screen._screening import (
 )
 
 __all__ = [
+    "STRONG_SIZES",
     "Score",
     "Screen",
     "Stand",

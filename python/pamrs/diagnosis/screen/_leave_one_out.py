@@ -10,10 +10,15 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, residuals, stacked
+from pamrs.diagnosis.fit import FIT_BIN_TIME, Fit, Key, Problem, bin_width, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 
 __all__ = ["left_out"]
+
+# share of a direction that one recording alone tells (leverage, Cook & Weisberg 1982)
+_SOLE_SOURCE = 0.9
+_PIECES_LEFT_OUT = 5  # pieces of a single recording, each predicted by the others (decision 111)
+
 
 Array = NDArray[np.float64]
 
@@ -58,13 +63,14 @@ def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[
     total += _RIDGE * np.diag(np.maximum(np.diag(total), _RIDGE))
     root = np.linalg.inv(np.linalg.cholesky(total))
     out = dict(found.residuals)
-    alone = problem.settings.fit.sole_source
     for part, (normal, gradient) in zip(parts, sums, strict=True):
         # in these coordinates all parts together tell one unit of every direction, and `shares` of
         # it come from this one
         shares, turn = np.linalg.eigh(root @ normal @ root.T)
         step = turn.T @ (root @ gradient)
-        moved = np.where(shares < alone, step / np.maximum(1.0 - shares, 1.0 - alone), 0.0)
+        moved = np.where(
+            shares < _SOLE_SOURCE, step / np.maximum(1.0 - shares, 1.0 - _SOLE_SOURCE), 0.0
+        )
         change = root.T @ (turn @ moved) * scales
         for key, there in part.items():
             own = found.residuals[key]
@@ -101,9 +107,10 @@ def _parts(problem: Problem, found: Fit) -> list[dict[Key, slice]]:
             for p in problem.recordings
         ]
     (only,) = problem.recordings
-    width = bin_width(only, problem.settings.noise.fit_bin_time)
-    count = problem.settings.fit.pieces_left_out
-    ends = [width * round(k / count * (only.n // width)) for k in range(count)] + [only.n]
+    width = bin_width(only, FIT_BIN_TIME)
+    ends = [
+        width * round(k / _PIECES_LEFT_OUT * (only.n // width)) for k in range(_PIECES_LEFT_OUT)
+    ] + [only.n]
     return [
         {key: slice(first, last) for key in sizes}
         for first, last in itertools.pairwise(ends)

@@ -17,11 +17,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._normal import solve_normal
+from pamrs.diagnosis.fit import FIT_BIN_TIME
 from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import exclude
 
 __all__ = ["inclusion"]
+
+# resamples of the recordings that say how often an effect would be taken: within 4 %
+_RESAMPLES = 200
+# [s] length of the segments that are drawn: longer than the residual remembers (Kuensch (1989))
+_RESAMPLE_TIME = 2.5
+
 
 Array = NDArray[np.float64]
 
@@ -54,27 +61,26 @@ def inclusion(
     columns = np.column_stack(
         [stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)]
     )
-    length = round(settings.screen.resample_time / settings.noise.fit_bin_time)
+    length = round(_RESAMPLE_TIME / FIT_BIN_TIME)
     count = -(-columns.shape[0] // length)
     parts = [columns[k * length : (k + 1) * length] for k in range(count)]
     products = np.array([part.T @ part for part in parts])
     rng = np.random.default_rng(settings.seed)
-    draws = settings.screen.resamples
     taken: Counter[str] = Counter()
-    for weights in rng.multinomial(count, np.full(count, 1.0 / count), draws):
+    for weights in rng.multinomial(count, np.full(count, 1.0 / count), _RESAMPLES):
         taken.update(
             _selected(
                 screened, np.tensordot(weights.astype(np.float64), products, 1), least, partner
             )
         )
-    return {effect: number / draws for effect, number in taken.most_common()}
+    return {effect: number / _RESAMPLES for effect, number in taken.most_common()}
 
 
 def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
     """Effects that forward selection takes, from the products of residual, sensitivities and
     signatures with each other.
     """
-    stand, settings = screened.stand, screened.settings
+    stand = screened.stand
     first = 1 + stand.moved.size
     base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
     columns = list(range(first, products.shape[0]))
@@ -87,7 +93,7 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
         powers = products[columns, columns] - np.sum(shared * solved, axis=0)
         alongs = products[0, columns] - (products[base, 0] + pull) @ solved
         gains = [
-            (best_size(float(along), float(power), start, settings)[1], effect, column)
+            (best_size(float(along), float(power), start)[1], effect, column)
             for column, (effect, start, _), along, power in zip(
                 columns, screened.signatures, alongs, powers, strict=True
             )

@@ -31,13 +31,13 @@ from pamrs.diagnosis.fit import (
     starts_of,
 )
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.settings import ScreenSettings
 from pamrs.effects import EffectParameter, exclude, id_of, info_of, place_of, term_of
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
 
 __all__ = [
+    "STRONG_SIZES",
     "Score",
     "Screen",
     "Stand",
@@ -47,6 +47,24 @@ __all__ = [
     "screen",
     "stand_of",
 ]
+
+_MOST_SIZE = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
+# [typical sizes] smallest start: a compressor may deliver 500 times less (decision 20)
+_LEAST_SIZE = 0.002
+# [sizes tried] size below which (and from most_size) the signature is taken again there
+_REPEAT_BELOW = 0.3
+# signatures of one start at the most, each at the size that the last one suggested
+_MOST_SIGNATURES = 3
+# [typical sizes] sizes at which each start is looked at beside a strong mismatch (decision 13)
+STRONG_SIZES = (0.05, 0.3, 4.0, 20.0)
+_INVISIBLE = 1e-6  # [noise levels^2] squared length below which a signature is none (rounding)
+_THRESHOLD_LEVELS = 6  # levels of a channel that are tried for the thresholds of a switch
+_THRESHOLD_PRECISION = 5e-3  # share of the channel's range to which they are narrowed down
+# quantiles of a channel tried as a place of contact; from above at the others
+_PLACE_SHARES = (0.5, 0.75, 0.93)
+# parts of a valve's largest opening at which a restriction beside it is tried
+_OPENING_SHARES = (0.6, 3.0)
+
 
 Array = NDArray[np.float64]
 Signature = tuple[str, Start, Array]
@@ -128,8 +146,6 @@ class Screen:
         The model.
     signatures : list of (effect, start, (n,) array)
         Each effect's, from each of its starts.
-    settings : ScreenSettings
-        Sizes that are relied on.
     strong : bool
         Whether so much is left that signatures, linear in what a strong effect is not, rank effects
         and no more.
@@ -137,7 +153,6 @@ class Screen:
 
     stand: Stand
     signatures: list[Signature]
-    settings: ScreenSettings
     strong: bool = False
 
     def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
@@ -156,26 +171,24 @@ class Screen:
             if exclude(effect, without):
                 continue
             power = own.power(signature)
-            if power < self.settings.invisible:
+            if power < _INVISIBLE:
                 continue
-            size, gain = best_size(float(own.left @ signature), power, start, self.settings)
+            size, gain = best_size(float(own.left @ signature), power, start)
             found.append(Score(effect, start, gain, size, signature))
         return sorted(found, key=lambda s: -s.gain)
 
 
-def best_size(
-    along: float, power: float, start: Start, settings: ScreenSettings
-) -> tuple[float, float]:
+def best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     """Multiple of a start's size at which its signature gains most, inside its plausible range, and
     that gain in chi-square.
 
     ``along`` is the product of what is left of the residual with the signature, ``power`` that of
     the signature with itself.
     """
-    if power < settings.invisible:
+    if power < _INVISIBLE:
         return 0.0, 0.0
-    low = -settings.most_size if start.signed else settings.least_size
-    size = float(np.clip(-along / power, low, settings.most_size)) if start.scalable else 1.0
+    low = -_MOST_SIZE if start.signed else _LEAST_SIZE
+    size = float(np.clip(-along / power, low, _MOST_SIZE)) if start.scalable else 1.0
     return size, -2.0 * size * along - size**2 * power
 
 
@@ -203,7 +216,7 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     """
     rows, jacobian = stacked(problem, fitted.residuals, inflation)
     # a parameter at the end of its range cannot go on: what it would explain is left for an effect
-    walls = problem.settings.fit.most_tolerances
+    walls = problem.settings.most_tolerances
     names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
     if jacobian is None or not names:
         none = np.zeros((rows.size, 0))
@@ -260,7 +273,7 @@ def screen(
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
             looking.at([start for start in starts if start.form == form])
-    return Screen(looking.stand, looking.signatures, looking.settings, strong)
+    return Screen(looking.stand, looking.signatures, strong)
 
 
 @dataclass(frozen=True, eq=False)
@@ -297,11 +310,6 @@ class _Looking:
     everywhere: dict[_Values, Start] = field(default_factory=dict)
     seen: dict[_Values, dict[Key, Residual]] = field(default_factory=dict)
 
-    @property
-    def settings(self) -> ScreenSettings:
-        """What it is done by."""
-        return self.problem.settings.screen
-
     def at(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
@@ -322,7 +330,7 @@ class _Looking:
         """Add the signature of a start; what it would bring."""
         begun = self.everywhere.get(_values(start)) if place_of(start.effect) else None
         tried, best = start if begun is None else begun.moved(start.effect), None
-        for _ in range(self.settings.most_signatures if looks is None else looks):
+        for _ in range(_MOST_SIGNATURES if looks is None else looks):
             seen = self._look(tried)
             if seen is None:
                 break
@@ -337,7 +345,7 @@ class _Looking:
                 break  # its bounds hold it
             tried = wanted
         if self.strong and start.scalable and looks is None and begun is None:
-            others = [self._look(start.scaled(size)) for size in self.settings.strong_sizes]
+            others = [self._look(start.scaled(size)) for size in STRONG_SIZES]
             # what a signature says of other sizes than its own is not relied on
             known = [seen for seen in (best, *others) if seen is not None]
             best = max(known, key=lambda seen: self._taken(seen[0]), default=None)
@@ -358,7 +366,7 @@ class _Looking:
             self.seen[_values(start)] = found
         rows, _ = stacked(self.problem, found, self.inflation)
         entry = (start.effect, start, rows - self.stand.rows)
-        return entry, next(iter(Screen(self.stand, [entry], self.settings).scores()), None)
+        return entry, next(iter(Screen(self.stand, [entry]).scores()), None)
 
     def _changes(self, start: Start) -> dict[Key, Residual] | None:
         """Residuals with an effect at the size of a start; None where that leaves the range in
@@ -386,7 +394,7 @@ class _Looking:
 
     def _placed(self, score: Score) -> bool:
         """Whether a signature says that its effect has about the size at which it was taken."""
-        return self.settings.repeat_below <= abs(score.size) < self.settings.most_size
+        return _REPEAT_BELOW <= abs(score.size) < _MOST_SIZE
 
     def _taken(self, entry: Signature) -> float:
         """What a start takes of the chi-square at its own size."""
@@ -439,7 +447,7 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
         there = float(np.quantile(reached, 1.0 - share if lower else share))
         return replace(start, free=start.free | {f"{effect}.{place.name}": there})
 
-    return [at(start, share) for start in starts for share in problem.settings.screen.place_shares]
+    return [at(start, share) for start in starts for share in _PLACE_SHARES]
 
 
 def _nearest(
@@ -500,7 +508,7 @@ def _beside(
     return [
         replace(start, free=start.free | {name: part * max(areas) / unit})
         for start in starts
-        for part in problem.settings.screen.opening_shares
+        for part in _OPENING_SHARES
         if any(_shows(start, block) for block in problem.blocks)
     ]
 
@@ -523,11 +531,11 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
     on, off = info_of(start.effect).with_role("threshold")
-    seen, settings = _seen(problem, on.channel), problem.settings.screen
+    seen = _seen(problem, on.channel)
     if seen is None:
         return None
     low, high = (float(f(seen)) for f in (np.min, np.max))
-    step = (high - low) / settings.threshold_levels
+    step = (high - low) / _THRESHOLD_LEVELS
     if step <= 0.0:
         return None
 
@@ -537,7 +545,7 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
             start, free={n: v for n, v in start.free.items() if n not in own}, held=start.held | own
         )
 
-    levels = [low + (k + 0.5) * step for k in range(settings.threshold_levels)]
+    levels = [low + (k + 0.5) * step for k in range(_THRESHOLD_LEVELS)]
     tried = [
         (try_(s), a, b, s)
         for a in levels
@@ -546,7 +554,7 @@ def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) ->
         for s in [at(a, b)]
     ]
     best = max(tried, key=lambda t: t[0])
-    while step > settings.threshold_precision * (high - low):
+    while step > _THRESHOLD_PRECISION * (high - low):
         step *= 0.5
         _, a, b, _ = best
         around = [(a - step, b), (a + step, b), (a, b - step), (a, b + step)]

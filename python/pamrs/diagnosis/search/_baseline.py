@@ -5,7 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from pamrs.diagnosis.evidence import autocorrelation_of
-from pamrs.diagnosis.fit import Fit, Key, Problem, bin_width, fit, known_parameters
+from pamrs.diagnosis.fit import (
+    FINAL_STEP_SHARE,
+    FIT_BIN_TIME,
+    Fit,
+    Key,
+    Problem,
+    bin_width,
+    fit,
+    known_parameters,
+)
+from pamrs.diagnosis.noise import CORRELATED_VARIANCE
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -20,32 +30,41 @@ def with_autocorrelation(
     that is large, and the weights.
     """
     autocorrelation = autocorrelation_of(problem, first)
-    if max(autocorrelation.values()) <= problem.settings.noise.correlated_variance:
+    if max(autocorrelation.values()) <= CORRELATED_VARIANCE:
         return first, autocorrelation
     return thorough(problem, nominal, autocorrelation, first), autocorrelation
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:
     """Baseline parameters alone, fitted to the end."""
-    settings = problem.settings.fit
-    evaluations, share = settings.baseline_evaluations, settings.final_step_share
-    return fit(problem, nominal, (), {}, inflation, warm=warm, evaluations=evaluations, share=share)
+    settings = problem.settings
+    evaluations = settings.baseline_evaluations
+    return fit(
+        problem,
+        nominal,
+        (),
+        {},
+        inflation,
+        warm=warm,
+        evaluations=evaluations,
+        share=FINAL_STEP_SHARE,
+    )
 
 
 def refitted(problem: Problem, nominal: Rig, inflation: dict[str, float]) -> Fit:
     """The baseline refitted from the nominal values and, where that leaves more than noise could,
     from the other side of them.
     """
-    settings = problem.settings.noise
+    settings = problem.settings
     first = thorough(problem, nominal, inflation, None)
     rows = sum(
-        int(r.rows.sum()) / bin_width(p, settings.fit_bin_time)
+        int(r.rows.sum()) / bin_width(p, FIT_BIN_TIME)
         for p in problem.recordings
         for r in _of(p, first.residuals)
     )
-    if 2.0 * first.cost < settings.margin * rows:
+    if 2.0 * first.cost < settings.noise_margin * rows:
         return first
-    known = known_parameters(nominal, problem.settings.fit)
+    known = known_parameters(nominal)
     mirrored = {n: 2.0 * known[n].value - first.values[n] for n in first.moved}
     try:
         second = thorough(problem, nominal, inflation, replace(first, values=mirrored))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from pamrs.diagnosis.evidence import (
+    STANDING_PRICE,
     Attempts,
     Candidate,
     Group,
@@ -37,6 +38,25 @@ from pamrs.diagnosis.screen import Screen, Stand, by_effect, inclusion, screen
 from pamrs.errors import SimulationError
 
 __all__ = ["below_noise"]
+
+# share of a stated error that a signature has by chance: most had less (decision 111)
+_STATED_SHARE = 0.3
+_RIVAL_SHARE = 0.3  # share of the largest gain from which another effect is its rival (decision 20)
+_MOST_FITTED = 4  # rivals that are fitted
+_HELD_OUT_SHARE = 0.05  # share of the gain that held-out recordings have to show (decision 20)
+# share of chi-square that weighs rivals: their equations are not quite true (decision 20)
+_GAIN_WEIGHT = 0.1
+_LOG_ODDS = 6.0  # log odds of an effect to unlisted where nothing speaks against it (decision 20)
+_MOST_PROBABILITY = 0.93  # largest probability of an effect below the noise (decision 20)
+# [tolerances] moved by a parameter that effects may undo: healthy 1.2 at most (decision 20)
+_MOVED_TOLERANCES = 1.75
+# cosine of two signatures from which an effect does the same as a parameter (decision 20)
+_SAME_COSINE = 0.8
+# [chi-square] fall of the priors' sum of squares that an effect has to bring (decision 20)
+_RELIEF = 3.0
+# log odds of parameters that are off to all effects that do the same (decision 20)
+_PARAMETERS_LOG_ODDS = 1.5
+_GONE_BACK_SHARE = 0.5  # share of its movement to which the parameter has to go back (decision 20)
 
 
 @dataclass(frozen=True)
@@ -83,18 +103,16 @@ def below_noise(
     """
     if trial.same:
         return None
-    start, settings = quiet.candidates[0], trial.settings.below_noise
+    start, settings = quiet.candidates[0], trial.settings
     autocorrelation = trial.autocorrelation(start.fit)
     screened = screen(
         trial.inner, start.fit, acting, autocorrelation, sealed=trial.nominal.model["valve"] is None
     )
     best = {effect: scores[0] for effect, scores in by_effect(screened.scores()).items()}
     gains = {effect: score.gain for effect, score in best.items()}
-    needed = settings.least_gain + _by_chance(trial, screened.stand)
-    least = max(needed, settings.rival_share * max(gains.values(), default=0.0))
-    chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][
-        : settings.most_fitted
-    ]
+    needed = settings.least_gain_below_noise + _by_chance(trial, screened.stand)
+    least = max(needed, _RIVAL_SHARE * max(gains.values(), default=0.0))
+    chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][:_MOST_FITTED]
     starts = {e: Begun(best[e].start.scaled(best[e].size), {}) for e in chosen}
     starts = starts or _instead(screened, start.fit, trial, autocorrelation)
     against = _finest(trial, start.fit, starts, autocorrelation) if starts else None
@@ -117,7 +135,11 @@ def below_noise(
             _weigh(found, tried, begun, against, trial, needed)
     if not found.shown and not found.eased:
         return None
-    often = inclusion(screened, settings.least_gain, 1.0, trial.settings) if found.shown else {}
+    often = (
+        inclusion(screened, settings.least_gain_below_noise, 1.0, trial.settings)
+        if found.shown
+        else {}
+    )
     return replace(_group(found, quiet, starts, trial), inclusion=often)
 
 
@@ -126,7 +148,7 @@ def _by_chance(trial: Attempts, stand: Stand) -> float:
     model: a smooth error has a share of any shape.
     """
     stated = max((level.stated for level in trial.noise_level.values()), default=0.0)
-    return trial.settings.below_noise.stated_share * stated * stand.power_left
+    return _STATED_SHARE * stated * stand.power_left
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,7 +219,7 @@ def _weigh(
     """Put a fitted effect among those that are found, if chi-square (a gain of more than `needed`)
     or priors and held-out recordings speak for it.
     """
-    settings, autocorrelation = trial.settings.below_noise, against.autocorrelation
+    autocorrelation = against.autocorrelation
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
     within = against.inside - _chi_square(trial.inner, tried.fit.residuals, autocorrelation)
     over = against.outside - _chi_square(
@@ -205,30 +227,25 @@ def _weigh(
     )
     relief = against.fit.strain - tried.fit.strain
     gain = within + relief
-    evidence = trial.settings.evidence
-    odd = evidence.standing_price * stands(tried, seconds) + unlikely(
-        tried, visited(trial.inner), evidence
-    )
-    if odd > settings.log_odds:
+    odd = STANDING_PRICE * stands(tried, seconds) + unlikely(tried, visited(trial.inner))
+    if odd > _LOG_ODDS:
         return  # it would have to have values that its physics hardly has
     cost = price(tried, trial.settings)
-    if gain > needed and over > settings.held_out_share * gain:
-        found.shown[tried] = (
-            0.5 * settings.gain_weight * (gain + over) - settings.gain_weight * cost - odd
-        )
+    if gain > needed and over > _HELD_OUT_SHARE * gain:
+        found.shown[tried] = 0.5 * _GAIN_WEIGHT * (gain + over) - _GAIN_WEIGHT * cost - odd
     elif (
-        _gone_back(begun, against.fit, tried.fit, settings.gone_back_share)
-        and relief > settings.relief
-        and min(gain, gain + over) > settings.relief
+        _gone_back(begun, against.fit, tried.fit, _GONE_BACK_SHARE)
+        and relief > _RELIEF
+        and min(gain, gain + over) > _RELIEF
     ):
         found.eased[tried] = (
-            0.5 * min(relief, gain, gain + over) - cost - odd - settings.parameters_log_odds
+            0.5 * min(relief, gain, gain + over) - cost - odd - _PARAMETERS_LOG_ODDS
         )
 
 
 def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempts) -> Group:
     """The quiet group with what was found in it, and its probabilities."""
-    settings, shown = trial.settings.below_noise, bool(found.shown)
+    shown = bool(found.shown)
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
     odds = found.shown or found.eased
     top = max(odds, key=lambda c: odds[c])
@@ -239,15 +256,12 @@ def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempt
         for c, score in odds.items()
     }
     total = sum(weights.values()) + (0.0 if shown else 1.0)
-    most = settings.most_probability
     probabilities = {
-        c.effects[0]: w
-        / total
-        * capped(settings.log_odds - penalty(c, seconds, trial.settings.evidence), most)
+        c.effects[0]: w / total * capped(_LOG_ODDS - penalty(c, seconds), _MOST_PROBABILITY)
         for c, w in weights.items()
     }
     if not shown:
-        probabilities[""] = most / total
+        probabilities[""] = _MOST_PROBABILITY / total
     probabilities["unlisted"] = 1.0 - sum(probabilities.values())
     acts = [b for b in quiet.blocks if acts_in(top.effects[0], b)]
     mismatch = max(acts, key=lambda b: quiet.baseline[b.name].ratio - top.fitted[b.name].ratio)
@@ -266,12 +280,11 @@ def _instead(
     screened: Screen, found: Fit, trial: Attempts, autocorrelation: dict[str, float]
 ) -> dict[str, Begun]:
     """Effects that do what a parameter was moved far for."""
-    settings = trial.settings.below_noise
-    known = known_parameters(trial.nominal, trial.settings.fit)
+    known = known_parameters(trial.nominal)
     _, jacobian = stacked(trial.inner, found.residuals, autocorrelation)
     best: dict[str, tuple[float, Begun]] = {}
     for name, moved in found.moved.items():
-        if abs(moved) < settings.moved_tolerances or jacobian is None:
+        if abs(moved) < _MOVED_TOLERANCES or jacobian is None:
             continue
         done = jacobian[:, list(found.values).index(name)] * found.scales[name] * moved
         for effect, start, signature in screened.signatures:
@@ -280,13 +293,13 @@ def _instead(
                 continue
             cosine = float(signature @ done) / math.prod(sizes)
             match = abs(cosine) if start.signed else cosine
-            if match > max(settings.same_cosine, best[effect][0] if effect in best else 0.0):
+            if match > max(_SAME_COSINE, best[effect][0] if effect in best else 0.0):
                 size = math.copysign(sizes[1] / sizes[0], cosine)
                 best[effect] = (
                     match,
                     Begun(start.scaled(size), {name: known[name].value}),
                 )
-    nearest = sorted(best, key=lambda e: -best[e][0])[: settings.most_fitted]
+    nearest = sorted(best, key=lambda e: -best[e][0])[:_MOST_FITTED]
     return {effect: best[effect][1] for effect in nearest}
 
 

@@ -22,12 +22,21 @@ from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import correlation_time
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.settings import ClosureSettings
 from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 
 __all__ = ["find_closure"]
+
+# share of the misfit that it may leave: with less gain it mends the smoothing of drives
+_MOST_MISFIT_SHARE = 0.75
+_MOST_TERMS = 6  # terms that it may have: more is no form that a person reads
+_LEAST_POWER = 1e-6  # share of a term left beside the baseline and the terms before it: rounding
+_EVALUATIONS = 5  # evaluations of the fit of the chosen terms at the most
+# share of the linear estimate from which the fit is tried where the whole of it gains nothing
+_SHRUNK_SHARE = 0.4
+_SHRUNK_EVALUATIONS = 3  # evaluations of that fit at the most
+
 
 Array = NDArray[np.float64]
 
@@ -122,22 +131,15 @@ def find_closure(
         )
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
-    settings = problem.settings.closures
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(
-        _Frame.of(problem, baseline, baseline, inflation), candidates, columns, {}, settings
-    )
+    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {})
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
     autocorrelation = autocorrelation_of(problem, found)
     candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
     second = _select(
-        _Frame.of(problem, warm, found, autocorrelation),
-        candidates,
-        columns,
-        found.values,
-        settings,
+        _Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values
     )
     other = (
         None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
@@ -356,7 +358,7 @@ def _better(
         for m, k in zip(misfits, terms, strict=True)
     ]
     best = int(np.argmax(worth))
-    most = problem.settings.closures.most_misfit_share * misfits[0]
+    most = _MOST_MISFIT_SHARE * misfits[0]
     return models[best] if best and misfits[best] < most else None
 
 
@@ -365,7 +367,6 @@ def _select(
     candidates: list[_Candidate],
     columns: Array,
     present: dict[str, float],
-    settings: ClosureSettings,
 ) -> _Choice | None:
     """Orthogonal forward selection of terms against the stacked residuals, the closure that is in
     them taken out.
@@ -387,8 +388,6 @@ def _select(
         What each does to the residuals per unit of its coefficient.
     present : dict of str to float
         Coefficients with which the residuals were computed; their terms are taken first.
-    settings : ClosureSettings
-        How many terms there may be, and what must be left of one.
 
     Returns
     -------
@@ -407,14 +406,14 @@ def _select(
         target = target - q @ (q.T @ target)
         wide = wide - q @ (q.T @ wide)
     crossed = _Crossed.of(frame, rows, unit)
-    chosen = _Selection(candidates, target, wide, settings.least_power)
+    chosen = _Selection(candidates, target, wide, _LEAST_POWER)
     for k, candidate in enumerate(candidates):
-        if candidate.name in present and usable[k] and chosen.power(k) > settings.least_power:
+        if candidate.name in present and usable[k] and chosen.power(k) > _LEAST_POWER:
             chosen.take(k)
     order = chosen.order
     taken, misfit, proof = len(order), chosen.misfit, crossed.left_out(order)
     samples = frame.independent(chosen.left[: rows.size])
-    while len(order) < settings.most_terms:
+    while len(order) < _MOST_TERMS:
         telling = chosen.most_telling(usable)
         if telling is None:
             break
@@ -596,8 +595,7 @@ def _fitted(
     say(f"trying {' + '.join(name for name in chosen.values)}")
     names = list(warm.values)
     best: Fit | None = None
-    settings = problem.settings.closures
-    shrunk = ((1.0, settings.evaluations), (settings.shrunk_share, settings.shrunk_evaluations))
+    shrunk = ((1.0, _EVALUATIONS), (_SHRUNK_SHARE, _SHRUNK_EVALUATIONS))
     for share, evaluations in shrunk:
         starts = {name: share * value for name, value in chosen.values.items()} | chosen.shapes
         shifted = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pamrs.diagnosis.evidence import Attempts, Candidate
 from pamrs.diagnosis.fit import Start, depends, starts_of
-from pamrs.diagnosis.screen import Screen, by_effect, stand_of
+from pamrs.diagnosis.screen import STRONG_SIZES, Screen, by_effect, stand_of
 from pamrs.diagnosis.search._sets import Say, Weight
 from pamrs.effects import id_of, info_of, is_effect
 
@@ -98,10 +98,13 @@ def _starts(trial: Attempts, screened: Screen, beside: Candidate, effect: str) -
     stand = stand_of(beside.fit, trial.inner, trial.white)
     scores = by_effect(screened.scores(stand, without=beside.effects)).get(effect, [])
     usual = starts_of(effect, sealed=trial.nominal.model["valve"] is None)
-    sizes = trial.settings.screen.strong_sizes
     return [
         *(score.start.scaled(score.size) for score in scores),
-        *(one.scaled(s) for one in usual for s in ((1.0, *sizes) if one.scalable else (1.0,))),
+        *(
+            one.scaled(s)
+            for one in usual
+            for s in ((1.0, *STRONG_SIZES) if one.scalable else (1.0,))
+        ),
     ]
 
 

@@ -13,6 +13,7 @@ from functools import partial
 from threadpoolctl import threadpool_limits
 
 from pamrs.diagnosis.evidence import (
+    FORM_SHARE_ALIKE,
     Attempts,
     Candidate,
     Group,
@@ -57,6 +58,11 @@ from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._considered import considered
 from pamrs.diagnosis.search._sets import (
+    LEAST_GAIN,
+    MOST_PAIRED,
+    MOST_STARTS,
+    NEAR_PLACE,
+    PARTNER_SHARE,
     Weight,
     beside_wrong,
     far_above_noise,
@@ -68,7 +74,6 @@ from pamrs.diagnosis.search._sets import (
     without_needless,
 )
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
-from pamrs.diagnosis.settings import SearchSettings
 from pamrs.effects import (
     CATALOGUE,
     EFFECTS,
@@ -84,6 +89,29 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
 __all__ = ["examine"]
+
+_FROM_PROBABILITY = 0.3  # probability of unlisted from which a form is looked for (decision 4)
+# share of the mismatch that it may leave, held-out too: no form of anything carries less
+_MOST_SHARE_LEFT = 0.8
+# held-out variance over noise that is a mismatch the fitted hardly show (decision 20)
+_HELD_OUT_RATIO = 2.0
+# variance over that of the noise that the fitted recordings must have for that (decision 20)
+_FITTED_HINT = 1.15
+# multiple of noise's largest excess that may be a low noise level (decisions 20, 22)
+_MARGINAL_MULTIPLE = 1.35
+# excess variance over that of the noise up to which it may (decisions 20, 22)
+_MARGINAL_EXCESS = 0.3
+_MARGINAL_PROBABILITY = 0.6  # probability that it is (decision 20: odds 3 to 2)
+# probability of unlisted that splits a group: no name is then more probable (decision 4)
+_SPLIT_FROM = 0.5
+_LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fitted (decision 13)
+# share of an effect's best gain from which another of its starts is fitted (decision 13)
+_NEAR_START = 0.6
+_NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
+_MOST_FORMS = 4  # forms of an effect that are fitted
+_EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
+_POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
+
 
 Say = Callable[[str], None]
 
@@ -230,23 +258,21 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     baseline, autocorrelation = with_autocorrelation(inner, nominal, first)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
-        return {
-            b.name: excess(b, problem.recordings, found, noise_level, settings.noise)
-            for b in blocks
-        }
+        return {b.name: excess(b, problem.recordings, found, noise_level, settings) for b in blocks}
 
     was, now = kept(inner, before), kept(inner, baseline.residuals)
     outside = left_out(inner, baseline, autocorrelation) if same else residuals(outer, baseline.rig)
     out = kept(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
-    least, hint = settings.search.held_out_ratio, settings.search.fitted_hint
 
     def held_out_alone(found: dict[str, Excess]) -> list[Block]:
         return [
             b
             for b in blocks
-            if significant(found[b.name], least) and now[b.name].ratio > hint and not same
+            if significant(found[b.name], _HELD_OUT_RATIO)
+            and now[b.name].ratio > _FITTED_HINT
+            and not same
         ]
 
     apart = held_out_alone(out)
@@ -404,22 +430,25 @@ class _Mismatch:
 
     def groups(self, say: Say) -> list[Group]:
         """The blocks as one group, or in parts where names explain parts of them."""
-        refit, weighed, settings = self.refit, dict(self.weighed), self.refit.trial.settings.search
+        refit, weighed = self.refit, dict(self.weighed)
         if self.marginal:
-            none, unlisted = settings.marginal_probability, weighed["unlisted"]
-            weighed |= {"": none * unlisted, "unlisted": (1.0 - none) * unlisted}
+            unlisted = weighed["unlisted"]
+            weighed |= {
+                "": _MARGINAL_PROBABILITY * unlisted,
+                "unlisted": (1.0 - _MARGINAL_PROBABILITY) * unlisted,
+            }
         now = refit.start.fitted[self.block.name]
-        part, least = refit.trial.inner.losses.part, settings.least_gain
+        part = refit.trial.inner.losses.part
         shares: dict[str, float] = {}
         resampled = partial(
-            inclusion, self.screened, least, settings.partner_share, refit.trial.settings
+            inclusion, self.screened, LEAST_GAIN, PARTNER_SHARE, refit.trial.settings
         )
         group = replace(
             refit.group(self.candidates, weighed, self.block),
             inclusion=part("the screen of resampled recordings", resampled, shares),
-            predicted_gain=_predicted_gain(self.screened, now, settings.marginal_excess),
+            predicted_gain=_predicted_gain(self.screened, now, _MARGINAL_EXCESS),
         )
-        if weighed["unlisted"] > settings.split_from:
+        if weighed["unlisted"] > _SPLIT_FROM:
             what = "the division of the blocks by their names"
             parts = part(what, lambda: _apart(group, refit.trial, self.terms), [])
             if parts:
@@ -449,9 +478,9 @@ class _Terms:
 
 def _marginal(refit: _Refit) -> bool:
     """Whether so little is left that the noise level may as well have been estimated too low."""
-    settings, found = refit.trial.settings.search, (refit.start.fitted, refit.trial.out)
+    found = (refit.start.fitted, refit.trial.out)
     return all(
-        e.ratio - 1.0 < max(settings.marginal_multiple * (e.limit - 1.0), settings.marginal_excess)
+        e.ratio - 1.0 < max(_MARGINAL_MULTIPLE * (e.limit - 1.0), _MARGINAL_EXCESS)
         for b in refit.trial.suspects
         for e in (kept[b.name] for kept in found)
     )
@@ -519,11 +548,10 @@ def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Ca
     """Of lasting effects, those that leave least first, the first one and the heaviest of the
     others, unless it weighs far less: a value that is wrong beside one may be so beside all.
     """
-    settings = trial.settings.search
     top = max(map(weight, lasting), default=0.0)
-    near = [c for c in lasting[1:] if math.exp(weight(c) - top) > settings.polish_from]
+    near = [c for c in lasting[1:] if math.exp(weight(c) - top) > _POLISH_FROM]
     near.sort(key=weight, reverse=True)
-    return [*lasting[:1], *near[: max(settings.most_paired - 1, 0)]]
+    return [*lasting[:1], *near[: max(MOST_PAIRED - 1, 0)]]
 
 
 def _told(candidate: Candidate, start: Start) -> bool:
@@ -543,11 +571,9 @@ def _weighed(
         return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
 
     found = weights(candidates)
-    likely = [c for c in candidates[1:] if _odds(found, c) > settings.search.polish_from]
-    close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.search.most_polished]
-    if len(close) > 1 or (
-        close and not explains(close[0], start, trial.compared, settings.evidence)
-    ):
+    likely = [c for c in candidates[1:] if _odds(found, c) > _POLISH_FROM]
+    close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.most_polished]
+    if len(close) > 1 or (close and not explains(close[0], start, trial.compared)):
         tell("fitting to the end " + ", ".join(c.key for c in close))
 
         def best(candidate: Candidate) -> Candidate:
@@ -557,9 +583,9 @@ def _weighed(
 
         ended = [best(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
-        candidates = [c for c in ended if c.is_wrong(settings.fit.most_tolerances)]
+        candidates = [c for c in ended if c.is_wrong(settings.most_tolerances)]
         found = weights(candidates)
-        sets = [c for c in candidates if _odds(found, c) > settings.search.polish_from]
+        sets = [c for c in candidates if _odds(found, c) > _POLISH_FROM]
         parts = trial.inner.losses.part(
             "the search for terms that are not needed",
             lambda: without_needless(trial, candidates, sets, tell),
@@ -586,10 +612,9 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
     trial, start = refit.trial, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
     suspects = [b for b in trial.suspects if "chamber" not in b.beside] or trial.suspects
-    settings = trial.settings.closures
-    if group.probabilities["unlisted"] < settings.from_probability or len(
-        {b.kind for b in suspects}
-    ) < len(suspects):
+    if group.probabilities["unlisted"] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
+        suspects
+    ):
         return group  # of two chambers one form would have to serve both
     if any(b.closure is None for b in suspects):
         tell(
@@ -608,7 +633,7 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything
-    if share_left(judged, start, suspects, trial.settings.evidence) > settings.most_share_left:
+    if share_left(judged, start, suspects) > _MOST_SHARE_LEFT:
         return group
     return replace(group, closure=judged)
 
@@ -638,8 +663,9 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
         for b in group.suspects
         if any(found == [b] for found in acting.values())
     }
-    least = settings.search.split_from
-    named = [b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < least]
+    named = [
+        b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < _SPLIT_FROM
+    ]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
@@ -712,12 +738,12 @@ def _singles(
     trial: Attempts, screened: Screen, baseline: Fit, weight: Weight, tell: Say
 ) -> list[Candidate]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
-    settings = trial.settings.search
+    settings = trial.settings
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
     most = max(gains.values(), default=0.0)
     # signatures of strong effects rule none out
-    least = max(settings.least_gain, settings.least_gain_share * most)
+    least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
     worth = _by_family([e for e, gain in gains.items() if screened.strong or gain > least])
     tell(
         "screened: "
@@ -732,15 +758,12 @@ def _singles(
     else:
         chosen, near, short = [], {}, {}
         for rank, places in enumerate(worth[: settings.most_singles]):
-            leads = rank < settings.effects_with_starts
-            close = [e for e in places if gains[e] >= settings.near_place * gains[places[0]]]
+            leads = rank < _EFFECTS_WITH_STARTS
+            close = [e for e in places if gains[e] >= NEAR_PLACE * gains[places[0]]]
             # of the leading effects another place may yet be the one that leaves least
             for effect in close if leads else places[:1]:
                 chosen.append(effect)
-                near[effect] = _begun(
-                    _near(ranked[effect], settings) if leads else ranked[effect][:1]
-                )
-    alike = trial.settings.evidence.form_share_alike
+                near[effect] = _begun(_near(ranked[effect]) if leads else ranked[effect][:1])
     found = []
     for effect in chosen:
         tried = two_at_a_time(
@@ -749,7 +772,7 @@ def _singles(
         )
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            found.append(replace(_usual_form(fitted, alike), gain=gains[effect]))
+            found.append(replace(_usual_form(fitted, FORM_SHARE_ALIKE), gain=gains[effect]))
     return found
 
 
@@ -786,7 +809,7 @@ def _shortlisted(
     effect is not. Each form of each effect gets a few steps from its best start, and the effects
     that then lead from all their others.
     """
-    settings = trial.settings.search
+    settings = trial.settings
     short: dict[str, list[Candidate]] = {}
 
     def begin(starts: dict[str, list[Start]]) -> None:
@@ -805,25 +828,21 @@ def _shortlisted(
     first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
         {p[0]: _begun(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
-        | {
-            e: _begun(ranked[e])
-            for places in first[: settings.effects_with_starts]
-            for e in places[1:]
-        }
+        | {e: _begun(ranked[e]) for places in first[:_EFFECTS_WITH_STARTS] for e in places[1:]}
     )
     first.sort(key=lambda places: -most(places[0]))
     best: list[str] = []
     starts: dict[str, list[Start]] = {}
     ends: dict[tuple[str, str], Candidate] = {}
     for rank, places in enumerate(first):
-        leads = rank < settings.effects_with_starts
+        leads = rank < _EFFECTS_WITH_STARTS
         tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
-        least = min((short[e][0].misfit for e in tried), default=math.inf) / settings.near_place
+        least = min((short[e][0].misfit for e in tried), default=math.inf) / NEAR_PLACE
         for effect in sorted((e for e in tried if short[e][0].misfit <= least), key=most)[::-1]:
             # of the leading effects every form may yet be the one that leaves least
             forms = {form_in(c.fit.rig, effect): c for c in reversed(short[effect])}
             kept = sorted(forms.values(), key=weight, reverse=True)
-            count = settings.most_forms if leads else 1
+            count = _MOST_FORMS if leads else 1
             starts[effect] = [trial.start_of(c.fit, effect) for c in kept[:count]]
             ends |= {(effect, form_in(c.fit.rig, effect)): c for c in kept[:count]}
             best.append(effect)
@@ -849,18 +868,18 @@ def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
     return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), left_everywhere(c)))
 
 
-def _near(scores: list[Score], settings: SearchSettings) -> list[Score]:
+def _near(scores: list[Score]) -> list[Score]:
     """The starts of an effect that are fitted: the best of each form (and choice in it) that comes
     near, and further ones of the best.
 
     A signature is a ranking of forms and no more: that of a strong effect is linear in what is not.
     """
     best = best_of_each_kind(scores)
-    forms = [s for s in best if s.gain > settings.near_form * scores[0].gain]
-    forms = sorted(forms, key=lambda s: -s.gain)[: settings.most_forms]
+    forms = [s for s in best if s.gain > _NEAR_FORM * scores[0].gain]
+    forms = sorted(forms, key=lambda s: -s.gain)[:_MOST_FORMS]
     alike = [s for s in scores if s.start.kind == scores[0].start.kind]
-    near = [s for s in alike if s.gain > settings.near_start * scores[0].gain]
-    return [*near[: settings.most_starts], *(s for s in forms if s not in near)]
+    near = [s for s in alike if s.gain > _NEAR_START * scores[0].gain]
+    return [*near[:MOST_STARTS], *(s for s in forms if s not in near)]
 
 
 def _with_same_data(
@@ -869,10 +888,9 @@ def _with_same_data(
     """The singles, and beside each that may be the same data as another effect (a late clock and a
     dead time) that other one.
     """
-    evidence = trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.compared, evidence)
+        return share_left(candidate, start, trial.compared)
 
     there = {c.effects: c for c in singles}
 
@@ -880,7 +898,7 @@ def _with_same_data(
         """Whether an effect was not fitted, or only in a form that leaves more than its equal."""
         fitted = there.get((effect,))
         return fits(trial.nominal, effect) and (
-            fitted is None or left_by(fitted) > left_by(own) + evidence.form_share_alike
+            fitted is None or left_by(fitted) > left_by(own) + FORM_SHARE_ALIKE
         )
 
     found: list[Candidate] = []
@@ -890,7 +908,7 @@ def _with_same_data(
         same = info_of(effect).same_data
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
-        if same is not None and same_recordings(own, effect, seconds, evidence):
+        if same is not None and same_recordings(own, effect, seconds):
             others += [_as_other(trial, start, own, same)] if wanted(same.effect, own) else []
         twins = (
             i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect
@@ -910,9 +928,8 @@ def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameDa
     alike = trial.fitted([replace(own, held=own.held | held)], start.fit, trial.white)
     if alike is None:
         return single
-    evidence = trial.settings.evidence
-    shaped, free = (share_left(c, start, trial.compared, evidence) for c in (alike, single))
-    return single if shaped > free + evidence.form_share_alike else replace(alike, gain=single.gain)
+    shaped, free = (share_left(c, start, trial.compared) for c in (alike, single))
+    return single if shaped > free + FORM_SHARE_ALIKE else replace(alike, gain=single.gain)
 
 
 def _as_other(

@@ -41,6 +41,24 @@ from pamrs.units import measured_from, parse_unit
 
 __all__ = ["Reading", "misread"]
 
+# [variances of the noise] from which units are doubted: a wrong one leaves hundreds, drives two
+_SUSPECT = 3.0
+# share of that excess which a unit may leave after one step of the parameters to be worth a fit
+_PROMISING = 0.3
+_FITTED = 4  # units that are fitted, the most promising first; others leave more
+# share of the excess that a unit may leave: physics may stand beside it, told from others
+_LEFT = 0.05
+# log of a small factor (bar, atmosphere, kgf/cm2), which parameters take up: a free one tells
+_SMALL_STEP = 0.1
+# standard errors by which such a factor beats none: some ten are tried, in coloured noise
+_CLEAR_STDS = 5.0
+_STDS = 3.0  # standard deviations by which a free factor may be off (one in 370)
+# parts of the step from the unit said within which a free factor is, half being no nearer
+_CLOSER = 0.25
+# part of an offset, and share of a factor, by which it is moved for its derivative
+_FREE_STEP = 0.005
+
+
 Array = NDArray[np.float64]
 
 OTHERS: Final[dict[str, tuple[str, ...]]] = {
@@ -153,11 +171,11 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
         nearly all of what it leaves.
     """
     every = list(_readings(problem, nominal))
-    settings = problem.settings.readings
-    small = [r for r in every if not r.offset and r.size < settings.small_step]
+    settings = problem.settings
+    small = [r for r in every if not r.offset and r.size < _SMALL_STEP]
     large = _promising(problem, nominal, [r for r in every if r not in small])
     # what is no more than a gauge's slope may be off by tells nothing
-    small = [r for r in small if r.size >= settings.stds * settings.gauge_error]
+    small = [r for r in small if r.size >= _STDS * settings.gauge_error]
     if not (small or large):
         return None
     try:
@@ -165,7 +183,7 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
     except SimulationError:
         return None
     found = [_fitted(problem, nominal, was, reading) for reading in large]
-    if _power(problem, was) <= settings.suspect:
+    if _power(problem, was) <= _SUSPECT:
         found += [_told_by_gain(problem, nominal, was, reading) for reading in small]
     believed = [r for r in found if r is not None and r.fit is not None]
     return min(believed, key=lambda r: r.fit.cost if r.fit else math.inf, default=None)
@@ -173,10 +191,9 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
 
 def _promising(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
     """Those that take most of what one step of the parameters leaves, where that is much."""
-    settings = problem.settings.readings
     names = free_baseline(problem, nominal)
     left = _linear(problem, nominal, names)
-    if left <= settings.suspect:
+    if left <= _SUSPECT:
         return []
     tried: list[tuple[float, Reading]] = []
     for reading in readings:
@@ -185,8 +202,8 @@ def _promising(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> l
             with suppress(SimulationError):
                 tried.append((_linear(own, nominal, names), reading))
     tried.sort(key=lambda item: item[0])
-    worth = [r for power, r in tried if power - 1.0 <= settings.promising * (left - 1.0)]
-    return worth[: settings.fitted]
+    worth = [r for power, r in tried if power - 1.0 <= _PROMISING * (left - 1.0)]
+    return worth[:_FITTED]
 
 
 def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
@@ -197,8 +214,7 @@ def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Readi
     except SimulationError:
         return None
     before, after = _power(problem, was), _power(own, now)
-    most = problem.settings.readings.left
-    if after - 1.0 > most * (before - 1.0) or not _free_is_listed(own, now, reading):
+    if after - 1.0 > _LEFT * (before - 1.0) or not _free_is_listed(own, now, reading):
         return None
     return replace(reading, before=before, after=after, fit=now, was=was)
 
@@ -210,13 +226,13 @@ def _told_by_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) ->
     than noise from bin to bin: asked is the sum of squares, priors included, as the parameters
     follow the factor. Beside physics that is missing it is not told.
     """
-    settings = problem.settings.readings
+    settings = problem.settings
     own = reading.read(problem)
     beyond = replace(reading, factors=tuple(factor**2 for factor in reading.factors)).read(problem)
     try:
         now = thorough(own, nominal, _white(problem), was)
         after = _power(own, now)
-        least = settings.clear_stds**2 * max(1.0, after)
+        least = _CLEAR_STDS**2 * max(1.0, after)
         if 2.0 * (was.cost - now.cost) < least or not _is_noise(own, now):
             return None
         far = thorough(beyond, nominal, _white(problem), now)
@@ -230,8 +246,8 @@ def _told_by_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) ->
     std = math.sqrt(max(1.0, after) / (2.0 * bend))
     step = math.log(reading.factors[0])
     gain = math.exp(step * best)
-    clear = abs(gain - 1.0) >= settings.stds * settings.gauge_error
-    if not clear or abs(best - 1.0) > settings.stds * std:
+    clear = abs(gain - 1.0) >= _STDS * settings.gauge_error
+    if not clear or abs(best - 1.0) > _STDS * std:
         return None
     before = _power(problem, was)
     fits = replace(reading, before=before, after=after, fit=now, was=was)
@@ -242,7 +258,7 @@ def _is_noise(problem: Problem, found: Fit) -> bool:
     """Whether a fit leaves no more than noise in any block."""
     levels = noise_levels(problem, core_rig(found.rig))
     own = [
-        excess(b, problem.recordings, found.residuals, levels, problem.settings.noise)
+        excess(b, problem.recordings, found.residuals, levels, problem.settings)
         for b in problem.blocks
     ]
     return all(one.ratio <= one.limit for one in own)
@@ -261,7 +277,7 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
     """What the baseline leaves after one step of its parameters inside their tolerances: the mean
     square of bin means, in variances of the noise.
     """
-    known = known_parameters(rig, problem.settings.fit)
+    known = known_parameters(rig)
     rows, slope = stacked(problem, residuals(problem, rig, names), _white(problem))
     square = float(rows @ rows)
     if not math.isfinite(square):
@@ -269,7 +285,7 @@ def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
     if slope is not None and np.all(np.isfinite(slope)):
         scaled = slope * np.array([known[name].tol for name in names])
         normal = scaled.T @ scaled + np.eye(len(names))
-        most = problem.settings.fit.most_tolerances
+        most = problem.settings.most_tolerances
         step = np.clip(np.linalg.solve(normal, -scaled.T @ rows), -most, most)
         square = min(square, float(np.sum((rows + scaled @ step) ** 2)))
     return square / max(1, rows.size)
@@ -279,8 +295,8 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
     """Whether a factor (an offset) that is free would be that of the list, beside parameters that
     move as well; the problem is that of the reading.
     """
-    settings = problem.settings.readings
-    step = settings.free_step * (abs(reading.offset) or 1.0)
+    settings = problem.settings
+    step = _FREE_STEP * (abs(reading.offset) or 1.0)
     factor, offset = (1.0, step) if reading.offset else (1.0 + step, 0.0)
     moved = replace(reading, factors=(factor,) * len(reading.channels), offset=offset)
     pairs = [(p, moved.of(p)) for p in problem.recordings]
@@ -303,14 +319,14 @@ def _free_is_listed(problem: Problem, found: Fit, reading: Reading) -> bool:
     inverse = np.linalg.pinv(design.T @ design + prior, hermitian=True)
     away = abs(float((inverse @ (design.T @ rows + prior @ strain))[0]))
     coloured = max(1.0, float(rows @ rows) / max(1, rows.size))
-    spread = settings.stds * math.sqrt(max(0.0, inverse[0, 0]) * coloured)
+    spread = _STDS * math.sqrt(max(0.0, inverse[0, 0]) * coloured)
     exact = settings.gauge_error * (abs(reading.offset) or 1.0)
-    return away <= max(exact, spread) and away + spread <= settings.closer * reading.size
+    return away <= max(exact, spread) and away + spread <= _CLOSER * reading.size
 
 
 def _possible(problem: Problem, nominal: Rig) -> bool:
     """Whether recordings read so can be of the rig at all."""
-    plausible = problem.settings.plausibility
+    plausible = problem.settings
     return not any(implausible(p.recording, nominal, plausible) for p in problem.recordings)
 
 

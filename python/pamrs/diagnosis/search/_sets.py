@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from pamrs.diagnosis.evidence import (
+    FORM_SHARE_ALIKE,
     Attempts,
     Candidate,
     explains,
@@ -28,7 +29,7 @@ from pamrs.diagnosis.screen import (
     by_effect,
     stand_of,
 )
-from pamrs.diagnosis.search._wrong_parameters import strained_parameters
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, strained_parameters
 from pamrs.effects import exclude, id_of
 
 __all__ = [
@@ -43,6 +44,24 @@ __all__ = [
     "several",
     "without_needless",
 ]
+
+# strong mismatch, ten times the noise: linear signatures tell no sizes (decision 13)
+_STRONG_RATIO = 100.0
+LEAST_GAIN = 12.0  # [chi-square] gain by the screen from which an effect is fitted (decision 13)
+# share of the best gain that fits another place: alike blocks half show both (decision 103)
+NEAR_PLACE = 0.3
+MOST_STARTS = 2  # starts of an effect that are fitted (decision 13)
+MOST_PAIRED = 2  # single effects that get a partner (decision 13)
+_MOST_PARTNERS = 2  # partners that each of these gets (decision 13)
+# [standard errors] held-out improvement, over pieces, that keeps a further effect
+_FURTHER_ERRORS = 2.0
+PARTNER_SHARE = 0.01  # least predicted gain of a partner, as a share of the mismatch (decision 13)
+# share left alone for a fit with the best effects: it takes a fifth (decision 103)
+_TELLING_LEFT = 0.8
+# share left by the best persistent effect that asks for transient ones (decision 20)
+_TRANSIENT_BESIDE = 0.08
+_MUCH_LEFT = 0.5  # share of a mismatch from which an effect leaves most of it (decision 20)
+
 
 Say = Callable[[str], None]
 Weight = Callable[[Candidate], float]
@@ -90,8 +109,7 @@ def several(
         (c for c in (*singles, *mistaken) if c.fit.events is None), key=weight, reverse=True
     )
     growing = _Growing(trial, screened, start, roots, weight, tell)
-    most = trial.settings.search.most_paired
-    sets = [s for root in roots[:most] for s in growing.widened(root)]
+    sets = [s for root in roots[:MOST_PAIRED] for s in growing.widened(root)]
     happening = []
     for effect, beside in _beside(trial, screened, start, singles, transient, weight):
         tell(f"looking for {effect} with {beside.effects[0]}")
@@ -171,7 +189,7 @@ class _Growing:
         """The best set with one term after the other."""
         best = max(sets, key=self.weight, default=None)
         found: list[Candidate] = []
-        while best is not None and len(best.names) < self.trial.settings.search.most_terms:
+        while best is not None and len(best.names) < self.trial.settings.most_terms:
             formed = self._in_best_forms(best, [*sets, *found])
             found += formed
             best = max(formed, key=self.weight)
@@ -202,7 +220,7 @@ class _Growing:
             ]
             return trial.together(starts, rival.fit, rival.wrong)
 
-        tried = two_at_a_time(formed, rivals[: trial.settings.search.most_polished])
+        tried = two_at_a_time(formed, rivals[: trial.settings.most_polished])
         return [best, *(c for c in tried if c is not None)]
 
     def widened(self, base: Candidate) -> list[Candidate]:
@@ -262,7 +280,7 @@ class _Growing:
         for found, start in self._shortly(base, begun, starts):
             own = self.trial.start_of(found.fit, start.effect)
             best.setdefault(start.effect, _Partner((start.effect,), [own]))
-        return list(best.values())[: self.trial.settings.search.most_partners]
+        return list(best.values())[:_MOST_PARTNERS]
 
     def _ranked(self, base: Candidate) -> tuple[Stand, dict[str, list[Score]]]:
         """Where a set stands, and the starts of each effect by what they would take of what it
@@ -287,20 +305,19 @@ class _Growing:
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
         """An effect beside a set, from the start that leaves least after a few steps."""
-        most = self.trial.settings.search.most_starts
-        starts = [s.start.scaled(s.size) for s in scores[:most]]
+        starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
         short = self._shortly(base, begun, starts if len(starts) > 1 else [])
         return _Partner((scores[0].effect,), [short[0][1] if short else starts[0]])
 
     def _signatures(self, base: Candidate) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
-        trial, settings = self.trial, self.trial.settings.search
+        trial = self.trial
         stand, ranked = self._ranked(base)
         alone = len(base.names) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
-        least = max(settings.least_gain, settings.partner_share * stand.power_left)
+        least = max(LEAST_GAIN, PARTNER_SHARE * stand.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
-        best = _one_place_each(likely)[: settings.most_partners]
+        best = _one_place_each(likely)[:_MOST_PARTNERS]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
         for block in _untouched(base, self.start, trial) if alone else []:
@@ -308,7 +325,7 @@ class _Growing:
                 effect
                 for effect, scores in ranked.items()
                 if [b for b in trial.suspects if acts_in(effect, b)] == [block]
-                and scores[0].gain > settings.least_gain
+                and scores[0].gain > LEAST_GAIN
             ]
             best += [effect for effect in there[:1] if effect not in best]
         return [ranked[effect] for effect in best]
@@ -319,12 +336,11 @@ class _Growing:
         The signature of a strong effect beside another one is linear in what is not; where both
         were fitted, both are known.
         """
-        trial, settings = self.trial, self.trial.settings.search
-        evidence = trial.settings.evidence
+        trial = self.trial
         telling = [
             c
             for c in self.roots
-            if share_left(c, self.start, trial.compared, evidence) < settings.telling_left
+            if share_left(c, self.start, trial.compared) < _TELLING_LEFT
             and not set(c.names) & set(base.names)
             and (c.effects or base.effects)
             and not any(exclude(e, base.effects) for e in c.effects)
@@ -336,7 +352,7 @@ class _Growing:
                 c.wrong,
                 {name: c.fit.values[name] for name in c.wrong},
             )
-            for c in telling[: settings.most_partners]
+            for c in telling[:_MOST_PARTNERS]
         ]
 
 
@@ -361,21 +377,16 @@ def _beside(
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
     fitted, the one whose signature is in what the events leave.
     """
-    settings, evidence = trial.settings.search, trial.settings.evidence
 
     def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.compared, evidence)
+        return share_left(candidate, start, trial.compared)
 
     steady = [c for c in singles if c.fit.events is None]
     best = max(steady, key=weight, default=start)
-    found = (
-        [(e, best) for e in happening]
-        if settings.transient_beside < left_by(best) < settings.much_left
-        else []
-    )
+    found = [(e, best) for e in happening] if _TRANSIENT_BESIDE < left_by(best) < _MUCH_LEFT else []
     mismatch = float(screened.stand.rows @ screened.stand.rows)
     for single in singles:
-        if single.fit.events is None or left_by(single) > settings.much_left:
+        if single.fit.events is None or left_by(single) > _MUCH_LEFT:
             continue
         # what the baseline can do is taken as without the events
         kept = start.fit.residuals
@@ -383,7 +394,7 @@ def _beside(
             key: replace(r, jacobian=kept[key].jacobian) for key, r in single.fit.residuals.items()
         }
         beside = replace(start.fit, residuals=left, moved=single.fit.moved)
-        least = max(settings.least_gain, settings.partner_share * mismatch)
+        least = max(LEAST_GAIN, PARTNER_SHARE * mismatch)
         told = [
             s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least
         ]
@@ -454,12 +465,11 @@ def _in_another_form(
 
     short = [c for c in two_at_a_time(begin, others) if c is not None]
     best = min(short, key=lambda c: c.misfit, default=None)
-    if best is None or best.misfit > base.misfit / trial.settings.search.near_place:
+    if best is None or best.misfit > base.misfit / NEAR_PLACE:
         return None
     begun = [trial.start_of(best.fit, e) for e in base.effects]
     found = trial.together(begun, best.fit, base.wrong)
-    alike = trial.settings.evidence.form_share_alike
-    if found is None or left_everywhere(found) > left_everywhere(base) - alike:
+    if found is None or left_everywhere(found) > left_everywhere(base) - FORM_SHARE_ALIKE:
         return None
     return replace(found, gain=base.gain)
 
@@ -488,7 +498,6 @@ def without_needless(
     list of Candidate
         Those that leave less than the fits of the same names before, at most one for each.
     """
-    share = trial.settings.search.further_share
     known: dict[frozenset[str], float] = {}
     for c in candidates:
         known[frozenset(c.names)] = min(c.misfit, known.get(frozenset(c.names), math.inf))
@@ -496,13 +505,13 @@ def without_needless(
     for larger in (c for c in sets if len(c.names) > 1 and c.fit.events is None):
         for needless in larger.names:
             names = frozenset(larger.names) - {needless}
-            if (1.0 - share) * known.get(names, math.inf) < larger.misfit:
+            if (1.0 - FURTHER_SHARE) * known.get(names, math.inf) < larger.misfit:
                 continue
             tell(f"trying {' + '.join(sorted(names))} from {' + '.join(sorted(larger.names))}")
             smaller = trial.without(larger, needless)
             if smaller is not None and smaller.misfit < known.get(names, math.inf):
                 found[names], known[names] = smaller, smaller.misfit
-    walls = trial.settings.fit.most_tolerances
+    walls = trial.settings.most_tolerances
     return [c for c in found.values() if c.is_wrong(walls)]
 
 
@@ -510,13 +519,13 @@ def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
     or held out.
     """
-    much = trial.settings.search.much_left
     stages = ((start.fitted, candidate.fitted), (start.held_out, candidate.held_out))
     return [
         b
         for b in trial.suspects
         if any(
-            significant(now[b.name]) and now[b.name].ratio - 1.0 > much * (was[b.name].ratio - 1.0)
+            significant(now[b.name])
+            and now[b.name].ratio - 1.0 > _MUCH_LEFT * (was[b.name].ratio - 1.0)
             for was, now in stages
         )
     ]
@@ -526,7 +535,6 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
     """Whether a larger set takes a telling share of what a smaller one leaves of held-out
     recordings, and more than the pieces of the recordings differ in it.
     """
-    settings = trial.settings.search
     taken, left = [], 0.0
     for block in trial.suspects:
         before, after = (c.held_out[block.name].pieces for c in (best, further))
@@ -536,14 +544,13 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
         return False
     error = math.sqrt(len(taken)) * float(np.std(taken, ddof=1))
     gained = float(sum(taken))
-    return gained > settings.further_errors * error and gained > settings.further_share * left
+    return gained > _FURTHER_ERRORS * error and gained > FURTHER_SHARE * left
 
 
 def far_above_noise(trial: Attempts, found: Candidate) -> bool:
     """Whether what a hypothesis leaves is so far above the noise that signatures say little."""
-    strong = trial.settings.search.strong_ratio
     return any(
-        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > strong
+        max(kept[b.name].ratio, kept[b.name].systematic ** 2) > _STRONG_RATIO
         for b in trial.suspects
         for kept in (found.fitted, found.held_out)
     )
@@ -551,14 +558,14 @@ def far_above_noise(trial: Attempts, found: Candidate) -> bool:
 
 def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     """Whether a hypothesis leaves noise, so that no pair can be called for."""
-    return explains(candidate, start, trial.compared, trial.settings.evidence)
+    return explains(candidate, start, trial.compared)
 
 
 def no_room_beside(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     """Whether even an effect of one parameter that left nothing beside a hypothesis would weigh
     less with it than the hypothesis does alone.
     """
-    evidence = trial.settings.evidence
+    evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
     return room_beside(candidate, start, trial.compared, evidence) < least
 

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import Attempts, Candidate, Group, significant
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, Candidate, Group, significant
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -27,17 +27,40 @@ from pamrs.diagnosis.fit import (
     with_priors,
 )
 from pamrs.diagnosis.prepare import Block
-from pamrs.diagnosis.settings import WrongParameterSettings
 from pamrs.rig import Rig
 
 __all__ = ["beside_quiet", "freed", "strained_parameters", "suspected"]
 
+# evaluations of the linear model that predicts the gain of freeing a parameter: to its end
+_PREDICTED_GAIN_EVALUATIONS = 50
+# share of what a set leaves that a further effect takes; less is the form of the others
+FURTHER_SHARE = 0.2
+_EFFECT_LOG_ODDS = 6.0  # [log odds] against an effect below the noise beside it (decision 25)
+# [chi-square] linear gain that frees a parameter: twice file_log_odds (decision 25)
+_LEAST_PREDICTED_GAIN = 9.2
+# freed parameters, and pairs of them, that are fitted to their end (decision 25)
+_MOST_FINISHED = 3
+# times the misfit of a freed parameter that leaves noise, for others fitted beside it
+_NEAR_MISFIT = 2.0
+# [tolerances] moved by a suspect beside effects, which take a part of what it would do
+_FAR_TOLERANCES = 2.0
+_MOST_BESIDE = 2  # parameters at their wall that are freed beside the effects that leave least
+_MOST_PAIRS = 2  # pairs of parameters that are fitted (decision 25)
+_PAIR_SHARE = 0.08  # share of the largest predicted gain from which a pair is fitted (decision 25)
+# wrong by one mistake: other valve and fittings, load, arm (decision 25)
+_WRONG_TOGETHER = (
+    ("chamber.dead_volume", "valve.discharge_area_max"),
+    ("arm.payload", "arm.first_moment"),
+    ("arm.inertia", "arm.first_moment"),
+    ("link.mass", "link.centre"),
+    ("link.inertia", "link.mass"),
+)
+
+
 Array = NDArray[np.float64]
 
 
-def suspected(
-    fitted: Fit, blocks: list[Block], settings: WrongParameterSettings
-) -> list[tuple[str, ...]]:
+def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
 
     Parameters
@@ -46,24 +69,20 @@ def suspected(
         The refitted baseline.
     blocks : list of Block
         Blocks that were fitted.
-    settings : WrongParameterSettings
-        Where the wall is, and which pairs one mistake makes wrong.
 
     Returns
     -------
     list of tuple of str
         Dotted names.
     """
-    at_wall = [
-        name for name, moved in fitted.moved.items() if abs(moved) >= settings.wall_tolerances
-    ]
+    at_wall = [name for name, moved in fitted.moved.items() if abs(moved) >= WALL_TOLERANCES]
     found: list[tuple[str, ...]] = [(name,) for name in at_wall]
     for one, other in itertools.permutations(fitted.moved, 2):
         together = any({one, other} <= block.parameters for block in blocks) and _same_owner(
             one, other
         )
         if (
-            (_kind(one), _kind(other)) in settings.wrong_together
+            (_kind(one), _kind(other)) in _WRONG_TOGETHER
             and together
             and not {one, other}.isdisjoint(at_wall)
         ):
@@ -114,18 +133,16 @@ def freed(
         Of the sum of squares, below which a step is not worth it; 0 where the last few units of
         chi-square count.
     """
-    settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
+    walls = trial.settings.most_tolerances
     suspects = [
-        names
-        for found in (baseline, first)
-        for names in suspected(found, trial.inner.blocks, settings)
+        names for found in (baseline, first) for names in suspected(found, trial.inner.blocks)
     ]
     gains = _promising(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
     # the linear model says little of what is far away: each parameter at its wall is fitted,
     # whatever its predicted gain beside others
-    least = settings.pair_share * max(gains.values(), default=0.0)
+    least = _PAIR_SHARE * max(gains.values(), default=0.0)
     pairs = [names for names, gain in gains.items() if len(names) > 1 and gain > least][
-        : settings.most_pairs
+        :_MOST_PAIRS
     ]
     found = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
@@ -146,12 +163,11 @@ def strained_parameters(trial: Attempts, found: Fit) -> list[str]:
     found : Fit
         A fit with effects.
     """
-    settings = trial.settings.wrong_parameters
     far: list[tuple[str, ...]] = [
-        (name,) for name, moved in found.moved.items() if abs(moved) >= settings.far_tolerances
+        (name,) for name, moved in found.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
     gains = _promising(trial, found, far, trial.autocorrelation(found))
-    return [name for (name,) in gains][: settings.most_beside]
+    return [name for (name,) in gains][:_MOST_BESIDE]
 
 
 def _promising(
@@ -160,9 +176,12 @@ def _promising(
     """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
     chi-square, the largest first.
     """
-    least = trial.settings.wrong_parameters.least_predicted_gain
     gains = _predicted_gain(trial.inner, trial.nominal, found, sets, inflation)
-    return {n: gains[n] for n in sorted(gains, key=lambda n: -gains[n]) if gains[n] > least}
+    return {
+        n: gains[n]
+        for n in sorted(gains, key=lambda n: -gains[n])
+        if gains[n] > _LEAST_PREDICTED_GAIN
+    }
 
 
 def _tried(
@@ -180,17 +199,16 @@ def _tried(
         ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
-    most = trial.settings.wrong_parameters.most_finished
-    if len(sets) <= most:
+    if len(sets) <= _MOST_FINISHED:
         return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
     begun = zip(sets, two_at_a_time(trial.freed_shortly, sets), strict=True)
     short = {names: c for names, c in begun if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
-    best = sorted(worth, key=lambda names: short[names].misfit)[:most]
+    best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
     if best and not any(significant(e) for e in short[best[0]].fitted.values()):
         # what leaves much more than one that leaves noise does not get there
-        near = trial.settings.wrong_parameters.near_misfit * short[best[0]].misfit
+        near = _NEAR_MISFIT * short[best[0]].misfit
         best = [names for names in best if short[names].misfit <= near]
     return {**short, **to_the_end(best)}
 
@@ -200,8 +218,7 @@ def _needless(
 ) -> bool:
     """Whether one of several parameters, freed by itself, leaves nearly as little."""
     alone = [short[name,].misfit for name in names if (name,) in short] if len(names) > 1 else []
-    share = trial.settings.search.further_share
-    return any((1.0 - share) * own < short[names].misfit for own in alone)
+    return any((1.0 - FURTHER_SHARE) * own < short[names].misfit for own in alone)
 
 
 def _predicted_gain(
@@ -216,7 +233,7 @@ def _predicted_gain(
     """
     if not suspects:
         return {}
-    settings = problem.settings.fit
+    settings = problem.settings
     names = list(baseline.moved)
     rows, jacobian = stacked(problem, baseline.residuals, inflation)
     if jacobian is None:
@@ -228,7 +245,7 @@ def _predicted_gain(
     triangle: Array = np.asarray(np.linalg.qr(np.column_stack([scaled, rows]), mode="r"))
     slopes, left = triangle[:, :-1], triangle[:, -1]
     begin = np.array([baseline.moved[n] for n in names])
-    known = known_parameters(nominal, settings)
+    known = known_parameters(nominal)
     low, high = (
         np.array([(getattr(known[n], end) - known[n].value) / known[n].tol for n in names])
         for end in ("lower", "upper")
@@ -248,7 +265,7 @@ def _predicted_gain(
 
         limits = (np.maximum(low, -wall), np.minimum(high, wall))
         _, (values, _, _), _ = levenberg_marquardt(
-            evaluate, begin, limits, settings.predicted_gain_evaluations, settings, 0.0
+            evaluate, begin, limits, _PREDICTED_GAIN_EVALUATIONS, 0.0
         )
         return float(values @ values)
 
@@ -279,9 +296,9 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
         c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0
     ]
     # a file that is further outside its tolerances is rarer, but less and less so
-    settings, walls = trial.settings.wrong_parameters, trial.settings.fit.most_tolerances
+    settings, walls = trial.settings, trial.settings.most_tolerances
     against = {c: settings.file_log_odds * len(c.wrong) + c.outside(walls) for c in shown}
-    against |= dict.fromkeys(effects, settings.effect_log_odds)
+    against |= dict.fromkeys(effects, _EFFECT_LOG_ODDS)
     scores = {
         c: 0.5 * (before - with_priors(trial.inner, c.fit, autocorrelation)) - odds
         for c, odds in against.items()
