@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.fit import Fit, Key, Problem, fit, free_baseline, residuals
-from pamrs.diagnosis.fit._fitting import FINAL_STEP_SHARE
+from pamrs.diagnosis.fit import FINAL_STEP_SHARE, Fit, Key, Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.noise import NoiseLevel, bins_of, noise_levels
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.search import refitted, with_autocorrelation

@@ -24,7 +24,7 @@ _SPOKEN_SHARE = 0.05  # share of the form from which a kind of dependence is put
 
 Array = NDArray[np.float64]
 
-_UNITS = {
+_UNITS = {  # factors and units in which sizes are told
     "N m": ((1.0, "N m"),),
     "kg/s": ((1.0, "kg/s"), (1e-3, "g/s"), (1e-6, "mg/s"), (1e-9, "ug/s")),
 }

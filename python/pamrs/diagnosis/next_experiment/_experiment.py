@@ -56,8 +56,8 @@ class Said:
         return round(value * self.factor, self.digits)
 
 
-BAR = Said("bar", 1e-5, 2)
-MM = Said("mm", 1e3, 1)
+BAR = Said("bar", 1e-5, 2)  # pressures are told in hundredths of a bar
+MM = Said("mm", 1e3, 1)  # lengths in tenths of a millimetre
 
 
 @dataclass(frozen=True, eq=False)

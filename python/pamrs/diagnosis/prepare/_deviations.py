@@ -71,7 +71,7 @@ _SET: Final = ("valve_command", "supply_command", "reference")
 _TAPS: Final = 8  # deviations on either side by which one of the other recording is told
 _SOON: Final = 4  # samples within which a flip of a converter goes back
 _ROWS: Final = 20_000  # rows from which a linear combination of a few columns is found
-_TINY: Final = 1e-300
+_TINY: Final = 1e-300  # keeps a quotient finite
 
 
 def is_set(name: str) -> bool:

@@ -88,7 +88,7 @@ _SENSE_RIGHT = 0.4
 Array = NDArray[np.float64]
 
 _PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
-_DEGREES = 180.0 / math.pi
+_DEGREES = 180.0 / math.pi  # of a radian
 _TOLD = 12
 """Findings that a message lists."""
 

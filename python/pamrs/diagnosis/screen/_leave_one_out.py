@@ -22,7 +22,7 @@ _PIECES_LEFT_OUT = 5  # pieces of a single recording, each predicted by the othe
 
 Array = NDArray[np.float64]
 
-_RIDGE = 1e-9
+_RIDGE = 1e-9  # keeps a matrix invertible
 
 
 def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[Key, Residual]:
