@@ -20,7 +20,7 @@ from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_as
 from pamrs.diagnosis.explain import _assemble, _free_run
 from pamrs.diagnosis.explain._free_run import _OFF_NOISES
 from pamrs.diagnosis.explain._next import _telling, next_experiment
-from pamrs.diagnosis.fit import Problem, fit, known_parameters, residuals
+from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.next_experiment import experiments_of
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
@@ -265,6 +265,20 @@ def test_a_name_whose_value_is_not_determined_does_not_lead() -> None:
     both = replace(own, candidates=[base, leak, pair, alone], probabilities=chances)
     after = determined(both, problem)
     assert after.probabilities == pytest.approx({pair.key: 0.0, alone.key: 0.9, "unlisted": 0.1})
+
+
+def test_events_of_another_effect_determine_no_value() -> None:
+    problem, own = leak_group(1e-13)
+    leak = own.candidates[1]
+    happened = Events("external_torque", {problem.recordings[0].recording.name: {"torque": 1.0}})
+    beside = replace(leak, fit=replace(leak.fit, events=happened))
+    after = determined(replace(own, candidates=[own.candidates[0], beside]), problem)
+    assert after.probabilities["leak_muscle"] == pytest.approx(0.45)
+    # what happened itself is known by its times
+    happened = replace(happened, effect="leak_muscle")
+    beside = replace(leak, fit=replace(leak.fit, events=happened))
+    after = determined(replace(own, candidates=[own.candidates[0], beside]), problem)
+    assert after.probabilities == own.probabilities
 
 
 def test_a_name_that_spoils_a_channel_is_put_aside() -> None:

@@ -78,11 +78,10 @@ def undetermined(candidate: Candidate) -> list[str]:
     What happened at times of its own in single recordings is told by when it happened.
     """
     found = candidate.fit
-    if found.events is not None:
-        return []
+    happened = None if found.events is None else found.events.effect
     names, sealed = list(found.scales), found.rig.model["valve"] is None
     out = []
-    for effect in candidate.effects:
+    for effect in (e for e in candidate.effects if e != happened):
         form = info_of(effect).form(form_in(found.rig, effect))
         sizes = [
             f"{effect}.{p.name}"
