@@ -31,7 +31,7 @@ FOUND = re.compile(rf"\b(?:{'|'.join(PRIVATE)})\b", re.IGNORECASE)
 
 #: Pages of the reproduction, whose tables stay as they are, and modules that wait for their turn.
 WRITTEN = "docs/reproduction/"
-LATER = ("comparison.py", "diagnosis/settings/")
+LATER = ("comparison.py",)
 
 
 def private_words(text):

@@ -115,7 +115,7 @@ class DiagnosisSettings:
         330.0,
         "K",
         "ambient temperature above which a recording is none of a room",
-        "judgement: beside an oven; degF under a heading in K are above it",
+        "judgement: next to an oven; degF under a heading in K are above it",
         least=_TINY,
     )
     most_room_change: float = _setting(
@@ -250,7 +250,7 @@ class DiagnosisSettings:
     wrong_price: float = _setting(
         1.5,
         "log odds",
-        "price of a rig file that is wrong about a parameter, beside the logarithm of how many "
+        "price of a rig file that is wrong about a parameter, besides the logarithm of how many "
         "times it is outside its tolerances",
         "docs/decisions/0025",
     )
