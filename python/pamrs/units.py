@@ -170,7 +170,7 @@ _MEASURED_FROM = re.compile(
     rf"(?P<unit>.+?)(?:[\s_-]*\(\s*(?P<inside>{_BEHIND})\.?\s*\)|[\s_,-]*(?P<behind>{_BEHIND})\.?)",
     re.IGNORECASE,
 )
-_FACTOR = re.compile(r"(?P<symbol>[^\d\s^*·/()-]+|1|-|%)\^?(?P<power>-?\d+)?")
+_FACTOR = re.compile(r"(?P<symbol>[^\d\s^*·/()-]+)\^?(?P<power>-?\d+)?")
 
 
 class Unit(NamedTuple):

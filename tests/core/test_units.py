@@ -129,6 +129,13 @@ def test_only_pressures_are_absolute(unit: str) -> None:
     assert measured_from(unit) == (unit, "")
 
 
+@pytest.mark.parametrize("unit", ["100 kPa", "10 bar", "bar*10", "bar/10", "kPa x 10"])
+def test_a_number_in_a_unit_is_refused(unit: str) -> None:
+    """It was read as a power of one, and a factor was lost without a word."""
+    with pytest.raises(ParameterError, match="unknown unit"):
+        parse_unit(unit)
+
+
 @given(st.text(max_size=12))
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:

@@ -133,6 +133,18 @@ def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.Monkey
         pamrs.diagnose(leaking())
 
 
+@pytest.mark.usefixtures("lenient")
+def test_a_search_for_units_or_offsets_that_fails_costs_itself(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(pamrs.diagnosis, "misread", broken)
+    monkeypatch.setattr(pamrs.diagnosis, "_on_time", broken)
+    found = pamrs.diagnose(leaking())
+    assert found.verdict == "effects"
+    assert found.warnings[0].startswith("the search for other units failed and was left out")
+    assert found.warnings[1].startswith("the search for offsets of commands failed")
+
+
 def test_an_experiment_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(STRICT)
     rig = pamrs.rigs.sealed_chamber()

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 import pamrs
 from pamrs.errors import RecordingError
 from pamrs.recordings import Recording, load_case, load_recording, load_recordings, propose
+from pamrs.recordings._stamps import ticks
 from pamrs.recordings.logs import TextFormat
 
 Array = NDArray[np.float64]
@@ -445,6 +446,26 @@ def test_counters_overflow_in_a_table_that_says_it_all(tmp_path: Path) -> None:
     recording = load_recording(tmp_path / "log.csv")
     assert "a clock of 16 bits: 1" in recording.issues[0].text
     check(recording, CLOCKS["16 bits"], 0)
+
+
+@pytest.mark.parametrize("bits", [2.0**32 / 1e3, 2.0**32 / 1e6, 2.0**16 / 1e3, 2.0**16 / 1e6])
+@pytest.mark.parametrize("rows", [1, 10, 19, 60])
+def test_counters_overflow_near_the_end_of_a_log(bits: float, rows: int) -> None:
+    """What comes after it is not late: a log ends with it."""
+    time = 0.005 * np.arange(400.0)
+    found = ticks(np.mod(time - time[-rows], bits))
+    np.testing.assert_allclose(found.time - found.time[0], time, atol=1e-5)
+    assert (found.rows == np.arange(400)).all()
+
+
+@pytest.mark.parametrize("rows", [1, 2, 10, 19])
+def test_a_clock_that_begins_again_near_the_end_of_a_log_is_not_sorted(rows: int) -> None:
+    time = 0.005 * np.arange(400.0)
+    for begins in (0.0, 0.3021):
+        found = ticks(np.concatenate([time, begins + time[:rows]]))
+        assert (found.rows == np.arange(400 + rows)).all()
+    late = ticks(np.concatenate([np.delete(time, [200, 201]), time[[200, 201]]]))
+    np.testing.assert_array_equal(late.time, time)
 
 
 CHANNELS = {

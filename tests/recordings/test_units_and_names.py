@@ -83,12 +83,14 @@ GAUGES = [
     ("p_muscle {bar}", 1e5), ("p_muscle_(kPa)", 1e3), ("p_muscle <psi>", PSI),
     ("p_muscle / bar", 1e5), ("p_muscle in psi", PSI), ("p_muscle_kPa", 1e3),
     ("p_muscle mbar", 1e2), ("p_muscle/kPa", 1e3),
+    ("P_MUSCLE_PSI", PSI), ("P_MUSCLE_KPA", 1e3), ("p_muscle/kPa(g)", 1e3),
 ]  # fmt: skip
 ABSOLUTE = [
     ("p_muscle [bar(a)]", 1e5), ("p_muscle (bar(a))", 1e5), ("p_muscle [bara]", 1e5),
     ("p_muscle [psi(a)]", PSI), ("p_muscle [PSIA]", PSI), ("p_muscle [kPa abs]", 1e3),
     ("p_muscle [hPa(a)]", 1e2), ("p_muscle [mmHg abs.]", MERCURY), ("p_muscle_bar_abs", 1e5),
     ("p_muscle_abs [bar]", 1e5), ("p_muscle bar(a)", 1e5), ("p_muscle (bar, abs)", 1e5),
+    ("p_muscle/kPa(a)", 1e3), ("P_MUSCLE_PSIA", PSI),
 ]  # fmt: skip
 
 
@@ -124,6 +126,8 @@ LEFT = [
     ("p_muscle [mmXy]", "the unit 'mmXy' is not known"),
     ("p_muscle (bar/x)", "the unit 'bar/x' is not known"),
     ("p_muscle [psid]", "the unit 'psid' is not known"),
+    ("p_muscle [100 kPa]", "the unit '100 kPa' is not known"),
+    ("p_muscle [bar/10]", "the unit 'bar/10' is not known"),
 ]
 
 
@@ -167,6 +171,21 @@ def test_a_unit_is_assumed_only_where_there_is_none_and_stays_marked(tmp_path: P
     case = read(tmp_path, proposal)
     (again,) = noted_units(case)  # what a diagnosis puts among its warnings
     assert again.startswith("run: muscle_pressure is assumed to be in bar: its numbers are 0.4")
+
+
+def test_a_force_in_pounds_is_no_force_in_newtons(tmp_path: Path) -> None:
+    columns = {"p [bar]": GAUGE / 1e5, "force_lbf": 50.0 + ANGLE}
+    proposal = propose([log(tmp_path, columns)], pamrs.rigs.named("bench"))
+    assert {m.channel: m.unit for m in proposal.logs[0].matches}["force"] == "lbf"
+    columns = {"p [bar]": GAUGE / 1e5, "force_lb": 50.0 + ANGLE}
+    (item,) = propose([log(tmp_path, columns)], pamrs.rigs.named("bench")).logs
+    assert [(each.channel, each.unit) for each in item.left] == [("force", "lbf")]
+
+
+def test_a_log_whose_only_unit_is_not_known_says_so(tmp_path: Path) -> None:
+    proposal = propose([log(tmp_path, {"p_muscle [% FS]": GAUGE / 1e4})], SHOULDER)
+    with pytest.raises(RecordingError, match="the unit '% FS' is not known"):
+        proposal.case_toml(tmp_path)
 
 
 def test_numbers_that_fit_no_unit_are_not_guessed(tmp_path: Path) -> None:

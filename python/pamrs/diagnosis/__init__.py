@@ -20,6 +20,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from pamrs.channels import dotted
@@ -57,7 +58,7 @@ from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine, misread
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError, meant
+from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty
 from pamrs.recordings import Case, load_case
 from pamrs.rig import Rig, load_rig
@@ -244,11 +245,15 @@ def diagnose(
     say(f"{case.name}: preparing {len(case.recordings)} recordings")
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
     with _in_range(case.name):
-        read, moved = misread(inner, case.rig), list[str]()
+        part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
+        read = part("the search for other units", lambda: misread(inner, case.rig))
         if read is not None:
             diagnosis = misread_diagnosis(case, inner, outer, read, unjudged)
         else:
-            inner, outer, moved = _on_time(inner, outer, case.rig)
+            laid = part(
+                "the search for offsets of commands", lambda: _on_time(inner, outer, case.rig)
+            )
+            inner, outer, moved = laid or (inner, outer, [])
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
     warnings = [*inner.losses.told, *suspected, *masked, *held, *begun, *moved]
     warnings += diagnosis.warnings

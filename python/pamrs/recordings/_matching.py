@@ -322,13 +322,9 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
         electric = next((r for u, r in _READINGS.items() if same_dimension(written.unit, u)), ())
         why = f"is called like {name}, but is in {series.unit}"
         if same_dimension(written.unit, "kg") and channel == "force":
-            return Open(
-                name,
-                series.name,
-                "kgf",
-                (),
-                f"{series.name} {why}, a mass: kgf if a weight is meant",
-            )
+            weight = "lbf" if written.unit == "lb" else "kgf"
+            text = f"{series.name} {why}, a mass: {weight} if a weight is meant"
+            return Open(name, series.name, weight, (), text)
         text = f"{series.name} {why}: give from and to, its calibration"
         return Open(name, series.name, usual, electric or (0.0, 1.0), text)
     if series.unit.strip(" -1[](){}"):

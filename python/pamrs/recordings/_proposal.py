@@ -143,9 +143,10 @@ class Proposal:
         """
         if not any(item.matches for item in self.logs):
             names = ", ".join(str(item.log.path) for item in self.logs)
+            left = "".join(f"\n{each.text}" for item in self.logs for each in item.left)
             raise RecordingError(
                 f"{names}: no channel was recognised; name the columns of a text without headings "
-                "(--columns, in Python TextFormat(columns=...)), or write case.toml by hand"
+                "(--columns, in Python TextFormat(columns=...)), or write case.toml by hand" + left
             )
         lines = [
             "# Proposed by pamrs import from names, units and ranges: look at every line.",

@@ -206,11 +206,13 @@ def ticks(stamps: Array, others: Sequence[Array] = ()) -> Ticks:
     if np.sum(steps > 0.0) < _NEWEST_FIRST * np.sum(steps < 0.0):
         rows = rows[::-1].copy()
         remarks.append("the newest row comes first: read from the end")
-    order, late = _in_order(stamps[rows])
-    if late:
-        remarks.append(f"rows that come after later ones: {late}, sorted by their times")
-    rows = rows[order]
     time, said = _counted_on(stamps[rows])
+    if np.any(np.diff(time) < 0.0):  # more than overflows, whose last rows would seem to be late
+        order, late = _in_order(time)
+        if late:
+            remarks.append(f"rows that come after later ones: {late}, sorted by their times")
+        rows = rows[order]
+        time, said = _counted_on(stamps[rows])
     remarks += said
     again = np.flatnonzero(np.diff(time) == 0.0) + 1
     if len(again) and others and all(_same(values, rows, again) for values in others):
@@ -237,7 +239,7 @@ def _counted_on(stamps: Array) -> tuple[Array, list[str]]:
     low, high = (limit * usual for limit in _OVERFLOW)
     for period in _PERIODS:
         gone = back + period
-        fits = (gone >= low) & (gone <= high)
+        fits = (gone >= low) & (gone <= high) & (np.ptp(stamps) <= period)
         often = len(back) >= _OFTEN and fits.all()
         if fits.any() and (period >= _LONG * usual or often):
             over = steps < -0.5 * period
@@ -268,7 +270,9 @@ def _in_order(time: Array) -> tuple[Rows, int]:
         if len(ahead):
             stop = at + 1 + int(ahead[0])
         else:
-            stop = len(laid) if at + 1 + _LATE >= len(laid) else 0
+            ends = at + 1 + _LATE >= len(laid)
+            fits = ends and _has_room(laid[start:], at + 1 - start, usual)
+            stop = len(laid) if fits else 0
         low = float(laid[at + 1 : stop].min()) if stop else 0.0
         first = start + int(np.searchsorted(laid[start : at + 1], low))
         span = float(laid[at]) - low
@@ -281,6 +285,17 @@ def _in_order(time: Array) -> tuple[Rows, int]:
         else:
             start = done = at + 1
     return order, moved
+
+
+def _has_room(laid: Array, count: int, usual: float) -> bool:
+    """Whether the rows before leave room for the last ones, from `count` on: a run that began again
+    at the end of a log lies where the first one has rows.
+    """
+    before, late = laid[:count], np.sort(laid[count:])
+    first = int(np.searchsorted(before, late[0]))
+    last = int(np.searchsorted(before, late[-1], side="right"))
+    low = before[first - 1] if first else late[0] - usual
+    return bool((last - first + len(late) + 1) * usual < _CROWDED * (before[last] - low))
 
 
 def spread(time: Array) -> tuple[Array, str]:

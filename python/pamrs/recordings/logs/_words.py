@@ -35,7 +35,10 @@ _TAILS: Final = frozenset(
     ("bar", "mbar", "kPa", "MPa", "hPa", "Pa", "psi", "psig", "psia", "bara", "barg", "Torr")
     + ("mmHg", "inHg", "inH2O", "mmH2O", "cmH2O", "mH2O", "atm", "degC", "degF", "deg", "rad")
     + ("mm", "cm", "ms", "us", "ns", "sec", "mV", "mA", "Nm", "kN", "V", "N", "s")
+    + ("lbf", "lb", "lbs", "kgf", "kg")
 )
+#: Of them, those of three letters or more are taken in capitals, too; ATM is the air outdoors.
+_CAPITALS: Final = frozenset(unit.upper() for unit in _TAILS if len(unit) > 2) - {"ATM"}
 _WORDS: Final[dict[str, str]] = {
     "sec": "s", "secs": "s", "second": "s", "seconds": "s", "sekunden": "s",
     "msec": "ms", "millisecond": "ms", "milliseconds": "ms", "usec": "us", "µs": "us",
@@ -193,10 +196,11 @@ def split_heading(heading: str) -> tuple[str, str]:
     if match and understood_unit(match["unit"]):
         return match["name"], match["unit"]
     match = _DIVIDED.match(heading)
-    if match and match["unit"] in _TAILS | {"m", "A", "°"}:
+    if match and measured_from(match["unit"])[0] in _TAILS | {"m", "A", "°"}:
         return match["name"], match["unit"]
     match = _TAIL.match(heading)
-    if match and match["alone"] in _TAILS and understood_unit(match["unit"]):
+    known = match and (match["alone"] in _TAILS or match["alone"].upper() in _CAPITALS)
+    if match and known and understood_unit(match["unit"]):
         return heading.strip(), match["unit"].replace("_", " ")
     return heading.strip(), ""
 
