@@ -128,6 +128,7 @@ LEFT = [
     ("p_muscle [psid]", "the unit 'psid' is not known"),
     ("p_muscle [100 kPa]", "the unit '100 kPa' is not known"),
     ("p_muscle [bar/10]", "the unit 'bar/10' is not known"),
+    ("p_muscle (10 kPa)", "the unit '10 kPa' is not known"),
 ]
 
 
@@ -173,10 +174,13 @@ def test_a_unit_is_assumed_only_where_there_is_none_and_stays_marked(tmp_path: P
     assert again.startswith("run: muscle_pressure is assumed to be in bar: its numbers are 0.4")
 
 
-def test_a_force_in_pounds_is_no_force_in_newtons(tmp_path: Path) -> None:
+def test_pounds_and_inches_are_no_newtons_and_millimetres(tmp_path: Path) -> None:
     columns = {"p [bar]": GAUGE / 1e5, "force_lbf": 50.0 + ANGLE}
     proposal = propose([log(tmp_path, columns)], pamrs.rigs.named("bench"))
     assert {m.channel: m.unit for m in proposal.logs[0].matches}["force"] == "lbf"
+    columns = {"p [bar]": GAUGE / 1e5, "length_inch": 10.0 + ANGLE / 50.0}
+    proposal = propose([log(tmp_path, columns)], pamrs.rigs.named("bench"))
+    assert {m.channel: m.unit for m in proposal.logs[0].matches}["length"] == "in"
     columns = {"p [bar]": GAUGE / 1e5, "force_lb": 50.0 + ANGLE}
     (item,) = propose([log(tmp_path, columns)], pamrs.rigs.named("bench")).logs
     assert [(each.channel, each.unit) for each in item.left] == [("force", "lbf")]

@@ -35,7 +35,7 @@ _TAILS: Final = frozenset(
     ("bar", "mbar", "kPa", "MPa", "hPa", "Pa", "psi", "psig", "psia", "bara", "barg", "Torr")
     + ("mmHg", "inHg", "inH2O", "mmH2O", "cmH2O", "mH2O", "atm", "degC", "degF", "deg", "rad")
     + ("mm", "cm", "ms", "us", "ns", "sec", "mV", "mA", "Nm", "kN", "V", "N", "s")
-    + ("lbf", "lb", "lbs", "kgf", "kg")
+    + ("lbf", "lb", "lbs", "kgf", "kg", "inch")
 )
 #: Of them, those of three letters or more are taken in capitals, too; ATM is the air outdoors.
 _CAPITALS: Final = frozenset(unit.upper() for unit in _TAILS if len(unit) > 2) - {"ATM"}
@@ -52,6 +52,7 @@ _WORDS: Final[dict[str, str]] = {
     "degree": "deg", "degrees": "deg", "grad": "deg", "radian": "rad", "radians": "rad",
     "newton": "N", "newtons": "N", "newton-meters": "N m", "n*m": "N m", "n.m": "N m",
     "n-m": "N m", "meter": "m", "meters": "m", "metre": "m", "metres": "m", "lbs": "lb",
+    "inch": "in", "inches": "in",
     "millimeter": "mm", "millimeters": "mm", "millimetres": "mm", "kelvin": "K",
     "celsius": "degC", "deg c": "degC", "degrees celsius": "degC", "deg_c": "degC",
     "°c": "degC", "°f": "degF", "fahrenheit": "degF", "grad c": "degC", "deg f": "degF",
@@ -212,4 +213,8 @@ def _like_a_unit(text: str) -> bool:
         plain in _COUNTS
         or "/" in plain
         or any(plain.startswith(unit.lower()) for unit in _PRESSURES if len(unit) > 2)
+        or any(
+            len(word) > 1 and (word in _TAILS or word.upper() in _CAPITALS)
+            for word in re.split(r"[^A-Za-z]+", text)
+        )
     )
