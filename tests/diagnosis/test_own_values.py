@@ -15,13 +15,16 @@ from pamrs.diagnosis.fit import Problem, residuals
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.errors import CaseError, DiagnosisError
 from pamrs.recordings import OwnValue, Recording, load_case
+from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import SHOULDER as NOISE
 from tests.diagnosis.noisy import noisy
+from tests.diagnosis.test_gauge_zeros import FED
 
 SETTINGS = DiagnosisSettings()
 DT = 0.005
 SHOULDER = pamrs.rigs.shoulder()
+SHOULDER_TEXT = SHOULDER.to_toml_text()
 NAME = "arm.payload"
 LOADS = {"light": SHOULDER.parameter(NAME).value, "heavy": 13.0, "half": 11.0}
 ROLES = {"light": "fit", "heavy": "fit", "half": "held_out"}
@@ -113,13 +116,30 @@ def nozzles(*, error: str) -> list[Recording]:
     return found
 
 
-def test_a_value_of_each_recording_is_found_there() -> None:
-    found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error="own"), Path()))
+def left_to_recordings(rig: Rig, key: str) -> Rig:
+    """A rig whose file says of a value that each recording has its own."""
+    (line,) = (own for own in rig.to_toml_text().splitlines() if own.startswith(f"{key} "))
+    open_ended = re.sub(r",\s*(tol|std) = [^ ,}]+", "", line).replace(" }", ', error = "own" }', 1)
+    return parse_rig(rig.to_toml_text().replace(line, open_ended))
+
+
+def told_of(found: pamrs.Diagnosis, name: str) -> tuple[dict[str, float], str]:
+    """What the warnings say of the values of each recording."""
+    (told,) = (w for w in found.warnings if w.startswith(f"{name} is free in each recording"))
+    values = re.findall(r"[:,] ([\de.+-]+) in (\w+)", told)
+    return {recording: float(value) for value, recording in values}, told
+
+
+@pytest.mark.parametrize("in_rig", [True, False])
+def test_a_value_of_each_recording_is_found_there(in_rig: bool) -> None:
+    rig = left_to_recordings(SHOULDER, "discharge_area_max") if in_rig else SHOULDER
+    case = pamrs.Case("nozzles", rig, nozzles(error="" if in_rig else "own"), Path())
+    found = pamrs.diagnose(case)
     assert found.verdict in ("none", "parameters")
-    (told,) = (w for w in found.warnings if w.startswith(f"{AREA} is free in each recording"))
+    values, told = told_of(found, AREA)
     assert "the largest is 2.9 times the smallest" in told
-    values = [float(v) for v in re.findall(r": ([\de.-]+) in narrow, ([\de.-]+) in wide", told)[0]]
-    assert values == pytest.approx([AREAS["narrow"], AREAS["wide"]], rel=0.02)
+    assert values == pytest.approx(AREAS, rel=0.02)
+    assert {d.recording: d.parameters[AREA] for d in found.data} == pytest.approx(AREAS, rel=0.02)
     # the whole rig has them too
     (run,) = found.free_run or []
     assert run.channels["muscle_pressure"].after < 3.0 * NOISE["muscle_pressure"]
@@ -128,6 +148,86 @@ def test_a_value_of_each_recording_is_found_there() -> None:
 def test_nozzles_that_nobody_told_are_no_single_value() -> None:
     found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error=""), Path()))
     assert found.verdict not in ("none", "parameters") or found.wrong_parameters
+
+
+LEAK = "leak_muscle.conductance"
+RATES = {"monday": 1e-11, "tuesday": 2.9e-11, "wednesday": 1.7e-11}
+
+
+@pytest.mark.parametrize("at", ["", "wall"])
+def test_a_leak_of_each_day_is_found_there(at: str) -> None:
+    tight = pamrs.rigs.sealed_chamber()
+    if at:
+        text = tight.to_toml_text().replace("[chamber]", f"[chamber.{at}]")
+        tight = parse_rig(text.replace("[sensors]", f"[sensors.{at}]"))
+    channel = f"muscle_pressure.{at}" if at else "muscle_pressure"
+    days = []
+    for k, (day, rate) in enumerate(RATES.items()):
+        true = tight.with_effect("leak_muscle", {"conductance": rate}, at=at)
+        run = pamrs.simulate(
+            true, duration=60.0, sample_time=0.1, step=0.01, initial={channel: 7e5}
+        )
+        role = "held_out" if day == "wednesday" else "fit"
+        days.append(noisy(day, role, 0.1, {channel: run[channel]}, {channel: 150.0}, [41, k]))
+    rig = tight.with_effect("leak_muscle", {"conductance": 2e-11}, at=at)
+    rig = left_to_recordings(rig, "conductance")
+    assert rig.own == (f"leak_muscle.{at}.conductance" if at else LEAK,)
+    found = pamrs.diagnose(pamrs.Case("days", rig, days, Path()))
+    assert found.verdict in ("none", "parameters"), found.summary()
+    values, told = told_of(found, LEAK)
+    assert values == pytest.approx(RATES, rel=0.05)
+    assert "the largest is 2.9 times the smallest" in told
+
+
+BEGUN = {"full": 7e5, "half": 4.5e5, "later": 5.5e5}
+
+
+def test_a_tank_without_a_gauge_begins_each_recording_at_its_own_pressure() -> None:
+    tank = parse_rig(FED)
+    name = "supply.initial_pressure"
+    records = []
+    for k, (day, begun) in enumerate(BEGUN.items()):
+        levels = np.random.default_rng(k).uniform(0.0, 10.0, 20).repeat(100)
+        run = pamrs.simulate(tank.with_parameters({name: begun}), levels, sample_time=DT)
+        channels = {"valve_command": levels, "muscle_pressure": run["muscle_pressure"]}
+        role = "held_out" if day == "later" else "fit"
+        records.append(noisy(day, role, DT, channels, {"muscle_pressure": 150.0}, [43, k]))
+    rig = left_to_recordings(tank, "initial_pressure")
+    found = pamrs.diagnose(pamrs.Case("tank", rig, records, Path()))
+    assert found.verdict in ("none", "parameters"), found.summary()
+    values, _ = told_of(found, name)
+    assert values == pytest.approx(BEGUN, rel=0.02)
+
+
+def test_a_pressure_that_is_read_needs_no_value_of_its_own() -> None:
+    rig = left_to_recordings(SHOULDER, "initial_pressure")
+    (first, *_) = recordings(SHOULDER, told=False)
+    found = pamrs.diagnose(pamrs.Case("read", rig, [first], Path()))
+    assert "supply.initial_pressure: its gauge says where each recording begins" in found.warnings
+
+
+def test_a_rig_file_says_which_values_are_those_of_recordings() -> None:
+    rig = left_to_recordings(SHOULDER, "discharge_area_max")
+    assert (rig.own, rig.parameter(AREA).tol) == ((AREA,), 0.0)
+    for comments in (True, False):
+        again = parse_rig(rig.with_parameters({AREA: 9e-6}).to_toml_text(comments=comments))
+        assert (again.own, again.parameter(AREA).value) == ((AREA,), 9e-6)
+    leaking = left_to_recordings(SHOULDER.with_effect("leak_muscle"), "conductance")
+    assert leaking.own == parse_rig(leaking.to_toml_text(comments=False)).own == (LEAK,)
+    assert leaking.without_effect("leak_muscle").own == ()
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ('{ value = 8e-6, unit = "m2", error = "same" }', "error = 'same' is not allowed: 'own'"),
+        ('{ value = 8e-6, unit = "m2", tol = 1e-6, error = "own" }', "exclude each other"),
+    ],
+)
+def test_what_a_rig_file_cannot_say_of_them(entry: str, message: str) -> None:
+    text = re.sub(r"discharge_area_max = {.*}", f"discharge_area_max = {entry}", SHOULDER_TEXT)
+    with pytest.raises(pamrs.RigError, match=message):
+        parse_rig(text)
 
 
 def test_a_leak_of_each_day_is_a_value_of_its_own() -> None:

@@ -432,7 +432,9 @@ class Network:
     """
 
     def __init__(self, model: Mapping[str, Any]) -> None:
-        if model["effects"] or any(s["pressure_zero"] or s["angle_zero"] for s in model["sensors"]):
+        zeros = [s["pressure_zero"] or s["angle_zero"] for s in model["sensors"]]
+        zeros += [b.get("pressure_zero") for kind in ("supplies", "lines") for b in model[kind]]
+        if model["effects"] or any(zeros):
             raise ValueError("the reference has no effects and no sensor errors")
         self.gas = Gas(**model["gas"])
         self.rt = self.gas.gas_constant * self.gas.temperature

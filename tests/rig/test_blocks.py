@@ -149,7 +149,12 @@ def test_a_chain_keeps_its_shape_and_its_names() -> None:
         "opening": [0.0, 0.25, 0.5, 0.75, 1.0],
         "fraction": [0.0, 0.2, 0.5, 0.8, 1.0],
     }
-    assert model["supply"] == {"kind": "tank", "volume": 0.015, "initial_pressure": 13.8e5}
+    assert model["supply"] == {
+        "kind": "tank",
+        "volume": 0.015,
+        "initial_pressure": 13.8e5,
+        "pressure_zero": 0.0,
+    }
     assert model["ports"] == {}
     assert all(model[block] is None for block in ("line", "transmission", "link", "load"))
     assert "valve.half_range" in rig.parameters
@@ -595,7 +600,7 @@ def test_rig_check_says_what_is_connected(
     assert any(
         line.split()[:3] == ["valve.flexor.discharge_area_max", "1.2e-06", "±"] for line in out
     )
-    assert out[-1].endswith("is valid, 82 parameters, 0 effects")
+    assert out[-1].endswith("is valid, 83 parameters, 0 effects")
 
 
 def test_help_and_template_know_every_rig_and_key(

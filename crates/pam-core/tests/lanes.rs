@@ -120,7 +120,15 @@ fn each_lane_is_the_plant_alone() {
         let opening = |name: &&String| name.ends_with("discharge_area_max");
         let opening = rig.parameters().names().iter().find(opening).unwrap().clone();
         let area = spread(&rig, &opening, 19);
-        let parameters = vec![("arm.payload", &payload[..]), (opening.as_str(), &area[..])];
+        let gauge =
+            |name: &&String| name.starts_with("supply") && name.ends_with(".pressure_zero");
+        let gauge = rig.parameters().names().iter().find(gauge).unwrap().clone();
+        let zero: Vec<f64> = (0..19).map(|k| 100.0 * f64::from(k)).collect();
+        let parameters = vec![
+            ("arm.payload", &payload[..]),
+            (opening.as_str(), &area[..]),
+            (gauge.as_str(), &zero[..]),
+        ];
         let request = request(&rig, 19, &signals, parameters);
         let outcome = run(&rig, &request);
         assert!(outcome.failures.iter().all(Option::is_none), "{name}");

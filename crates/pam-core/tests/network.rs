@@ -44,6 +44,7 @@ fn tube(from: &str, to: &str, length: f64, diameter: f64) -> LineSpec {
         diameter,
         discharge_area: 0.0,
         inlet_volume: 0.0,
+        pressure_zero: 0.0,
         segments: 0,
         alpha: 1.4,
     }
@@ -247,6 +248,7 @@ fn regulator(droop: f64) -> SupplySpec {
         rise_limit: FASTEST,
         fall_limit: FASTEST,
         dead_band: 0.0,
+        pressure_zero: 0.0,
         inlet: String::new(),
     }
 }
@@ -615,6 +617,7 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
         rise_limit: FASTEST,
         fall_limit: FASTEST,
         dead_band: 0.0,
+        pressure_zero: 0.0,
         inlet: String::new(),
     }];
     let mut through_line = spec.clone();
@@ -663,6 +666,51 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
     let (own, other) = (missed(&rig), missed(&Rig::new(narrower).unwrap()));
     assert!(own < 2e3 && other > 10.0 * own, "{own} Pa, {other} Pa");
     assert!(Block::from_name(&rig, "line.other").is_err());
+}
+
+/// A gauge that reads too much moves no gas; where its zero is known, what it drives is as it was.
+#[test]
+fn gauges_of_supplies_and_lines_have_zeros() {
+    let true_rig = Rig::new(fed_through_a_tube(5e-6, 2.0)).unwrap();
+    let mut spec = fed_through_a_tube(5e-6, 2.0);
+    (spec.supplies[0].pressure_zero, spec.lines[0].pressure_zero) = (1500.0, -700.0);
+    let off = Rig::new(spec).unwrap();
+    let (rows, dt) = (400, 0.005);
+    let command = wave(rows, 0.0);
+    let commands: [(&str, &[f64]); 1] = [("valve_command", &command)];
+    let [truth, read] = [&true_rig, &off].map(|rig| run(rig, rows, &commands, dt, 0.001));
+    for ((name, _), (a, b)) in
+        true_rig.names().channels.iter().zip(truth.channels.iter().zip(&read.channels))
+    {
+        let zero = match name.as_str() {
+            "supply_pressure" => 1500.0,
+            "line_pressure" => -700.0,
+            _ => 0.0,
+        };
+        assert!(a.iter().zip(b).all(|(a, b)| (b - a - zero).abs() <= 1e-9 * a.abs()), "{name}");
+    }
+    let predicted = |name: &str, rig: &Rig, of: &Trajectory| {
+        let known = ["supply_pressure", "line_pressure", "muscle_pressure", "joint_angle"];
+        let known = known.iter().filter(|name| of.get(rig, name).is_some());
+        let signals: Vec<_> = known.map(|n| (*n, slopes(of, rig, n, dt))).collect();
+        let signals: Vec<_> = (signals.iter())
+            .map(|(n, slope)| (*n, Signal { value: of.get(rig, n).unwrap(), slope }))
+            .collect();
+        let measured = Measured::new(rig, rows, &commands, &signals).unwrap();
+        let block = Block::from_name(rig, name).unwrap();
+        let timing = Timing::new(dt, 0.001).unwrap();
+        let timing = timing.at_most(block.longest_step(rig, &measured).unwrap()).unwrap();
+        predict(rig, block, &measured, timing, &[0], &[]).unwrap().value
+    };
+    for (block, zero) in [("supply", 1500.0), ("line", -700.0), ("chamber", 0.0)] {
+        let [was, corrected, fooled] = [(&true_rig, &truth), (&off, &read), (&true_rig, &read)]
+            .map(|(rig, of)| predicted(block, rig, of));
+        let apart = |other: &[f64]| {
+            was.iter().zip(other).map(|(a, b)| (b - a - zero).abs()).fold(0.0, f64::max)
+        };
+        assert!(apart(&corrected) < 1e-3, "{block}: {}", apart(&corrected));
+        assert!(apart(&fooled) > 1.0, "{block}: {}", apart(&fooled));
+    }
 }
 
 #[test]

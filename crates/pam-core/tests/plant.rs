@@ -110,7 +110,12 @@ fn sensitivities_agree_with_differences() {
         (
             &with_effects,
             Block::Supply(0),
-            &["supply.volume", "valve.discharge_area_max", "valve.null_voltage"],
+            &[
+                "supply.volume",
+                "supply.pressure_zero",
+                "valve.discharge_area_max",
+                "valve.null_voltage",
+            ],
         ),
         (
             &with_effects,
@@ -118,6 +123,7 @@ fn sensitivities_agree_with_differences() {
             &[
                 "chamber.dead_volume",
                 "chamber.alpha",
+                "supply.pressure_zero",
                 "leak_muscle.conductance",
                 "leak_muscle.laminar_share",
                 "sensors.angle_zero",
@@ -329,6 +335,7 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
     }
     match name {
         "supply.volume" => &mut spec.supplies[0].volume,
+        "supply.pressure_zero" => &mut spec.supplies[0].pressure_zero,
         "valve.discharge_area_max" => &mut spec.valves[0].discharge_area_max,
         "valve.fill_conductance" => &mut spec.valves[0].fill_conductance,
         "valve.fill_critical_ratio" => &mut spec.valves[0].fill_critical_ratio,
@@ -354,7 +361,7 @@ fn slot<'a>(spec: &'a mut RigSpec, name: &str) -> &'a mut f64 {
 fn nudge_size(spec: &RigSpec, name: &str, relative: f64) -> f64 {
     let value = *slot(&mut spec.clone(), name);
     if value == 0.0 {
-        if name == "sensors.pressure_zero" {
+        if name.ends_with("pressure_zero") {
             10.0
         } else {
             1e-5

@@ -38,6 +38,7 @@ fn tube(from: &str, to: &str, length: f64, segments: usize) -> LineSpec {
         diameter: 0.004,
         discharge_area: 0.0,
         inlet_volume: 0.0,
+        pressure_zero: 0.0,
         segments,
         alpha: 1.4,
     }

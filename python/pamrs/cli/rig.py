@@ -43,6 +43,7 @@ def _rig_check(
         spread = f" ± {parameter.tol:.3g}" if parameter.known and parameter.tol else ""
         shown[name] = with_unit(f"{known}{spread}", parameter.unit)
     shown |= _of_effects(rig)
+    shown |= {name: f"{shown[name]}, another one in each recording" for name in rig.own}
     width = max(map(len, shown), default=0)
     for name, text in shown.items():
         typer.echo(f"{name:<{width}}  {text}")

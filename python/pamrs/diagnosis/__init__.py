@@ -39,6 +39,7 @@ from pamrs.diagnosis.prepare import (
     check_plausible,
     check_sense,
     noted_units,
+    own_of_rig,
     prepare,
     said_of_beginnings,
     said_of_own,
@@ -46,6 +47,7 @@ from pamrs.diagnosis.prepare import (
     suspected_units,
     unjudged_blocks,
     unread_tanks,
+    varying,
     with_own_values,
     with_tanks,
     without_copies,
@@ -60,7 +62,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty
-from pamrs.recordings import Case, load_case
+from pamrs.recordings import Case, Recording, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
@@ -228,6 +230,7 @@ def diagnose(
         case = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
+    case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
     _check_rig(case)
     suspected = [*suspected_units(case), *noted_units(case)]
     chosen = DiagnosisSettings() if settings is None else settings
@@ -259,7 +262,9 @@ def diagnose(
     warnings += diagnosis.warnings
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
-    data = data_used(case.recordings, counts, inner.blocks, case.rig, inner.core, unjudged)
+    data = data_used(
+        _as_found(case, inner, outer), counts, inner.blocks, case.rig, inner.core, unjudged
+    )
     return replace(
         diagnosis,
         faulty=[*dead, *clipped],
@@ -267,6 +272,12 @@ def diagnose(
         data=data,
         seconds=round(time.perf_counter() - began, 3),
     )
+
+
+def _as_found(case: Case, *problems: Problem) -> list[Recording]:
+    """The recordings of a case with the values that were found of each."""
+    found = {p.recording.name: p.recording.parameters for own in problems for p in own.recordings}
+    return [replace(r, parameters=found.get(r.name, r.parameters)) for r in case.recordings]
 
 
 def _physics(
@@ -331,13 +342,13 @@ def _check_rig(case: Case) -> None:
             f"{', '.join(case.channels)}"
         )
 
-    varying = set(core_rig(rig).parameter_names)
+    free = varying(rig, core_rig(rig))
     for recording in case.recordings:
-        fixed = [name for name in recording.parameters if name not in varying]
+        fixed = [name for name in recording.parameters if name not in free]
         if fixed:
             raise DiagnosisError(
                 f"parameters of recording {recording.name!r}: {', '.join(fixed)} cannot differ "
-                f"between recordings of a diagnosis; what can: {', '.join(sorted(varying))}"
+                f"between recordings of a diagnosis; what can: {', '.join(sorted(free))}"
             )
 
 
@@ -448,7 +459,9 @@ def _problems(
     blocks, core = blocks_beside_tanks(rig, channels), core_rig(rig)
     tanks = unread_tanks(rig, channels)
     fitted, held = ([with_tanks(rig, core, p, tanks) for p in part] for part in (fitted, held))
-    fitted, held = ([with_own_values(blocks, core, p) for p in part] for part in (fitted, held))
+    fitted, held = (
+        [with_own_values(blocks, rig, core, p, tanks) for p in part] for part in (fitted, held)
+    )
     judged = {b.name for b in blocks}
     every_block = unjudged_blocks(rig, channels)
     without = [
@@ -494,6 +507,6 @@ def _problems(
     unjudged = [*without, *(Unjudged(b.name, b.covers, why[b.name]) for b in left_out)]
     outer = replace(inner, recordings=held) if held else inner
     begun += said_of_beginnings(inner.blocks, [*inner.recordings, *outer.recordings])
-    begun += said_of_tanks(rig, inner.blocks)
+    begun += said_of_tanks(rig, inner.blocks, inner.recordings)
     begun += said_of_own([*fitted, *held])
     return inner, outer, unjudged, begun

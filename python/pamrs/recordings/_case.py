@@ -385,9 +385,12 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
 
 def _known(rig: Rig, name: str) -> Parameter:
     """A parameter of a rig, or of an effect that it holds."""
+    ids = [entry["id"] for entry in rig.effects]
     for entry in rig.effects:
         full, _, short = name.rpartition(".")
-        if full == qualified(entry["id"], entry.get("at", "")) and short in entry["parameters"]:
+        alone = full == entry["id"] and ids.count(full) == 1
+        here = alone or full == qualified(entry["id"], entry.get("at", ""))
+        if here and short in entry["parameters"]:
             info = find_parameter(f"{entry['id']}.{short}")
             value = float(entry["parameters"][short])
             return Parameter(name, value, info.unit, 0.0, info.lower, info.upper)

@@ -228,12 +228,15 @@ class Recording:
         ParameterError
             If the rig has no such parameter, or it cannot have that value.
         """
+        ids = [entry["id"] for entry in rig.effects]
         for entry in rig.effects:
-            full = qualified(entry["id"], entry.get("at", "")) + "."
+            names = {qualified(entry["id"], entry.get("at", ""))}
+            names |= {entry["id"]} if ids.count(entry["id"]) == 1 else set()
             there = {
-                n.removeprefix(full): own.at(entry["parameters"][n.removeprefix(full)])
+                short: own.at(entry["parameters"][short])
                 for n, own in self.parameters.items()
-                if n.startswith(full)
+                for full, _, short in [n.rpartition(".")]
+                if full in names
             }
             if there:
                 rig = rig.with_effect(

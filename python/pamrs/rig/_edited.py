@@ -164,8 +164,9 @@ class _Editor:
                 continue
             if len(key.where) == 2 and key.where[0] not in place:
                 place[key.where[0]] = tomlkit.inline_table()
-            own = place[key.where[0]] if len(key.where) == 2 else place
-            _set(own, key.where[-1], key, value, tol, old)
+            inner = place[key.where[0]] if len(key.where) == 2 else place
+            own = dotted in self.now.model.get("own", ())
+            _set(inner, key.where[-1], key, (value, own), tol, old)
 
     # ------------------------------------------------------------------- effects
 
@@ -242,8 +243,11 @@ def _put(place: Any, name: str, value: str | None) -> None:
 # ---------------------------------------------------------------------------------- values
 
 
-def _set(place: Any, name: str, key: Key, value: Any, tol: float, old: float) -> None:
-    """One entry: its numbers in the unit that it has, where that loses nothing."""
+def _set(place: Any, name: str, key: Key, given: tuple[Any, bool], tol: float, old: float) -> None:
+    """One entry: its numbers in the unit that it has, where that loses nothing; `given` is the
+    value, and whether each recording has its own.
+    """
+    value, own = given
     entry = place.get(name)
     if isinstance(entry, Mapping):
         unit = str(entry["unit"])
@@ -253,9 +257,10 @@ def _set(place: Any, name: str, key: Key, value: Any, tol: float, old: float) ->
         elif _told_by(tol) == _told_by(old):
             _in_place(cast(Any, entry), key, value, numbers, tol != old)
             return
-        place[name] = tomlkit.value(entry_text(key._replace(unit=unit, path=()), *numbers))
+        text = entry_text(key._replace(unit=unit, path=()), *numbers, own=own)
+        place[name] = tomlkit.value(text)
         return
-    place[name] = tomlkit.value(entry_text(key, value, tol))
+    place[name] = tomlkit.value(entry_text(key, value, tol, own=own))
 
 
 def _told_by(tol: float) -> str:

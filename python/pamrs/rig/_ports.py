@@ -345,6 +345,11 @@ class _Connector:
                     f"{label}.inlet_volume = {table['inlet_volume']:g} m3 is not allowed: {label} "
                     f"begins at {start}, and only an inlet that valves feed has a volume of its own"
                 )
+            if start is not None and table.get("pressure_zero"):
+                self.problems.append(
+                    f"{label}.pressure_zero = {table['pressure_zero']:g} Pa is not allowed: "
+                    f"{label} begins at {start}, and only an inlet that valves feed has a gauge"
+                )
 
     def two_ends(self, block: str, name: str, start: str | None, end: str | None) -> None:
         """Note a valve or line that leads back to where it begins."""

@@ -36,7 +36,8 @@ from pamrs.units import to_si, with_unit
 __all__ = ["Content", "Reader", "read_model"]
 
 _TOP = ("schema", "name", "description", "case", "limits", "effects", "model_error")
-_QUANTITY = ("value", "unit", "tol", "unknown")
+_QUANTITY = ("value", "unit", "tol", "unknown", "error")
+_OWN = "own"
 _NAME = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -94,6 +95,7 @@ class Reader:
         self.tolerances: dict[str, float] = {}
         self.effect_std: dict[str, dict[str, float]] = {}
         self.ports: dict[str, dict[str, str]] = {}
+        self.own: list[str] = []
         self.whole = True  # every block could be told: what is connected to what can be checked
 
     def problem(self, text: str) -> None:
@@ -135,9 +137,12 @@ class Reader:
         self.sensors(model, document.get("sensors"))
         model["ports"] = self.ports
         model["effects"] = self.effects(document.get("effects", []))
+        model |= {"own": self.own} if self.own else {}
         model["model_error"] = read_model_error(self, document.get("model_error"), model)
         if self.whole:
-            self.problems += connect(model)[1]
+            ports, problems = connect(model)
+            self.problems += problems
+            self.gauges(model, ports, document)
         self.problems += block_problems(model)
         return Content(name, model, self.tolerances, self.effect_std)
 
@@ -277,6 +282,24 @@ class Reader:
                             f"sensors.{name}.{key} is not allowed: the rig has no {what}.{name}"
                         )
 
+    def gauges(
+        self, model: dict[str, Any], ports: Mapping[str, Any], document: Mapping[str, Any]
+    ) -> None:
+        """Zeros of the gauges at supplies and at inlets of lines that a file leaves out are known
+        as well as those of its chambers.
+        """
+        stated = [
+            self.tolerances.get(f"{qualified('sensors', name)}.pressure_zero", 0.0)
+            for name in tables_of(model, "sensors")
+        ]
+        tol = max((known for known in stated if math.isfinite(known)), default=0.0)
+        for block in ("supply", "line"):
+            for name in tables_of(model, block):
+                given = document[block][name] if name else document[block]
+                inlet = block == "supply" or ports["line"][name].get("from") == ""
+                if inlet and tol and "pressure_zero" not in given:
+                    self.tolerances[f"{qualified(block, name)}.pressure_zero"] = tol
+
     def _length_zero(self, model: dict[str, Any], raw: Any) -> None:
         """The zero of the length is that of a mass that moves, and a rig has one: sensors without a
         name have it.
@@ -329,7 +352,7 @@ class Reader:
         if value is None:
             return None
         if whole:
-            for word in ("tol", "unknown"):
+            for word in ("tol", "unknown", "error"):
                 if extra.get(word):
                     self.problem(f"{label}.{word} is not allowed: a count is known")
             return int(value)
@@ -407,7 +430,11 @@ class Reader:
         return known if len(known) == len(values) else None
 
     def spread(self, name: str, label: str, key: Key, unit: str, extra: Mapping[str, Any]) -> None:
-        """Keep what is known of a value: ``tol``, or ``unknown = true``."""
+        """Keep what is known of a value: ``tol``, ``unknown = true``, or ``error = "own"``."""
+        if "error" in extra:
+            self.of_each_recording(name, label, extra)
+            if key.kind == "vector":
+                self.problem(f"{label}.error is not allowed: a list is the same in each recording")
         unknown = extra.get("unknown", False)
         if not isinstance(unknown, bool):
             self.problem(f"{label}.unknown = {_shown(unknown)} is not allowed: true or false")
@@ -422,6 +449,18 @@ class Reader:
             )
             if tol:
                 self.tolerances[name] = tol
+
+    def of_each_recording(self, name: str, label: str, extra: Mapping[str, Any]) -> None:
+        """Keep that a value is another one in each recording, which nobody knows."""
+        if extra["error"] != _OWN:
+            self.problem(
+                f"{label}.error = {_shown(extra['error'])} is not allowed: {_OWN!r}, another value "
+                "in each recording; what a recording says itself stands in case.toml"
+            )
+        for word in ("tol", "unknown", "std"):
+            if word in extra:
+                self.problem(f"{label}: {word} and error = {_OWN!r} exclude each other")
+        self.own.append(name)
 
     # ------------------------------------------------------------------- effects
 
@@ -507,7 +546,9 @@ class Reader:
                 f"{parameter.unit!r} }}"
             )
             return None
-        self.unknown_keys(f"{label}.", raw, ("value", "unit", "std"))
+        self.unknown_keys(f"{label}.", raw, ("value", "unit", "std", "error"))
+        if "error" in raw:
+            self.of_each_recording(f"{qualified(identity, place)}.{parameter.name}", label, raw)
         unit = raw.get("unit")
         if "value" not in raw or not isinstance(unit, str):
             self.problem(f"{label}: value and unit (like {parameter.unit!r}) are needed")

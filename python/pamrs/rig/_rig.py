@@ -230,6 +230,13 @@ class Rig:
         return found
 
     @property
+    def own(self) -> tuple[str, ...]:
+        """Dotted names of the parameters, those of effects included, that have another value in
+        each recording, which nobody knows: ``error = "own"`` in the file.
+        """
+        return tuple(self._model.get("own", ()))
+
+    @property
     def blocks(self) -> tuple[str, ...]:
         """The kinds of block that this rig has."""
         return tuple(block for block in BLOCKS if tables_of(self._model, block))
@@ -494,8 +501,11 @@ class Rig:
         entries = without(self._model["effects"], effect, at)
         if len(entries) == len(self._model["effects"]):
             return self
-        model = {**self._model, "effects": entries}
         left = {full_name(entry) for entry in entries}
+        gone = {full_name(entry) for entry in self._model["effects"]} - left
+        model = {**self._model, "effects": entries}
+        if self.own:
+            model["own"] = [n for n in self.own if n.rpartition(".")[0] not in gone]
         kept = {name: std for name, std in self._effect_std.items() if name in left}
         return Rig(self.name, model, self._tolerances, kept, self.source, self._text)
 

@@ -35,6 +35,7 @@ __all__ = [
     "toml_text",
 ]
 
+_OWN: Final = ', error = "own"'
 _MOUNTING: Final = ("base_angle", "centre_angle")
 
 # ---------------------------------------------------------------------------------- TOML
@@ -88,9 +89,11 @@ def effect_lines(content: Content, effect: Mapping[str, Any]) -> list[str]:
         "[effects.parameters]",
     ]
     units = _effect_units(effect["id"], effect.get("form", ""))
-    spread = content.effect_std.get(qualified(effect["id"], place), {})
+    full = qualified(effect["id"], place)
+    spread = content.effect_std.get(full, {})
     for name, value in effect["parameters"].items():
         std = f", std = {_number(spread[name])}" if name in spread else ""
+        std += _OWN if f"{full}.{name}" in content.model.get("own", ()) else ""
         lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
     return lines
 
@@ -108,7 +111,9 @@ def block_lines(content: Content, block: str, name: str, table: Mapping[str, Any
     for key in keys_of(block, table):
         if key.name not in table:
             continue
-        entry = entry_text(key, table[key.name], content.tolerances.get(f"{label}.{key.name}", 0.0))
+        dotted = f"{label}.{key.name}"
+        own = dotted in content.model.get("own", ())
+        entry = entry_text(key, table[key.name], content.tolerances.get(dotted, 0.0), own=own)
         if len(key.where) == 1:
             yield f"{key.name} = {entry}"
         else:
@@ -116,8 +121,8 @@ def block_lines(content: Content, block: str, name: str, table: Mapping[str, Any
     yield from (f"{group} = {{ {', '.join(members)} }}" for group, members in groups.items())
 
 
-def entry_text(key: Key, value: Any, tol: float) -> str:
-    """The value of one key, with its unit and tolerance."""
+def entry_text(key: Key, value: Any, tol: float, *, own: bool = False) -> str:
+    """The value of one key, with its unit and tolerance, or that each recording has its own."""
     if key.kind == "choice":
         return _text(value)
     if key.kind == "count":
@@ -129,6 +134,7 @@ def entry_text(key: Key, value: Any, tol: float) -> str:
     note = (
         "" if tol == 0.0 else (", unknown = true" if math.isinf(tol) else f", tol = {_number(tol)}")
     )
+    note += _OWN if own else ""
     if key.kind == "vector":
         return f"{{ value = {numbers}, unit = {_text(key.unit)}{note} }}"
     if key.path and not note:
@@ -174,7 +180,7 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
         "name": model["name"],
         "gas": model["gas"],
         "supplies": [
-            {"name": name, **ports["supply"][name], **table}
+            {"name": name, **ports["supply"][name], **_gauged(table)}
             for name, table in tables_of(model, "supply").items()
         ],
         "valves": [
@@ -222,9 +228,14 @@ def core_json(model: Mapping[str, Any], ports: Ports) -> str:
 
 def _line(name: str, table: Mapping[str, Any], ports: Ports) -> dict[str, Any]:
     usual = () if table.get("segments") else ("segments",)  # none: the core need not be told
-    values = {key: value for key, value in table.items() if key not in ("kind", *usual)}
+    values = {k: value for k, value in _gauged(table).items() if k not in ("kind", *usual)}
     ends = ports["line"][name]
     return {"name": name, "kind": table["kind"], "from": ends["from"], "to": ends["to"], **values}
+
+
+def _gauged(table: Mapping[str, Any]) -> dict[str, Any]:
+    """A supply or a line; the core takes the zero of its gauge as none where it is not told."""
+    return {key: value for key, value in table.items() if key != "pressure_zero" or value != 0.0}
 
 
 def _chamber(table: Mapping[str, Any]) -> dict[str, Any]:

@@ -153,6 +153,16 @@ _GEOMETRY: Final = (
     Key("rest_angle", "rad", -_TURN, _TURN, note="where the muscle is at rest length"),
 )
 
+#: Of the gauge at a supply or at the inlet of a line: those of chambers stand in [sensors].
+_GAUGE_ZERO: Final = Key(
+    "pressure_zero",
+    "Pa",
+    -1e6,
+    1e6,
+    0.0,
+    note="what its gauge reads too much; known as well as those of the chambers where left out",
+)
+
 #: What the bench allows, for experiments that are proposed: the core knows nothing of it.
 LIMITS: Final = (
     Key("max_pressure", "Pa", 0.0, 1e8, note="gauge, of muscle and chamber"),
@@ -215,6 +225,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             only=("regulator",),
             note="error of the outlet pressure that it does nothing about",
         ),
+        _GAUGE_ZERO,
     ),
     "valve": (
         Key(
@@ -308,6 +319,7 @@ BLOCKS: Final[dict[str, tuple[Key, ...]]] = {
             0.0,
             note="at its inlet where valves feed it, besides half of the tube's own",
         ),
+        _GAUGE_ZERO,
         Key(
             "segments",
             "1",

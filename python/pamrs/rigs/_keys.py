@@ -12,7 +12,8 @@ __all__ = ["every_key"]
 _INTRODUCTION = """\
 Every key that a rig file may have. Each number is { value, unit }, any unit \
 of the right dimension; with tol (one standard
-deviation of what you know) it may move in a diagnosis or a fit, with unknown = true it is sought. \
+deviation of what you know) it may move in a diagnosis or a fit, with unknown = true it is sought, \
+with error = "own" it is another one in each recording. \
 Pressures are gauge.
 A block that is left out is not there: only [gas] and [chamber] are needed.
 

@@ -361,10 +361,13 @@ def switching_valves(rig: Rig) -> list[str]:
     return [name for name, table in rig.tables("valve").items() if table["spool"] == "switching"]
 
 
-def sensor_zero(rig: Rig, key: str, block: str) -> float:
-    """Zero (``pressure_zero``, ``angle_zero``) of a block's sensor: its own, or the common one."""
-    sensors = rig.tables("sensors")
-    return float(sensors.get(block, sensors.get("", {})).get(key, 0.0))
+def sensor_zero(rig: Rig, kind: str, key: str, block: str) -> float:
+    """Zero (``pressure_zero``, ``angle_zero``) of the sensor of a block of a kind: its own, or the
+    common one; supplies and lines have theirs themselves.
+    """
+    own = kind if kind in ("supply", "line") else "sensors"
+    tables = rig.tables(own)
+    return float(tables.get(block, tables.get("", {})).get(key, 0.0))
 
 
 def _named(

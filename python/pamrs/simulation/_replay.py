@@ -26,8 +26,8 @@ Array = NDArray[np.float64]
 #: zero of its sensor.
 _STATES = {
     "muscle_pressure": ("chamber", "pressure_zero"),
-    "supply_pressure": ("supply", ""),
-    "line_pressure": ("line", ""),
+    "supply_pressure": ("supply", "pressure_zero"),
+    "line_pressure": ("line", "pressure_zero"),
     "joint_angle": ("joint", "angle_zero"),
     "length": ("load", "length_zero"),
 }
@@ -256,6 +256,5 @@ def _held(recording: Recording, name: str) -> Array:
 
 
 def _zero(rig: Rig, channel: str, name: str) -> float:
-    """Zero of the sensor of a block's channel; none where its sensor has none."""
-    key = _STATES[channel][1]
-    return sensor_zero(rig, key, name) if key else 0.0
+    """Zero of the sensor of a block's channel."""
+    return sensor_zero(rig, *_STATES[channel], name)

@@ -369,7 +369,7 @@ class Simulation(Mapping[str, Array]):
         gas = self.rig.tables("gas")[""]
         total = self._implied_in_lines(gas["gas_constant"] * gas["temperature"])
         for name, volume in self.under("air_volume").items():
-            zero = sensor_zero(self.rig, "pressure_zero", name)
+            zero = sensor_zero(self.rig, "chamber", "pressure_zero", name)
             absolute = (
                 self._channels[dotted("muscle_pressure", name)] - zero + gas["ambient_pressure"]
             )

@@ -272,7 +272,7 @@ pub(super) fn rest_length(rig: &Rig) -> Option<f64> {
 pub(super) fn zero<S: Scalar>(plant: &Plant<'_, S>, place: usize) -> S {
     let (rig, layout) = (plant.rig(), plant.rig().layout());
     let id = if place < layout.supplies {
-        None
+        Some(rig.wiring.supply_zeros[place])
     } else if place < layout.mass(0) {
         rig.wiring.gases[place - layout.supplies].pressure_zero
     } else {

@@ -48,6 +48,9 @@ pub struct SupplySpec {
     pub fall_limit: f64,
     #[serde(default)]
     pub dead_band: f64,
+    /// What its gauge reads too much.
+    #[serde(default)]
+    pub pressure_zero: f64,
     /// The supply in front of a regulator, empty where nothing limits it.
     #[serde(default)]
     pub inlet: Port,
@@ -189,6 +192,9 @@ pub struct LineSpec {
     pub discharge_area: f64,
     #[serde(default)]
     pub inlet_volume: f64,
+    /// What the gauge at its inlet reads too much.
+    #[serde(default)]
+    pub pressure_zero: f64,
     #[serde(default)]
     pub segments: usize,
     #[serde(default = "one")]
@@ -382,7 +388,7 @@ impl LoadSpec {
 }
 
 /// Constant sensor errors: measured = true + zero; of the chamber or joint of its name, of all (and
-/// of a load) without a name.
+/// of a load) without a name. Supplies and inlets of lines have those of their gauges themselves.
 #[allow(missing_docs)]
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]

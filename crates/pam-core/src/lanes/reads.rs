@@ -139,7 +139,9 @@ fn read(rig: &Rig, plants: &[&Plant<'_, f64>], channel: usize) -> Read {
     let angle_zero =
         |k: usize, p: &Plant<'_, f64>| wiring.coordinates[k].zero.map_or(0.0, |id| p.values[id]);
     match rig.names().channels[channel].1 {
-        Channel::Supply(k) => state(layout.supply(k), 1.0, &|_| -ambient),
+        Channel::Supply(k) => {
+            state(layout.supply(k), 1.0, &|p| p.values[wiring.supply_zeros[k]] - ambient)
+        }
         Channel::Pressure(k) => state(layout.pressure(k), 1.0, &|p| {
             wiring.gases[k].pressure_zero.map_or(0.0, |id| p.values[id]) - ambient
         }),

@@ -697,7 +697,9 @@ impl Plant<'_, f64> {
         let zero = |id: Option<super::ParameterId>| id.map_or(0.0, |id| self.values[id]);
         for ((_, channel), out) in self.rig.names.channels.iter().zip(out) {
             out.push(match *channel {
-                Channel::Supply(k) => state[layout.supply(k)] - ambient,
+                Channel::Supply(k) => {
+                    state[layout.supply(k)] - ambient + self.values[wiring.supply_zeros[k]]
+                }
                 Channel::Pressure(k) => {
                     state[self.reading(k)] - ambient
                         + zero(wiring.gases[k].pressure_zero)

@@ -218,6 +218,8 @@ pub(crate) enum BodyUnit {
 #[derive(Debug, Clone)]
 pub(crate) struct Wiring {
     pub supplies: Vec<SupplyUnit>,
+    /// What the gauge of each reads too much.
+    pub supply_zeros: Vec<ParameterId>,
     pub gases: Vec<GasUnit>,
     /// The first `chambers` of `gases` are chambers, the next ones inlets of lines, the rest lies
     /// inside tubes.

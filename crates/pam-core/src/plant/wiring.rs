@@ -1,7 +1,7 @@
 //! How the air and the effects of a description fit together: ports become indices, numbers become
 //! parameters.
 
-use super::parameters::{ParameterId, Parameters};
+use super::parameters::{Bounds, ParameterId, Parameters};
 use super::ports::{switch_on, Ports as EffectPorts};
 use super::units::{
     Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit,
@@ -88,6 +88,7 @@ impl Wiring {
         let ports = Ports::new(spec);
         let mut table = Parameters::default();
         let supplies = supplies(spec, &ports, &mut table)?;
+        let supply_zeros = supply_zeros(spec, &mut table)?;
         let valves = valves(spec, &ports, &mut table)?;
         let (lines, inlets) = lines(spec, &ports, &valves, &mut table)?;
         let waves = waves(spec, &lines, inlets.len(), &mut table)?;
@@ -116,6 +117,7 @@ impl Wiring {
         let mut wiring = Self {
             chambers: spec.chambers.len(),
             supplies,
+            supply_zeros,
             gases,
             inlets,
             waves,
@@ -212,6 +214,17 @@ fn supplies(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result
         })
     };
     spec.supplies.iter().map(&mut unit).collect()
+}
+
+/// Bounds of what a gauge reads too much.
+const ZERO: Bounds = (-1e7, 1e7, "Pa");
+
+fn supply_zeros(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<ParameterId>> {
+    let mut zero = |supply: &SupplySpec| {
+        let name = format!("{}.pressure_zero", dotted("supply", &supply.name));
+        table.add(name, supply.pressure_zero, ZERO)
+    };
+    spec.supplies.iter().map(&mut zero).collect()
 }
 
 fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<Vec<ValveUnit>> {
@@ -395,11 +408,13 @@ fn gases(
     }
     for (k, end) in inlets {
         let line = &spec.lines[*k];
-        let name = format!("{}.inlet_volume", dotted("line", &line.name));
-        let volume = table.add(name, line.inlet_volume, (0.0, 1e3, "m3"))?;
+        let name = |key: &str| format!("{}.{key}", dotted("line", &line.name));
+        let volume = table.add(name("inlet_volume"), line.inlet_volume, (0.0, 1e3, "m3"))?;
+        let zero = table.add(name("pressure_zero"), line.pressure_zero, ZERO)?;
         let wave = waves.iter().find(|wave| wave.line == *k);
         let law = wave.map_or(GasLaw::Isothermal, |wave| GasLaw::Alike(wave.alpha));
-        units.push(plain(Some(volume), law, begins(*end)));
+        let inlet = plain(Some(volume), law, begins(*end));
+        units.push(GasUnit { pressure_zero: Some(zero), ..inlet });
     }
     for wave in waves {
         let gas = plain(None, GasLaw::Alike(wave.alpha), begins(lines[wave.line].to));
@@ -411,7 +426,7 @@ fn gases(
 fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Result<()> {
     for sensor in &spec.sensors {
         let name = |key: &str| format!("{}.{key}", dotted("sensors", &sensor.name));
-        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero, (-1e7, 1e7, "Pa"))?;
+        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero, ZERO)?;
         table.add(name("angle_zero"), sensor.angle_zero, (-7.0, 7.0, "rad"))?;
         if spec.load.is_some() && sensor.name.is_empty() {
             table.add(name("length_zero"), sensor.length_zero, (-10.0, 10.0, "m"))?;

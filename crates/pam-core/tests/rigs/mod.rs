@@ -124,6 +124,7 @@ pub fn fitting(id: &str, mut spec: RigSpec) -> RigSpec {
                 diameter: 0.0,
                 discharge_area: 5e-7,
                 inlet_volume: 0.0,
+                pressure_zero: 0.0,
                 segments: 0,
                 alpha: 1.0,
             });

@@ -11,8 +11,8 @@ Public: `at_ambient`, `AMBIENT` (a measured ambient temperature), `averaged`, `a
 `available_blocks`, `Unjudged`, `unjudged_blocks` (blocks that the channels do not tell), `begun`,
 `change`, `predicted`, `residual` (blocks and their residuals), `begun_alike`, `said_of_beginnings`
 (beginnings that nobody measured), `blocks_beside_tanks`, `unread_tanks`, `with_tanks`,
-`said_of_tanks` (tanks without a gauge, which are simulated), `with_own_values`, `said_of_own`
-(values that are free in each recording).
+`said_of_tanks` (tanks without a gauge, which are simulated), `own_of_rig`, `varying`,
+`with_own_values`, `said_of_own` (values that are free in each recording).
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from pamrs.diagnosis.prepare._blocks import (
     unjudged_blocks,
 )
 from pamrs.diagnosis.prepare._overlap import Overlap, overlap, without_copies
-from pamrs.diagnosis.prepare._own import said_of_own, with_own_values
+from pamrs.diagnosis.prepare._own import own_of_rig, said_of_own, varying, with_own_values
 from pamrs.diagnosis.prepare._plausible import (
     check_plausible,
     check_sense,
@@ -82,6 +82,7 @@ __all__ = [
     "noise_level",
     "noted_units",
     "overlap",
+    "own_of_rig",
     "predicted",
     "prepare",
     "residual",
@@ -93,6 +94,7 @@ __all__ = [
     "thermometers_of",
     "unjudged_blocks",
     "unread_tanks",
+    "varying",
     "warm_chambers",
     "without_copies",
     "without_dead_commands",

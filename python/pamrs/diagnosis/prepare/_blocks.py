@@ -336,14 +336,22 @@ class _Map:
         own = self.rig.tables("sensors")
         return f"sensors.{name}.{key}" if name and name in own else f"sensors.{key}"
 
-    def zeros(self, chambers: Iterable[str], joints: Iterable[str]) -> set[str]:
-        """Those of the sensors of some chambers and joints."""
+    def zeros(self, nodes: Iterable[str], joints: Iterable[str]) -> set[str]:
+        """Those of the gauges that are read at chambers, supplies and inlets of lines, by their
+        full names, and of the sensors of some joints.
+        """
         moving = (
             {"sensors.length_zero"}
             if self.rig.model["load"]
             else {self.zero("angle_zero", j) for j in joints}
         )
-        return {self.zero("pressure_zero", c) for c in chambers} | moving
+        read = [node.partition(".") for node in nodes if self.pressure(node) in self.has]
+        return moving | {
+            self.zero("pressure_zero", name)
+            if kind == "chamber"
+            else f"{qualified(kind, name)}.pressure_zero"
+            for kind, _, name in read
+        }
 
     def of_ways(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
@@ -375,10 +383,19 @@ class _Map:
             found.append(Tube(name, beginning, end, table["length"] / sound))
         return tuple(found)
 
-    def chambers_at(self, block: str) -> set[str]:
-        """Names of the chambers that a block's ways lead to, its own included."""
-        ends = {block, *(end for way in self.around(block) for end in way.ends)}
-        return {end.partition(".")[2] for end in ends if end.partition(".")[0] == "chamber"}
+    def nodes_at(self, block: str) -> set[str]:
+        """Chambers, supplies and inlets of lines at which a block is cut, by their full names:
+        itself, where its ways lead, and what feeds a regulator that it simulates.
+        """
+        ends = {block, *(end for way in self.around(block) for end in way.ends)} - {"ambient"}
+        simulated = [e for e in ends if e == block or self._unread(e, "regulator")]
+        supplies = self.rig.ports("supply")
+        inlets = [
+            supplies.get(e.partition(".")[2], {}).get("inlet", "")
+            for e in simulated
+            if e.partition(".")[0] == "supply"
+        ]
+        return ends | {inlet for inlet in inlets if inlet}
 
     def lacking(self, name: str, covers: str, needed: Iterable[str]) -> Unjudged | None:
         """That a block is not judged without channels that it needs; None where all are there."""
@@ -426,7 +443,7 @@ class _Map:
             f"{node}.{key}" for node in (full, *(nodes[1:] if unread else ())) for key in _SUPPLY
         }
         for node in nodes:
-            names |= self.of_ways(node) | self.zeros(self.chambers_at(node), ())
+            names |= self.of_ways(node) | self.zeros(self.nodes_at(node), ())
         return Block(
             full,
             self.pressure(full),
@@ -474,7 +491,7 @@ class _Map:
             self.of_ways(full)
             | {f"{full}.{key}" for key in _CHAMBER}
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
-            | self.zeros(self.chambers_at(full), joints or [""])
+            | self.zeros(self.nodes_at(full), joints or [""])
         )
         step = _GAS_STEP if fed else _SEALED_STEP
         window = _CHAMBER_WINDOW if fed else None
@@ -537,7 +554,7 @@ class _Map:
         names = (
             self.of_ways(full)
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
-            | self.zeros(self.chambers_at(full), ())
+            | self.zeros(self.nodes_at(full), ())
         )
         return Block(
             full,
@@ -570,7 +587,9 @@ class _Map:
         names |= {
             f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK
         }
-        names |= self.zeros(self.pulling.values(), self.rig.tables("joint"))
+        names |= self.zeros(
+            (qualified("chamber", c) for c in self.pulling.values()), self.rig.tables("joint")
+        )
         return Block(
             name,
             dotted("joint_angle", joint),
@@ -592,7 +611,7 @@ class _Map:
         names = {f"load.{key}" for key in _LOAD} | {
             f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
         }
-        names |= self.zeros(self.pulling.values(), ())
+        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), ())
         return Block("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
 
     def pull(self, joint: str) -> Block | None:
@@ -606,7 +625,7 @@ class _Map:
         if not pulling or not {channel, *drives, *self.angles} <= self.has:
             return None
         names = {f"{qualified('muscle', m)}.{key}" for m in pulling for key in _MUSCLE}
-        names |= self.zeros([self.pulling[m] for m in pulling], [joint])
+        names |= self.zeros([qualified("chamber", self.pulling[m]) for m in pulling], [joint])
         return Block(
             "force" if loaded else qualified("torque", joint),
             channel,
@@ -786,7 +805,7 @@ def _there(core: _core.Rig, prepared: Prepared) -> _core.Rig:
     if not own:
         return core
     known = dict(zip(core.parameter_names, core.values.tolist(), strict=True))
-    there = core.revalued({name: value.at(known[name]) for name, value in own.items()})
+    there = core.revalued({n: value.at(known[n]) for n, value in own.items() if n in known})
     if there is None:
         raise AssertionError("values of a recording are those of parameters that can vary")
     return there

@@ -1,5 +1,5 @@
 """Values that each recording has of its own and that nobody knows: a discharge coefficient of each
-nozzle, a leak's rate of each day.
+nozzle, a leak's rate of each day, the pressure at which a tank began.
 """
 
 from __future__ import annotations
@@ -13,22 +13,82 @@ from numpy.typing import NDArray
 from pamrs import _core
 from pamrs.diagnosis.prepare._blocks import Block, residual
 from pamrs.diagnosis.prepare._signals import Prepared
+from pamrs.diagnosis.prepare._unread import begins_at, with_tanks
 from pamrs.errors import SimulationError
+from pamrs.recordings import OwnValue, Recording
 from pamrs.report.text import format_number
+from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
 
-__all__ = ["said_of_own", "with_own_values"]
+__all__ = ["own_of_rig", "said_of_own", "varying", "with_own_values"]
 
 # steps to find a recording's own value, each at most a factor 3: 3 orders and a few to settle
 _OWN_STEPS = 12
 _OWN_APART = 1.5  # ratio of such values between recordings from which it is said
-
+_SHAKEN = 1e-3  # share by which a pressure is moved for the slope of what begins at it
+_BEGINS = "initial_pressure"
 
 Array = NDArray[np.float64]
 
 
-def with_own_values(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> Prepared:
+def varying(rig: Rig, core: _core.Rig) -> set[str]:
+    """Dotted names of parameters that may have another value in each recording; pressures at which
+    a recording begins are among them.
+    """
+    begin = (f"{qualified(k, n)}.{_BEGINS}" for k in ("supply", "chamber") for n in rig.tables(k))
+    return {*core.parameter_names, *begin}
+
+
+def own_of_rig(rig: Rig, recordings: Sequence[Recording]) -> list[Recording]:
+    """Recordings with the values that the rig file leaves to each of them, where they do not say
+    them, all under the names that the core has.
+
+    Parameters
+    ----------
+    rig : Rig
+        The nominal model.
+    recordings : sequence of Recording
+        As they were read.
+    """
+    nominal = {name: _nominal(rig, name) for name in rig.own}
+    left = {_core_name(rig, n): OwnValue(value, value, "own") for n, value in nominal.items()}
+    return [
+        replace(r, parameters=left | {_core_name(rig, n): v for n, v in r.parameters.items()})
+        if left or r.parameters
+        else r
+        for r in recordings
+    ]
+
+
+def _core_name(rig: Rig, name: str) -> str:
+    """A parameter as the core has it: of an effect that is the only one of its id, without the
+    block at which it acts.
+    """
+    full, _, short = name.rpartition(".")
+    ids = [entry["id"] for entry in rig.effects]
+    found = (e["id"] for e in rig.effects if full == qualified(e["id"], e.get("at", "")))
+    alone = next((effect for effect in found if ids.count(effect) == 1), None)
+    return name if alone is None else f"{alone}.{short}"
+
+
+def _nominal(rig: Rig, name: str) -> float:
+    """What the rig file says of one of its parameters, or of one of its effects."""
+    full, _, short = name.rpartition(".")
+    for entry in rig.effects:
+        if full == qualified(entry["id"], entry.get("at", "")):
+            return float(entry["parameters"][short])
+    return rig.parameter(name).value
+
+
+def with_own_values(
+    blocks: Sequence[Block],
+    rig: Rig,
+    core: _core.Rig,
+    prepared: Prepared,
+    tanks: Sequence[str],
+) -> Prepared:
     """A recording with the values of its own that fit it best, beside the nominal ones of all
-    others; around them they stay free.
+    others; around them they stay free, a tank's by its level.
 
     Steps of Gauss and Newton on the blocks that depend on them, each kept where it leaves less.
 
@@ -36,34 +96,58 @@ def with_own_values(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
     ----------
     blocks : sequence of Block
         Those that can be judged.
+    rig : Rig
+        The nominal model.
     core : _core.Rig
-        The nominal model, compiled.
+        The same, compiled.
     prepared : Prepared
         The recording.
+    tanks : sequence of str
+        Channels of tanks without a gauge.
     """
     own = {n: v for n, v in prepared.recording.parameters.items() if v.error == "own"}
-    names = [name for name in own if name in core.parameter_names]
-    if not names:
+    begun = {begins_at(tank): tank for tank in tanks if begins_at(tank) in own}
+    free = [name for name in own if name in core.parameter_names]
+    every = [*free, *begun]
+    if not every:
         return prepared
+    seen = [
+        replace(b, floating=tuple(tank for tank in b.floating if tank not in begun.values()))
+        for b in blocks
+    ]
 
     def at(values: Array) -> Prepared:
-        put = {n: replace(own[n], value=float(v)) for n, v in zip(names, values, strict=True)}
+        put = {n: replace(own[n], value=float(v)) for n, v in zip(every, values, strict=True)}
         parameters = prepared.recording.parameters | put
-        return replace(prepared, recording=replace(prepared.recording, parameters=parameters))
+        there = replace(prepared, recording=replace(prepared.recording, parameters=parameters))
+        return with_tanks(rig, core, there, tanks)
 
-    def left(there: Prepared) -> tuple[float, Array, Array]:
+    def rows_at(values: Array, names: list[str]) -> tuple[Array, Array]:
+        there = at(values)
         fixed = {
             n: replace(v, error="same") if n in own else v
             for n, v in there.recording.parameters.items()
         }
         told = replace(there, recording=replace(there.recording, parameters=fixed))
-        found = [residual(block, core, told, names) for block in blocks]
+        found = [residual(block, core, told, names) for block in seen]
+        slopes = [r.jacobian / r.noise for r in found if r.jacobian is not None]
         rows = np.concatenate([r.value / r.noise for r in found])
-        slopes = np.concatenate([r.jacobian / r.noise for r in found if r.jacobian is not None])
-        return float(rows @ rows), rows, slopes
+        return rows, np.concatenate(slopes) if slopes else np.zeros((rows.size, 0))
 
-    values = np.array([own[name].value for name in names])
-    best, (size, rows, slopes) = at(values), left(at(values))
+    def left(values: Array) -> tuple[float, Array, Array]:
+        rows, slopes = rows_at(values, free)
+        moved = []
+        for k in range(len(free), values.size):
+            step = _SHAKEN * max(abs(values[k]), 1e5)
+            shaken = rows_at(values + step * (np.arange(values.size) == k), [])[0]
+            moved.append((rows - shaken) / step)
+        return float(rows @ rows), rows, np.column_stack([slopes, *moved])
+
+    values = np.array([own[name].value for name in every])
+    try:
+        size, rows, slopes = left(values)
+    except SimulationError:
+        return prepared  # the fit says what cannot be predicted
     for _ in range(_OWN_STEPS):
         scale = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
         step = np.linalg.lstsq(slopes / scale, rows, rcond=1e-9)[0] / scale
@@ -71,26 +155,30 @@ def with_own_values(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared
         wanted = values + step
         wanted = np.where(values > 0.0, np.clip(wanted, values / 3.0, values * 3.0), wanted)
         try:
-            now, more_rows, more_slopes = left(at(wanted))
+            now, more_rows, more_slopes = left(wanted)
         except SimulationError:
             break
         if not now < size:
             break
         done = size - now < 1e-3 * size
-        values, best, size, rows, slopes = wanted, at(wanted), now, more_rows, more_slopes
+        values, size, rows, slopes = wanted, now, more_rows, more_slopes
         if done:
             break
-    return best
+    return at(values)
 
 
 def said_of_own(recordings: Sequence[Prepared]) -> list[str]:
     """Values that recordings have of their own, in words, and how far they are from each other."""
     found: dict[str, dict[str, float]] = {}
+    said = []
+    simulated = {begins_at(tank) for p in recordings for tank in p.simulated}
     for name, recording in {p.recording.name: p.recording for p in recordings}.items():
         for parameter, own in recording.parameters.items():
             if own.error == "own":
                 found.setdefault(parameter, {})[name] = own.value
-    said = []
+    for parameter in [n for n in found if n.endswith(f".{_BEGINS}") and n not in simulated]:
+        said.append(f"{parameter}: its gauge says where each recording begins")
+        del found[parameter]
     for parameter, values in found.items():
         low, high = min(values.values()), max(values.values())
         told = ", ".join(f"{format_number(v, unicode=False)} in {n}" for n, v in values.items())

@@ -18,6 +18,11 @@ from pamrs.rig.schema import qualified
 __all__ = ["blocks_beside_tanks", "said_of_tanks", "unread_tanks", "with_tanks"]
 
 
+def begins_at(gauge: str) -> str:
+    """Dotted name of the pressure at which the supply of a gauge begins."""
+    return f"{qualified('supply', gauge.partition('.')[2])}.initial_pressure"
+
+
 def unread_tanks(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Channels of tanks that nobody measured and whose pressure can be simulated, since what they
     feed and what is commanded there is recorded.
@@ -41,8 +46,13 @@ def blocks_beside_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
     simulated pressure of a tank included, the tank itself not.
     """
     tanks = unread_tanks(rig, channels)
+    no_gauge = {f"{qualified('supply', t.partition('.')[2])}.pressure_zero" for t in tanks}
     return [
-        replace(block, floating=tuple(name for name in block.drives if name in tanks))
+        replace(
+            block,
+            floating=tuple(name for name in block.drives if name in tanks),
+            parameters=block.parameters - no_gauge,
+        )
         for block in available_blocks(rig, (*channels, *tanks))
         if block.channel not in tanks
     ]
@@ -50,7 +60,7 @@ def blocks_beside_tanks(rig: Rig, channels: tuple[str, ...]) -> list[Block]:
 
 def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[str]) -> Prepared:
     """A recording with the simulated pressures of its tanks without a gauge: from the pressure of
-    the rig file, under what the recording draws from them.
+    the rig file, or of the recording where it has one of its own, under what it draws from them.
 
     Parameters
     ----------
@@ -67,15 +77,15 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
     for tank in tanks:
         name = tank.partition(".")[2]
         full = qualified("supply", name)
-        begun = float(rig.tables("supply")[name]["initial_pressure"])
+        there = prepared.recording.parameters.get(begins_at(tank))
+        begun = rig.parameter(begins_at(tank)).value if there is None else there.value
         level = np.full(prepared.n, begun)
         flat = replace(
-            prepared,
-            signals=prepared.signals | {tank: (level, np.zeros(prepared.n))},
+            prepared.shaken({tank: (level, np.zeros(prepared.n))}),
             raw=prepared.raw | {tank: level},
             noise=prepared.noise | {tank: 0.0},
             lengths=prepared.lengths | {tank: np.zeros(prepared.n, dtype=np.intp)},
-            simulated=(*prepared.simulated, tank),
+            simulated=tuple(dict.fromkeys((*prepared.simulated, tank))),
         )
         found = available_blocks(rig, (*names, *flat.simulated))
         (own,) = [replace(b, window=None) for b in found if b.name == full]
@@ -84,18 +94,22 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
         except SimulationError:  # it then stands still
             value = level
         slope = np.gradient(value, prepared.dt)
-        prepared = replace(flat, signals=flat.signals | {tank: (value, slope)})
+        prepared = flat.shaken({tank: (value, slope)})
     return prepared
 
 
-def said_of_tanks(rig: Rig, blocks: Sequence[Block]) -> list[str]:
+def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepared]) -> list[str]:
     """What is taken of tanks without a gauge, in words."""
     said = []
     for tank in dict.fromkeys(name for block in blocks for name in block.floating):
-        table = rig.tables("supply")[tank.partition(".")[2]]
+        name = begins_at(tank)
+        own = [p.recording.parameters[name] for p in recordings if name in p.recording.parameters]
+        begun = f"{rig.parameter(name).value / 1e5:.3g} bar"
+        if own:
+            begun = "the pressure that each recording has of its own"
         driven = " and ".join(block.name for block in blocks if tank in block.floating)
         said.append(
             f"{tank} was not recorded: {driven} is driven by its simulated course from "
-            f"{table['initial_pressure'] / 1e5:.3g} bar, whose level is free in each recording"
+            f"{begun}; its level is free in each recording"
         )
     return said
