@@ -455,7 +455,7 @@ class Reader:
         if extra["error"] != _OWN:
             self.problem(
                 f"{label}.error = {_shown(extra['error'])} is not allowed: {_OWN!r}, another value "
-                "in each recording; what a recording says itself stands in case.toml"
+                "in each recording; the known value of one recording is given in case.toml"
             )
         for word in ("tol", "unknown", "std"):
             if word in extra:
