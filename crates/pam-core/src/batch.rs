@@ -8,8 +8,8 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use crate::lanes::group::{grouped, Group, Rigs, Row};
-use crate::lanes::Spent;
+use crate::lanes::group::{Group, Rigs, Row};
+use crate::lanes::{grouped, Spent};
 use crate::plant::Rig;
 use crate::room::{counted, room};
 use crate::simulate::drive::{
@@ -18,6 +18,7 @@ use crate::simulate::drive::{
 use crate::simulate::run::Run;
 use crate::simulate::team::Team;
 use crate::simulate::{of_row, Failure, Initial, Progress, Timing, Trajectory};
+use crate::vector::Plan;
 use crate::{Error, Result};
 use self_cell::self_cell;
 
@@ -106,7 +107,7 @@ impl Batch {
             (input >= valves).then(|| rigs.iter().map(|rig| set_pressure(rig, input)).collect())
         };
         let defaults = (0..first.names().inputs.len()).map(default).collect();
-        let whole = if first.lanes().is_some() { FLIGHT } else { 1 };
+        let whole = if Plan::of(first).is_some() { FLIGHT } else { 1 };
         let size = rigs.len().div_ceil(4 * threads.max(1)).clamp(1, MOST_ROWS);
         let size = size.next_multiple_of(whole);
         let mut chunks = Vec::new();

@@ -113,3 +113,8 @@ pub(crate) fn named<T: Copy>(
         }
     })
 }
+
+/// The error of a model that cannot be, in words.
+pub(crate) fn model<T>(text: impl Into<String>) -> Result<T> {
+    Err(Error::Model(text.into()))
+}

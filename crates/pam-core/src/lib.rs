@@ -28,6 +28,7 @@ pub mod plant;
 mod room;
 pub mod scalar;
 pub mod simulate;
+mod vector;
 
 pub use description::RigSpec;
 pub use error::{Error, Result};

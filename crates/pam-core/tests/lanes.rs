@@ -120,8 +120,7 @@ fn each_lane_is_the_plant_alone() {
         let opening = |name: &&String| name.ends_with("discharge_area_max");
         let opening = rig.parameters().names().iter().find(opening).unwrap().clone();
         let area = spread(&rig, &opening, 19);
-        let gauge =
-            |name: &&String| name.starts_with("supply") && name.ends_with(".pressure_zero");
+        let gauge = |name: &&String| name.starts_with("supply") && name.ends_with(".pressure_zero");
         let gauge = rig.parameters().names().iter().find(gauge).unwrap().clone();
         let zero: Vec<f64> = (0..19).map(|k| 100.0 * f64::from(k)).collect();
         let parameters = vec![

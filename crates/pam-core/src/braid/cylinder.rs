@@ -12,7 +12,7 @@
 
 use std::f64::consts::PI;
 
-use super::Braid;
+use super::dimensions::Braid;
 use crate::scalar::Scalar;
 
 /// Outer radius [m] that the braid allows at length `length` [m], shorter than the fibre.

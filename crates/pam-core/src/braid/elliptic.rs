@@ -24,8 +24,8 @@
 
 use std::f64::consts::PI;
 
+use super::dimensions::{Braid, EndRatio};
 use super::numeric::GaussLegendre;
-use super::{Braid, EndRatio};
 use crate::scalar::{constant, Scalar};
 
 /// Quadrature order of the fibre arc: below 1e-14 relative for every axis ratio above 0.3.

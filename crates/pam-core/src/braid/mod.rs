@@ -17,6 +17,7 @@
 //! root is differentiated implicitly, `dR/de = -(dB_est/de)/(dB_est/dR)`.
 
 pub mod cylinder;
+mod dimensions;
 pub mod elliptic;
 pub mod numeric;
 
@@ -24,9 +25,10 @@ use std::f64::consts::PI;
 
 use crate::dual::Slope;
 
+pub use self::dimensions::{Braid, Dimensions, EndRatio, Profile};
 use self::elliptic::{Arc, Ends, ARC_NODES};
 use self::numeric::{brent, minimum, GaussLegendre, Root};
-use crate::error::{check_range, named, Error, Result};
+use crate::error::{check_range, Error, Result};
 use crate::scalar::Scalar;
 
 /// The shortest length the geometry is used for, as a fraction of the fibre length.
@@ -41,82 +43,6 @@ const SCAN_STEPS: u32 = 16;
 const FLOOR_TOLERANCE: f64 = 1e-9;
 /// How far beyond the cylinder's radius a root is looked for in contraction.
 const SCAN_REACH: f64 = 1.6;
-
-/// Constants of the braid and the bladder at rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Braid {
-    /// Rest length `L0` [m].
-    pub rest_length: f64,
-    /// Rest outer radius `R0` [m].
-    pub rest_radius: f64,
-    /// Rest wall thickness `t0` [m].
-    pub rest_thickness: f64,
-    /// Fibre length `B` [m].
-    pub fibre_length: f64,
-    /// Turns `N` of one fibre.
-    pub turns: f64,
-    /// Rubber volume `VB` [m3].
-    pub bladder_volume: f64,
-}
-
-/// Dimensions of one muscle at rest, checked by whoever states them.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Dimensions {
-    /// Rest length between the fittings [m].
-    pub rest_length: f64,
-    /// Rest outer diameter [m].
-    pub rest_diameter: f64,
-    /// Braid angle at rest from the circumferential plane [rad].
-    pub braid_angle: f64,
-    /// Rest wall thickness of the bladder [m].
-    pub wall_thickness: f64,
-    /// Elliptic ends.
-    pub ends: EndRatio,
-    /// Smallest outer radius in extension as a fraction of the rest radius [1].
-    pub neck_floor: f64,
-    /// Outer profile.
-    pub profile: Profile,
-}
-
-/// Axis ratio of the elliptic ends, `k = k0 - slope e`, one slope for each direction.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct EndRatio {
-    /// Axis ratio at rest.
-    pub k0: f64,
-    /// Slope in contraction.
-    pub contraction_slope: f64,
-    /// Slope in extension.
-    pub extension_slope: f64,
-}
-
-/// Which outer profile a muscle has.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Profile {
-    /// Toroidal ends of elliptic section and a cylindrical middle.
-    Elliptic,
-    /// The same ends with the literal printed choices, for comparison: the fibre's arc over `pi/3`,
-    /// and the radius that brings its length nearest to the fibre's where none meets it.
-    EllipticPublished,
-    /// One radius over the whole length.
-    Cylinder,
-}
-
-impl Profile {
-    /// Names in descriptions.
-    pub const NAMES: [(&'static str, Self); 3] = [
-        ("cylinder", Self::Cylinder),
-        ("elliptic", Self::Elliptic),
-        ("elliptic_published", Self::EllipticPublished),
-    ];
-
-    /// The profile of a name.
-    ///
-    /// # Errors
-    /// [`Error::Choice`] that lists the names.
-    pub fn from_name(name: &str) -> Result<Self> {
-        named("muscle.geometry", name, &Self::NAMES)
-    }
-}
 
 /// The state of one muscle at one contraction ratio.
 #[derive(Debug, Clone, Copy, PartialEq)]

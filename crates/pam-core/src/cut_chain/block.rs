@@ -1,6 +1,6 @@
 //! The blocks between which a chain is cut, and what each needs measured.
 
-use super::boundary::Measured;
+use super::measured::Measured;
 use crate::description::dotted;
 use crate::plant::{Acting, Layout, Node, Place, Rig, Simulated};
 use crate::{Error, Result};

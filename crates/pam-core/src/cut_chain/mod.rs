@@ -8,9 +8,10 @@
 mod block;
 mod boundary;
 mod clock;
+mod measured;
 mod sensitivity;
 mod window;
 
 pub use self::block::Block;
-pub use self::boundary::{Measured, Signal};
+pub use self::measured::{Measured, Signal};
 pub use self::sensitivity::{closure_terms, predict, Prediction};

@@ -2,7 +2,7 @@
 //! number.
 
 use super::block::{check, Block};
-use super::boundary::Measured;
+use super::measured::Measured;
 use super::window::Cut;
 use crate::dual::{Dual, LANES, WIDE_LANES};
 use crate::effects::Number;

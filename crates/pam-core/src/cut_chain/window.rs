@@ -2,8 +2,9 @@
 //! block through it.
 
 use super::block::{fed_by, unread, Block};
-use super::boundary::{driven, rest_length, taps, zero, Driven, Measured};
+use super::boundary::{driven, rest_length, taps, zero, Driven};
 use super::clock::Clocks;
+use super::measured::Measured;
 use crate::effects::Number;
 use crate::plant::{Controls, Memory, Plant, Simulated};
 use crate::scalar::{constant, Scalar};

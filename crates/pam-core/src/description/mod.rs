@@ -2,6 +2,7 @@
 
 mod check;
 
+pub use crate::blocks::joint::TransmissionSpec;
 use crate::blocks::supply::FASTEST;
 use crate::effects::{spool, Form};
 use crate::muscle::MuscleSpec;
@@ -233,38 +234,6 @@ fn one() -> f64 {
     1.0
 }
 
-/// How a muscle pulls on a joint; the lengths are those of its kind, see
-/// [`crate::blocks::joint::Joint`].
-#[allow(missing_docs)]
-#[derive(Debug, Clone, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TransmissionSpec {
-    pub kind: String,
-    #[serde(default)]
-    pub upper_axial: f64,
-    #[serde(default)]
-    pub upper_offset: f64,
-    #[serde(default)]
-    pub lower_axial: f64,
-    #[serde(default)]
-    pub lower_offset: f64,
-    #[serde(default)]
-    pub radius: f64,
-    #[serde(default)]
-    pub coefficients: Vec<f64>,
-    pub rest_angle: f64,
-}
-
-impl TransmissionSpec {
-    /// Read a transmission on its own from JSON text.
-    ///
-    /// # Errors
-    /// [`Error::Model`] for text that is not of this form (unknown keys included).
-    pub fn from_json(text: &str) -> Result<Self> {
-        serde_json::from_str(text).map_err(|e| Error::Model(format!("joint description: {e}")))
-    }
-}
-
 /// Muscles of one kind that share a chamber and pull on one joint (`joint.elbow`, or `load`).
 #[allow(missing_docs)]
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -467,6 +436,19 @@ pub fn dotted(block: &str, name: &str) -> String {
         block.into()
     } else {
         format!("{block}.{name}")
+    }
+}
+
+/// Names of the coordinates (joints), in their order.
+pub(crate) fn coordinate_names(spec: &RigSpec) -> Vec<String> {
+    match &spec.arm {
+        Some(arm) if arm.kind == "planar" => {
+            let bare = |port: &str| {
+                port.split_once('.').map_or(String::new(), |(_, name)| name.to_string())
+            };
+            arm.links.iter().map(|l| bare(&l.joint)).collect()
+        }
+        _ => spec.joints.iter().map(|j| j.name.clone()).collect(),
     }
 }
 

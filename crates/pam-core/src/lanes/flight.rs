@@ -3,15 +3,15 @@
 //! depends on its own state and commands only.
 
 use super::group::{Group, Rigs, Row, Runs, Spent};
-use super::num::{in_fours, side_by_side, Num, Pair, Registers, Single, MOST_LANES, PAIR};
-use super::rates::{Lanes, Shape};
 use super::reads::Reads;
-use super::rk4::Rk4;
-use super::Plan;
-use crate::blocks::valve::{spool_position, Opening};
+use crate::blocks::valve::spool_position;
 use crate::plant::Plant;
 use crate::simulate::drive::Drive;
 use crate::simulate::{Failure, Progress, Timing, Trajectory};
+use crate::vector::{
+    in_fours, opening, side_by_side, Lanes, Num, Pair, Plan, Registers, Rk4, Shape, Single,
+    MOST_LANES, PAIR,
+};
 use crate::Result;
 use pulp::{Arch, Scalar, Simd, WithSimd};
 use std::marker::PhantomData;
@@ -365,19 +365,6 @@ impl<S: Simd, R: Registers> Group for Flight<'_, S, R> {
 
     fn side_by_side(&self) -> bool {
         true
-    }
-}
-
-/// Opening of a valve at a spool position [m2], below zero where it vents.
-#[inline(always)]
-pub(super) fn opening(plant: &Plant<'_, f64>, valve: usize, spool: f64) -> f64 {
-    if spool == 0.0 {
-        return 0.0; // neither, whatever its table begins with
-    }
-    let table = &plant.rig().wiring.valves[valve].table;
-    match plant.valves[valve].paths[0] {
-        Opening::Area(area) => area * table.eval(spool.abs()) * spool.signum(),
-        Opening::Conductance(_) => 0.0, // no such rig is planned in lanes
     }
 }
 

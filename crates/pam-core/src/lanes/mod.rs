@@ -1,119 +1,23 @@
 //! Many plants of one structure, side by side in the vector lanes of the processor.
 //!
-//! Rigs without effects whose arm is one link or a hanging mass run in lanes ([`Plan`]): one plant
-//! in each, two registers of 8, 4, 2 or 1 as the processor has, chosen when the program runs. All
-//! other rigs, and plants that leave the range of the lanes' curves, run one by one as in
+//! Rigs without effects whose arm is one link or a hanging mass run in lanes ([`crate::vector`]): one
+//! plant in each, two registers of 8, 4, 2 or 1 as the processor has, chosen when the program runs.
+//! All other rigs, and plants that leave the range of the lanes' curves, run one by one as in
 //! [`crate::simulate`]. What happens to a row depends on its own numbers only: neighbours, threads
 //! and the number of lanes change no bit.
 
-mod blocks;
-mod curves;
 mod flight;
 pub(crate) mod group;
-mod num;
+mod grouped;
 mod queue;
-mod rates;
 mod reads;
 mod reduce;
 mod request;
-mod rk4;
 mod run;
-mod solo;
 mod steps;
 
 pub use group::Spent;
-pub(crate) use reads::{needs_sums, Wanted};
+pub(crate) use grouped::grouped;
 pub use reduce::{Reduce, Reduction};
 pub use request::{Outcome, Request, Signal};
 pub use run::simulate;
-pub(crate) use solo::Solo;
-
-use self::blocks::{Orifice, Turns};
-use self::curves::Curves;
-use crate::muscle::Pushed;
-use crate::plant::{BodyUnit, Group, Passes, Rig};
-
-/// How far beyond its stops a coordinate may go in lanes, in ranges of it.
-const BEYOND: f64 = 0.25;
-/// The same, where the curves end before that.
-const LESS_BEYOND: [f64; 4] = [BEYOND, 0.1, 0.04, 0.01];
-
-/// What lanes need to know of a rig beside the values of its parameters.
-#[derive(Debug, Clone)]
-pub struct Plan {
-    orifice: Orifice,
-    curves: Vec<Curves>,
-}
-
-impl Plan {
-    /// The plan of a rig that can run in lanes; none for another.
-    #[must_use]
-    pub(crate) fn new(rig: &Rig) -> Option<Self> {
-        let wiring = &rig.wiring;
-        let body = matches!(wiring.body, BodyUnit::OneLink { .. } | BodyUnit::Mass { .. });
-        // the curves hold torques linear in pressure, whose sign tells a slack muscle and whose size
-        // does not tell how far one bows out
-        let plain = wiring.ports.effects.is_empty()
-            && wiring
-                .groups
-                .iter()
-                .all(|g| !g.direction && g.muscle.pushed() != Pushed::Bows && !g.muscle.mapped());
-        let one_joint = wiring.groups.iter().all(|g| g.coordinate == 0);
-        let areas = wiring.valves.iter().all(|valve| matches!(valve.passes, Passes::Area(_)));
-        let fed = wiring.inlets_of_regulators().next().is_some();
-        let states = wiring.heated() || !wiring.waves.is_empty();
-        if !(body && plain && one_joint && areas) || states || fed {
-            return None;
-        }
-        let curves = wiring.groups.iter().map(|group| curves(rig, group));
-        Some(Self { orifice: Orifice::new(&rig.gas), curves: curves.collect::<Option<_>>()? })
-    }
-
-    /// How a weight follows the angles inside all curves.
-    fn turns(&self) -> Turns {
-        let near = |curves: &Curves| curves.low.abs().max(curves.high.abs()) <= num::NEAR;
-        match self.curves.iter().any(near) {
-            true => Turns::Near,
-            false => Turns::Far,
-        }
-    }
-
-    /// Coordinates between which all curves hold.
-    fn range(&self) -> (f64, f64) {
-        let low = self.curves.iter().map(|curves| curves.low).fold(f64::NEG_INFINITY, f64::max);
-        let high = self.curves.iter().map(|curves| curves.high).fold(f64::INFINITY, f64::min);
-        (low, high)
-    }
-
-    /// Whether a coordinate is inside all curves.
-    fn contains(&self, angle: f64) -> bool {
-        self.curves.iter().all(|curves| curves.low <= angle && angle <= curves.high)
-    }
-}
-
-/// Curves of a group over the range of its coordinate and somewhat more.
-fn curves(rig: &Rig, group: &Group) -> Option<Curves> {
-    let (low, high) = rig.angles(group);
-    let holds = |angle: f64| {
-        group.joint.reaches(angle)
-            && group.muscle.table.contains(group.joint.eval(angle).shortening / group.rest_length)
-    };
-    LESS_BEYOND.iter().find_map(|share| {
-        let more = share * (high - low);
-        Curves::new(group, edge(&holds, low, low - more), edge(&holds, high, high + more))
-    })
-}
-
-/// As far from a place towards another as something holds.
-fn edge(holds: &dyn Fn(f64) -> bool, from: f64, to: f64) -> f64 {
-    const STEPS: u32 = 64;
-    let mut good = from;
-    for k in 1..=STEPS {
-        let next = from + (to - from) * f64::from(k) / f64::from(STEPS);
-        if !holds(next) {
-            break;
-        }
-        good = next;
-    }
-    good
-}

@@ -1,7 +1,7 @@
 //! Runs: blocks of rows over threads, rows of a block in groups, each sample read as it comes.
 
-use super::group::{grouped, Group, Rigs, Row, Spent};
-use super::reads::needs_sums;
+use super::group::{Group, Rigs, Row, Spent};
+use super::grouped::grouped;
 use super::reduce::{Reduce, Reduction};
 use super::request::{Checked, Outcome, Request, Signal};
 use super::steps::Steps;
@@ -11,6 +11,7 @@ use crate::simulate::drive::Drive;
 use crate::simulate::run::Run;
 use crate::simulate::team::Team;
 use crate::simulate::{Failure, Progress, Timing};
+use crate::vector::needs_sums;
 use crate::{Error, Result};
 
 /// Rows of a block: a millisecond or more of work, so that no thread waits long for the last one.

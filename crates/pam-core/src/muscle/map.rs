@@ -11,8 +11,7 @@
 //!
 //! The muscle's geometry gives its volume only.
 
-use super::spec::MuscleSpec;
-use super::{HIGHEST_PRESSURE, LOWEST_PRESSURE};
+use super::pressures::{HIGHEST_PRESSURE, LOWEST_PRESSURE};
 use crate::error::{check_range, Error, Result};
 use crate::scalar::{constant, Scalar};
 
@@ -50,17 +49,6 @@ pub struct MapSurface {
 }
 
 impl MapSurface {
-    /// The surface of a muscle with the model `map`; none for another one.
-    ///
-    /// # Errors
-    /// As [`check`].
-    pub fn new(spec: &MuscleSpec) -> Result<Option<Self>> {
-        if spec.map_force.is_empty() {
-            return Ok(None);
-        }
-        Self::of(&spec.map_pressure, &spec.map_contraction, &spec.map_force).map(Some)
-    }
-
     /// The surface of a table: gauge pressures [Pa], contraction ratios [1], and a row of forces
     /// [N] over the contractions for each pressure.
     ///
@@ -295,9 +283,9 @@ fn monotone(c: &[[Node; 2]; 2]) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use crate::dual::Slope;
     use crate::muscle::tests::shoulder;
+    use crate::muscle::MuscleSpec;
 
     fn grid(p: &[f64], e: &[f64], force: impl Fn(f64, f64) -> f64) -> MuscleSpec {
         MuscleSpec {
@@ -325,14 +313,14 @@ mod tests {
     fn nodes_are_met_and_what_is_linear_in_pressure_is_exact() {
         let (p, e) = axes();
         let law = |p: f64, e: f64| 2e-3 * p * (1.0 - 3.0 * e) - 400.0 * e;
-        let surface = MapSurface::new(&grid(&p, &e, law)).unwrap().unwrap();
+        let surface = grid(&p, &e, law).surface().unwrap().unwrap();
         for p in [-5e4, 0.0, 3.3e4, 1e5, 2.9e5, 6e5, 7e5] {
             for e in &e {
                 assert!((surface.force(p, *e) - law(p, *e)).abs() < 1e-9, "{p} {e}");
             }
             assert!((surface.force(p, 0.111) - law(p, 0.111)).abs() < 1e-9);
         }
-        let surface = MapSurface::new(&grid(&p, &e, sharp)).unwrap().unwrap();
+        let surface = grid(&p, &e, sharp).surface().unwrap().unwrap();
         for p in &p {
             for e in &e {
                 assert!((surface.force(*p, *e) - sharp(*p, *e)).abs() < 1e-9);
@@ -344,7 +332,7 @@ mod tests {
     fn it_is_monotone_where_its_nodes_are() {
         let (p, e) = axes();
         let spec = grid(&p, &e, sharp);
-        let surface = MapSurface::new(&spec).unwrap().unwrap();
+        let surface = spec.surface().unwrap().unwrap();
         let line = |k: u32, low: f64, high: f64| low + (high - low) * f64::from(k) / 300.0;
         for i in 0..=300 {
             for k in 0..300 {
@@ -362,7 +350,7 @@ mod tests {
     #[test]
     fn slopes_are_continuous_and_those_of_dual_numbers() {
         let (p, e) = axes();
-        let surface = MapSurface::new(&grid(&p, &e, sharp)).unwrap().unwrap();
+        let surface = grid(&p, &e, sharp).surface().unwrap().unwrap();
         for q in [-1e4, 2e4, 1e5, 1.7e5, 6.5e5] {
             for x in [-0.05, 0.0, e[3], 0.1, 0.4] {
                 let by_p = surface.force(Slope::new(q, 1.0), Slope::from(x)).slope();

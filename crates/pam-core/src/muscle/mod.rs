@@ -6,6 +6,7 @@
 //! compiled once to a [`Table`] with a checked error bound.
 
 pub mod chou_hannaford;
+mod elasticity;
 pub mod elbow_linear;
 pub mod ferraresi;
 pub mod friction;
@@ -14,24 +15,22 @@ pub mod kothera;
 pub mod map;
 pub mod model;
 pub mod mooney_rivlin;
+mod pressures;
 pub mod robinson;
 pub mod slip;
 pub mod spec;
 pub mod table;
 
+pub use self::elasticity::Elasticity;
 pub use self::friction::Friction;
 pub use self::map::MapSurface;
-pub use self::model::{Coefficients, Elasticity, ForceModel};
+pub use self::model::{Coefficients, ForceModel};
+pub use self::pressures::{HIGHEST_PRESSURE, LOWEST_PRESSURE};
 pub use self::spec::{MuscleSpec, HIGHEST_ORDER, STRUT};
 pub use self::table::{Table, TablePoint};
 use crate::braid::{MuscleGeometry, Shape};
 use crate::error::{check_range, Error, Result};
 use crate::scalar::{constant, Scalar};
-
-/// Lowest gauge pressure [Pa]: vacuum at standard ambient pressure.
-pub const LOWEST_PRESSURE: f64 = -101_325.0;
-/// Highest gauge pressure [Pa] that is taken for an input and not for a mistake of unit.
-pub const HIGHEST_PRESSURE: f64 = 1.0e8;
 
 /// One muscle, exact.
 #[derive(Debug, Clone)]
@@ -61,7 +60,7 @@ impl Muscle {
             contracting,
             lengthening,
             friction: spec.friction(),
-            map: MapSurface::new(spec)?,
+            map: spec.surface()?,
         })
     }
 

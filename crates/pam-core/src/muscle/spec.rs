@@ -4,6 +4,7 @@ use serde::Deserialize;
 
 use super::elbow_linear::Factors;
 use super::friction::Friction;
+use super::map::MapSurface;
 use super::model::ForceModel;
 use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
@@ -209,6 +210,17 @@ impl MuscleSpec {
     /// [`Error::Choice`] for an unknown name.
     pub fn force_model(&self) -> Result<ForceModel> {
         ForceModel::from_name(&self.model)
+    }
+
+    /// The surface of its map; none without one.
+    ///
+    /// # Errors
+    /// As [`super::map::check`].
+    pub fn surface(&self) -> Result<Option<MapSurface>> {
+        if self.map_force.is_empty() {
+            return Ok(None);
+        }
+        MapSurface::of(&self.map_pressure, &self.map_contraction, &self.map_force).map(Some)
     }
 
     /// The outer profile.

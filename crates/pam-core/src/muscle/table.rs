@@ -16,7 +16,7 @@
 
 use crate::dual::Slope;
 
-use super::model::Elasticity;
+use super::elasticity::Elasticity;
 use crate::braid::MuscleGeometry;
 use crate::chebyshev::{interpolate, lobatto};
 use crate::error::{Error, Result};

@@ -1,8 +1,8 @@
 //! Where each state and channel of a rig is, and what it is called.
 
-use super::units::{WaveUnit, Wiring};
-use super::wiring_motion::coordinate_names;
-use crate::description::{dotted, RigSpec};
+use super::units::{Node, WaveUnit};
+use super::wired::Wiring;
+use crate::description::{coordinate_names, dotted, RigSpec};
 use crate::effects::Role;
 use crate::{Error, Result};
 
@@ -108,6 +108,17 @@ impl Layout {
     #[must_use]
     pub fn balance(&self, k: usize) -> usize {
         self.states() + k
+    }
+}
+
+impl Node {
+    /// Place of its pressure among the states.
+    pub fn place(self, layout: &Layout) -> Option<usize> {
+        match self {
+            Self::Ambient => None,
+            Self::Supply(k) => Some(layout.supply(k)),
+            Self::Gas(k) => Some(layout.pressure(k)),
+        }
     }
 }
 

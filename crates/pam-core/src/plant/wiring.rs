@@ -2,21 +2,20 @@
 //! parameters.
 
 use super::parameters::{Bounds, ParameterId, Parameters};
-use super::ports::{switch_on, Ports as EffectPorts};
+use super::plugs::switch_on;
+use super::ports::Ports as EffectPorts;
 use super::units::{
     Coordinate, GasLaw, GasUnit, Group, LineUnit, Node, Passes, Path, SupplyUnit, ValveUnit,
-    WaveUnit, Wiring,
+    WaveUnit,
 };
-use super::wiring_motion::{body, coordinate_names, coordinates, groups};
+use super::wired::Wiring;
+use super::wiring_motion::{body, coordinates, groups};
 use crate::blocks::supply::FASTEST;
 use crate::blocks::valve::AreaTable;
-use crate::description::{dotted, RigSpec, SupplySpec, ValveSpec};
+use crate::description::{coordinate_names, dotted, RigSpec, SupplySpec, ValveSpec};
 use crate::effects::{EffectInfo, Form};
-use crate::{Error, Result};
-
-pub(super) fn model<T>(text: impl Into<String>) -> Result<T> {
-    Err(Error::Model(text.into()))
-}
+use crate::error::model;
+use crate::Result;
 
 /// Finds ports.
 struct Ports<'a> {

@@ -2,10 +2,10 @@
 
 use super::parameters::Parameters;
 use super::units::{BodyUnit, Coordinate, Group, LinkUnit, MOST_LINKS};
-use super::wiring::model;
 use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, ArmSpec, JointSpec, LinkSpec, LoadSpec, RigSpec};
+use crate::error::model;
 use crate::muscle::spec::{MODULUS_SCALE, SOFTENING, TEMPERATURE};
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
@@ -94,19 +94,6 @@ pub(crate) fn coordinate_of(spec: &RigSpec, port: &str) -> Option<usize> {
     match &spec.arm {
         Some(arm) if arm.kind == "planar" => arm.links.iter().position(|l| l.joint == port),
         _ => spec.joints.iter().position(|j| dotted("joint", &j.name) == port),
-    }
-}
-
-/// Names of the coordinates (joints), in their order.
-pub(crate) fn coordinate_names(spec: &RigSpec) -> Vec<String> {
-    match &spec.arm {
-        Some(arm) if arm.kind == "planar" => {
-            let bare = |port: &str| {
-                port.split_once('.').map_or(String::new(), |(_, name)| name.to_string())
-            };
-            arm.links.iter().map(|l| bare(&l.joint)).collect()
-        }
-        _ => spec.joints.iter().map(|j| j.name.clone()).collect(),
     }
 }
 

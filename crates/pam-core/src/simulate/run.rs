@@ -1,15 +1,21 @@
 //! What the samples of one rig need on the way, kept from one to the next.
 
-use crate::lanes::{needs_sums, Solo};
+use super::drive::Drive;
+use super::events::{Conditions, Event, Watch};
+use super::initial::Initial;
+use super::progress::Progress;
+use super::stepper::Stepper;
+use super::timing::Timing;
 use crate::plant::Rig;
 use crate::plant::{Controls, Plant, Simulated};
-use crate::simulate::drive::Drive;
-use crate::simulate::events::{Conditions, Event, Watch};
-use crate::simulate::{Initial, Progress, Stepper, Timing, STEPS_UNSEEN};
+use crate::vector::{needs_sums, Solo};
 use crate::Result;
 use self_cell::self_cell;
 use std::ops::Range;
 use std::sync::Arc;
+
+/// Steps between two looks outside: some ten milliseconds of a large rig.
+pub(crate) const STEPS_UNSEEN: usize = 8_000;
 
 /// What samples of one rig need on the way and do not depend on: made once, whatever runs with it.
 pub struct Run<'a> {

@@ -4,27 +4,19 @@
 //! the torque of a pull `F` is `F dd/dtheta`, so that `tau dtheta = F dd`: what the muscle gives,
 //! the link gets. Only the printed tendon joint ([`tendon::Torque::Published`]) gives less.
 
+mod point;
 pub mod polynomial;
 pub mod pulley;
+mod spec;
 pub mod tendon;
 
+pub use self::point::JointPoint;
 pub use self::polynomial::Polynomial;
 pub use self::pulley::Pulley;
+pub use self::spec::TransmissionSpec;
 pub use self::tendon::TendonJoint;
-use crate::description::TransmissionSpec;
 use crate::error::{check_range, Error, Result};
 use crate::scalar::{chained, constant, Scalar};
-
-/// Shortening and moment arms at one angle.
-#[derive(Debug, Clone, Copy)]
-pub struct JointPoint<S> {
-    /// Shortening of the muscle [m].
-    pub shortening: S,
-    /// Moment arm dd/dtheta [m]: rate of shortening per rate of angle.
-    pub moment_arm: S,
-    /// Torque per pull [m]: the moment arm, less what the printed equations lose.
-    pub torque_arm: S,
-}
 
 /// A joint of any kind.
 #[derive(Debug, Clone, PartialEq)]

@@ -2,7 +2,7 @@
 //!
 //! `d = sum_k c_k (theta - theta_0)^k`, k from 1; moment arm `sum_k k c_k (theta - theta_0)^(k-1)`.
 
-use super::JointPoint;
+use super::point::JointPoint;
 use crate::error::{check_range, Error, Result};
 use crate::scalar::{constant, Scalar};
 

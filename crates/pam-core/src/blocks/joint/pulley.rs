@@ -3,7 +3,7 @@
 //! `d = r (theta - theta_0)`, moment arm `r`; a negative radius is a muscle on the other side (the
 //! antagonist).
 
-use super::JointPoint;
+use super::point::JointPoint;
 use crate::error::{check_range, Result};
 use crate::scalar::{constant, Scalar};
 

@@ -7,7 +7,7 @@
 //! printed multiply by `cos^2` of the tendon's angle, `(s/lT)^2`, too much: [`Torque::Published`]
 //! keeps them for comparison.
 
-use super::JointPoint;
+use super::point::JointPoint;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 

@@ -1,11 +1,10 @@
 //! One plant by the equations of the lanes: how a single run advances where its rig allows it. The
 //! bits are those of the same plant in a flight.
 
-use super::flight::opening;
 use super::num::{in_fours, Num, Single};
-use super::rates::{Lanes, Shape};
+use super::plan::Plan;
+use super::rates::{opening, Lanes, Shape};
 use super::rk4::Rk4;
-use super::Plan;
 use crate::plant::{Controls, Plant};
 use pulp::{Scalar, Simd, WithSimd};
 
@@ -35,7 +34,7 @@ impl<'a> Solo<'a> {
     /// Room for a plant; none for one that does not run in lanes.
     pub fn new(plant: &Plant<'a, f64>) -> Option<Self> {
         let rig = plant.rig();
-        let plan = rig.lanes()?;
+        let plan = Plan::of(rig)?;
         let sums = plant.states() > rig.layout.states();
         let state = vec![Num::splat(Scalar, 0.0); plant.states()];
         let lanes = Lanes::new(Scalar, plan, &[plant], sums);

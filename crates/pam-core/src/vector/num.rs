@@ -12,14 +12,14 @@ use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 
 /// Vector registers that hold a number of many plants: while one waits for a result the other is
 /// worked on. A plant alone has one.
-pub(super) const PAIR: usize = 2;
+pub(crate) const PAIR: usize = 2;
 /// Lanes at most.
-pub(super) const MOST_LANES: usize = 8 * PAIR;
+pub(crate) const MOST_LANES: usize = 8 * PAIR;
 
 /// Do something with registers of four numbers where there are such: the columns of a plant alone,
 /// or a few plants, do not fill wider ones, and each width is compiled anew.
 #[inline(always)]
-pub(super) fn in_fours<W: WithSimd>(work: W) -> W::Output {
+pub(crate) fn in_fours<W: WithSimd>(work: W) -> W::Output {
     #[cfg(target_arch = "x86_64")]
     return match pulp::x86::V3::try_new() {
         Some(simd) => Simd::vectorize(simd, work),
@@ -30,7 +30,7 @@ pub(super) fn in_fours<W: WithSimd>(work: W) -> W::Output {
 }
 
 /// The registers that hold a number: how many they are, and how they stand in memory.
-pub(super) trait Registers: Copy + 'static {
+pub(crate) trait Registers: Copy + 'static {
     /// How many they are.
     const COUNT: usize;
     /// One thing for each of them.
@@ -42,7 +42,7 @@ pub(super) trait Registers: Copy + 'static {
 
 /// The register of a plant alone.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Single;
+pub(crate) struct Single;
 
 impl Registers for Single {
     const COUNT: usize = 1;
@@ -57,12 +57,12 @@ impl Registers for Single {
 /// The registers of plants side by side, which begin a line of the cache: one that lies across two
 /// lines takes twice as long to read and to write.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pair;
+pub(crate) struct Pair;
 
 /// What begins a line of the cache.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
-pub(super) struct Aligned<T>(pub T);
+pub(crate) struct Aligned<T>(pub T);
 
 impl<T, const N: usize> AsRef<[T]> for Aligned<[T; N]> {
     #[inline(always)]
@@ -90,26 +90,26 @@ impl Registers for Pair {
 
 /// How many plants there are side by side.
 #[inline(always)]
-pub(super) const fn side_by_side<S: Simd, R: Registers>() -> usize {
+pub(crate) const fn side_by_side<S: Simd, R: Registers>() -> usize {
     S::F64_LANES * R::COUNT
 }
 
 /// One number of each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Num<S: Simd, R: Registers> {
+pub(crate) struct Num<S: Simd, R: Registers> {
     simd: S,
     lanes: R::Each<S::f64s>,
 }
 
 /// Yes or no for each lane.
 #[derive(Clone, Copy)]
-pub(super) struct Mask<S: Simd, R: Registers> {
+pub(crate) struct Mask<S: Simd, R: Registers> {
     simd: S,
     lanes: R::Each<S::m64s>,
 }
 
 /// What a number is multiplied by, or what is added to it: a number of each lane, or one of all.
-pub(super) trait Operand<S: Simd, R: Registers> {
+pub(crate) trait Operand<S: Simd, R: Registers> {
     /// As a number of each lane.
     fn in_lanes(self, simd: S) -> Num<S, R>;
 }
@@ -424,10 +424,10 @@ impl<S: Simd, R: Registers> Num<S, R> {
 }
 
 /// Adding it leaves no place for a fraction.
-pub(super) const WHOLE: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
+pub(crate) const WHOLE: f64 = 6_755_399_441_055_744.0; // 1.5 * 2^52
 
 /// As far as the sine's polynomial reaches [rad].
-pub(super) const NEAR: f64 = 2.75;
+pub(crate) const NEAR: f64 = 2.75;
 
 /// `(sin x - x)/x^3` in powers of `x^2`, through Chebyshev's points up to [`NEAR`]: the rest is
 /// below 1e-16.

@@ -14,7 +14,7 @@ use pulp::Simd;
 /// Torque per gauge pressure of braid and wall [m3], of the moduli's slopes for scale 1 [m3],
 /// torque of their offsets for scale 1 [N m]; air volume [m3] and its slope [m3/rad]; then the
 /// first three again for the power of the muscles, which a printed joint does not pass on whole.
-pub(super) const COLUMNS: usize = 8;
+pub(crate) const COLUMNS: usize = 8;
 const DEGREE: usize = 5;
 const NODES: usize = DEGREE + 1;
 const VOLUME: usize = 3;
@@ -26,7 +26,7 @@ type Cell = Aligned<[f64; NODES * COLUMNS]>;
 const _: () = assert!(COLUMNS * size_of::<f64>() == align_of::<Cell>());
 
 /// Largest error, relative to the largest magnitude of each column.
-pub(super) const TOLERANCE: f64 = 1e-9;
+pub(crate) const TOLERANCE: f64 = 1e-9;
 /// Cells are halved until the error is below this.
 const AIM: f64 = 2e-10;
 const MOST_CELLS: usize = 1024;
@@ -58,14 +58,14 @@ impl Piece {
 
 /// What the torque of muscles that pull does to the coordinate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Sign {
+pub(crate) enum Sign {
     Raises,
     Lowers,
 }
 
 /// All columns of one group over a range of its coordinate.
 #[derive(Debug, Clone)]
-pub(super) struct Curves {
+pub(crate) struct Curves {
     pub low: f64,
     pub high: f64,
     /// Of muscles that go slack the sign of the torque with which they pull: of the other one they

@@ -2,10 +2,11 @@
 
 use super::num::{Num, Registers};
 use super::rates::{Lanes, Shape, SMALL};
+use super::slopes::Slopes;
 use pulp::Simd;
 
 /// The classical Runge-Kutta method over lanes.
-pub(super) struct Rk4<S: Simd, R: Registers> {
+pub(crate) struct Rk4<S: Simd, R: Registers> {
     before: Vec<Num<S, R>>,
     stage: Vec<Num<S, R>>,
     next: Vec<Num<S, R>>,
@@ -95,33 +96,5 @@ impl<S: Simd, R: Registers> Stages<'_, S, R> {
         for place in 0..shape.states() {
             out[place] = sum[place].times_plus(step / 6.0, start[place]);
         }
-    }
-}
-
-/// Where the slopes of a stage go. Each is used as it comes: a plant alone would wait for it to be
-/// written and read.
-pub(super) struct Slopes<'s, S: Simd, R: Registers> {
-    start: &'s [Num<S, R>],
-    sum: &'s mut [Num<S, R>],
-    next: &'s mut [Num<S, R>],
-    weight: f64,
-    /// From the start of the step to the next stage [s].
-    ahead: f64,
-    /// Of the first stage.
-    pub first: bool,
-}
-
-impl<S: Simd, R: Registers> Slopes<'_, S, R> {
-    /// The slope of the state at a place.
-    #[inline(always)]
-    pub fn set(&mut self, place: usize, slope: Num<S, R>) {
-        self.gather(place, slope);
-        self.next[place] = slope.times_plus(self.ahead, self.start[place]);
-    }
-
-    /// The same where no slope depends on that state.
-    #[inline(always)]
-    pub fn gather(&mut self, place: usize, slope: Num<S, R>) {
-        self.sum[place] = slope.times_plus(self.weight, self.sum[place]);
     }
 }

@@ -12,7 +12,7 @@ const NODES: usize = 12;
 
 /// Flow through orifices of one gas. `psi^2/(1 - r)` is a polynomial over the subsonic ratios.
 #[derive(Debug, Clone)]
-pub(super) struct Orifice {
+pub(crate) struct Orifice {
     critical_ratio: f64,
     per_half_width: f64,
     /// Where the middle of the curve is, in half-widths, below zero.
@@ -84,7 +84,7 @@ impl Orifice {
 
 /// A tube, as [`crate::blocks::tube::Tube`].
 #[derive(Clone, Copy)]
-pub(super) struct Tube<S: Simd, R: Registers> {
+pub(crate) struct Tube<S: Simd, R: Registers> {
     pub flow_factor: Num<S, R>,
     pub critical_ratio: Num<S, R>,
 }
@@ -112,7 +112,7 @@ impl<S: Simd, R: Registers> Tube<S, R> {
 
 /// Where the air comes from, as [`crate::blocks::supply::Supply`].
 #[derive(Clone, Copy)]
-pub(super) enum Supply<S: Simd, R: Registers> {
+pub(crate) enum Supply<S: Simd, R: Registers> {
     /// Fall of the pressure per mass that leaves [Pa/kg].
     Tank(Num<S, R>),
     Constant,
@@ -142,7 +142,7 @@ impl<S: Simd, R: Registers> Supply<S, R> {
 
 /// How the torque of a weight follows the angle.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Turns {
+pub(crate) enum Turns {
     /// Not at all: it hangs.
     Not,
     /// By the sine of angles up to [`super::num::NEAR`].
@@ -154,7 +154,7 @@ pub(super) enum Turns {
 /// What moves: an arm of one link, or a mass that hangs from the muscle (without inertia of its
 /// own, and always pulled straight down).
 #[derive(Clone, Copy)]
-pub(super) struct Body<S: Simd, R: Registers> {
+pub(crate) struct Body<S: Simd, R: Registers> {
     /// One over the inertia [1/(kg m2)], or over the mass [1/kg].
     pub mobility: Num<S, R>,
     /// Torque of the weight where it pulls across [N m], or the weight itself [N].

@@ -4,10 +4,11 @@
 use super::blocks::{Body, Supply, Tube, Turns};
 use super::curves::Sign;
 use super::num::{side_by_side, Mask, Num, Registers, MOST_LANES};
-use super::rk4::Slopes;
-use super::Plan;
+use super::plan::Plan;
+use super::slopes::Slopes;
 use crate::blocks::arm::one_link::Spring;
 use crate::blocks::supply::Supply as OneSupply;
+use crate::blocks::valve::Opening;
 use crate::plant::{Layout, Line, Node, OneBody, Plant, Rig, BALANCE};
 use pulp::Simd;
 
@@ -31,11 +32,11 @@ enum Passage<S: Simd, R: Registers> {
 }
 
 /// Length of the state of [`Shape::small`] at most.
-pub(super) const SMALL: usize = 5 + BALANCE.len();
+pub(crate) const SMALL: usize = 5 + BALANCE.len();
 
 /// How many blocks the equations are for, and whether masses and sums of the balance are wanted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Shape {
+pub(crate) struct Shape {
     layout: Layout,
     sums: bool,
     /// It is as [`Self::small`], and the compiler is to know it.
@@ -146,7 +147,7 @@ struct Room<T> {
 }
 
 /// Plants side by side and room for their equations.
-pub(super) struct Lanes<'a, S: Simd, R: Registers> {
+pub(crate) struct Lanes<'a, S: Simd, R: Registers> {
     pub shape: Shape,
     plants: Plants<'a, S, R>,
     room: Room<Vec<Num<S, R>>>,
@@ -624,5 +625,18 @@ fn body<'a, S: Simd, R: Registers>(
         stops,
         spring: [stiffness, of(numbers, 5)],
         springs: some(&stiffness),
+    }
+}
+
+/// Opening of a valve at a spool position [m2], below zero where it vents.
+#[inline(always)]
+pub(crate) fn opening(plant: &Plant<'_, f64>, valve: usize, spool: f64) -> f64 {
+    if spool == 0.0 {
+        return 0.0; // neither, whatever its table begins with
+    }
+    let table = &plant.rig().wiring.valves[valve].table;
+    match plant.valves[valve].paths[0] {
+        Opening::Area(area) => area * table.eval(spool.abs()) * spool.signum(),
+        Opening::Conductance(_) => 0.0, // no such rig is planned in lanes
     }
 }
