@@ -12,7 +12,6 @@ from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import rank_filter
 
 __all__ = ["Fault", "find_faults"]
 
@@ -153,6 +152,8 @@ def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     n = len(data)
     if n < _LEAST:
         return []
+    from scipy.ndimage import rank_filter  # `import pamrs` is light
+
     low, middle, high = (rank_filter(data, rank, 7, mode="nearest") for rank in (2, 3, 4))
     off, local = data - middle, high - low
     quantum = _quantum(data)
