@@ -145,6 +145,7 @@ def test_a_value_of_each_recording_is_found_there(in_rig: bool) -> None:
     assert run.channels["muscle_pressure"].after < 3.0 * NOISE["muscle_pressure"]
 
 
+@pytest.mark.slow
 def test_nozzles_that_nobody_told_are_no_single_value() -> None:
     found = pamrs.diagnose(pamrs.Case("nozzles", SHOULDER, nozzles(error=""), Path()))
     assert found.verdict not in ("none", "parameters") or found.wrong_parameters
