@@ -172,7 +172,7 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     # a block that has the channel is asked, without one what surrounds it
     assert "no judged block shows why. For the chamber: step" in told(problem, "muscle_pressure")
     few = replace(problem, blocks=[b for b in blocks if b is not chamber])
-    assert "record the channels that stand between it" in told(few, "muscle_pressure")
+    assert "record the channels between it" in told(few, "muscle_pressure")
 
 
 def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> None:

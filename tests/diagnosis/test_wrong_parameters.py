@@ -210,6 +210,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
     asked: list[tuple[str, ...]] = []
 
     class Trial:
+        settings = SETTINGS
         inner, nominal, white = (
             Problem([], [], core_rig(pamrs.rigs.shoulder()), SETTINGS),
             pamrs.rigs.shoulder(),

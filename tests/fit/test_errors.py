@@ -205,7 +205,9 @@ def test_exchanged_directions_are_asked_about():
         rest_length=REST,
         direction=-np.ones(len(maps[0])),
     )
-    assert noted(fit_muscle(one, muscle()), "all rows are contracting: friction cannot be told")
+    assert noted(
+        fit_muscle(one, muscle()), "all rows are contracting: friction cannot be determined"
+    )
 
 
 def test_loops_without_friction_do_not_tell_any():
