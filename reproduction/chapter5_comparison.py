@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +19,6 @@ from reproduction.tracking_runs import MIDDLE, Plan
 __all__ = ["compound", "effects", "hysteresis", "lift", "orders"]
 
 Array = NDArray[np.float64]
-
-_CURVE: Final = "5.5, Fig. 5.19"
-_LIFT: Final = "5.5, Fig. 5.20"
 
 
 def orders(plan: Plan, row: int = 0) -> dict[str, float]:

@@ -42,7 +42,6 @@ class Truth:
     wrong: bool = False
 
 
-_E = (KNOWN, OTHER, UNLISTED)
 TRUTHS: tuple[Truth, ...] = (
     Truth(), Truth(), Truth(percent=1), Truth(percent=3),
     Truth(wrong=True), Truth(wrong=True), Truth(wrong=True, percent=1),

@@ -22,8 +22,7 @@ from pamrs.recordings._headed import load_recording
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings._suspicion import ambient_of, limits_of
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
-from pamrs.rig import Parameter, Rig, load_rig
-from pamrs.rig.schema import qualified
+from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
 
 __all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
@@ -385,16 +384,13 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
 
 def _known(rig: Rig, name: str) -> Parameter:
     """A parameter of a rig, or of an effect that it holds."""
-    ids = [entry["id"] for entry in rig.effects]
-    for entry in rig.effects:
-        full, _, short = name.rpartition(".")
-        alone = full == entry["id"] and ids.count(full) == 1
-        here = alone or full == qualified(entry["id"], entry.get("at", ""))
-        if here and short in entry["parameters"]:
-            info = find_parameter(f"{entry['id']}.{short}")
-            value = float(entry["parameters"][short])
-            return Parameter(name, value, info.unit, 0.0, info.lower, info.upper)
-    return rig.parameter(name)
+    found = effect_parameter(rig, name)
+    if found is None:
+        return rig.parameter(name)
+    _, short, entry = found
+    info = find_parameter(f"{entry['id']}.{short}")
+    value = float(entry["parameters"][short])
+    return Parameter(name, value, info.unit, 0.0, info.lower, info.upper)
 
 
 def _check_logs(home: Path, entries: list[Mapping[str, Any]]) -> None:

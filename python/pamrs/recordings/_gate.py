@@ -21,6 +21,8 @@ __all__ = ["Gate", "Unpacking", "admit_arrow", "admit_matlab", "admit_numpy", "c
 
 _NUMBER: Final = 8
 """Bytes of a number as it is kept."""
+_DENSEST: Final = 100
+"""How many times smaller numbers become when they are packed, at most."""
 
 
 def check_size(rows: int, cells: int, source: str, columns: int = 0) -> None:
@@ -280,7 +282,3 @@ def _unpacked(data: bytes) -> Any:
 
         return lz4.frame.open(io.BytesIO(data))
     return bz2.open(io.BytesIO(data)) if data.startswith(b"BZh") else None
-
-
-_DENSEST: Final = 100
-"""How many times smaller numbers become when they are packed, at most."""

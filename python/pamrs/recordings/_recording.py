@@ -23,7 +23,7 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
 from pamrs.recordings._faults import Fault, find_faults
 from pamrs.recordings._suspicion import suspicions
-from pamrs.rig.schema import qualified
+from pamrs.rig import full_name, named_entries
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -228,15 +228,12 @@ class Recording:
         ParameterError
             If the rig has no such parameter, or it cannot have that value.
         """
-        ids = [entry["id"] for entry in rig.effects]
-        for entry in rig.effects:
-            names = {qualified(entry["id"], entry.get("at", ""))}
-            names |= {entry["id"]} if ids.count(entry["id"]) == 1 else set()
+        for label, entry in named_entries(rig):
             there = {
                 short: own.at(entry["parameters"][short])
                 for n, own in self.parameters.items()
                 for full, _, short in [n.rpartition(".")]
-                if full in names
+                if full in (label, full_name(entry))
             }
             if there:
                 rig = rig.with_effect(

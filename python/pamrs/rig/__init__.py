@@ -14,6 +14,7 @@ from pamrs.rig._law import force_table
 from pamrs.rig._muscle import Muscle
 from pamrs.rig._reader import Reader
 from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig
+from pamrs.rig._switching import effect_parameter, full_name, named_entries
 
 __all__ = [
     "Joint",
@@ -21,8 +22,11 @@ __all__ = [
     "Parameter",
     "Reader",
     "Rig",
+    "effect_parameter",
     "force_table",
+    "full_name",
     "load_rig",
     "muscle_problems",
+    "named_entries",
     "parse_rig",
 ]

@@ -165,7 +165,7 @@ class _Editor:
             if len(key.where) == 2 and key.where[0] not in place:
                 place[key.where[0]] = tomlkit.inline_table()
             inner = place[key.where[0]] if len(key.where) == 2 else place
-            own = dotted in self.now.model.get("own", ())
+            own = self.now.leaves_open(dotted)
             _set(inner, key.where[-1], key, (value, own), tol, old)
 
     # ------------------------------------------------------------------- effects

@@ -50,6 +50,10 @@ class Content:
     tolerances: dict[str, float] = field(default_factory=dict)
     effect_std: dict[str, dict[str, float]] = field(default_factory=dict)
 
+    def leaves_open(self, dotted: str) -> bool:
+        """Whether a parameter has another value in each recording: ``error = "own"``."""
+        return dotted in self.model.get("own", ())
+
 
 def read_model(text: str, source: str) -> Content:
     """Read rig TOML.

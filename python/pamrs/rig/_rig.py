@@ -23,7 +23,7 @@ from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._cautions import cautions_of
 from pamrs.rig._ports import Ports, connect, wiring
 from pamrs.rig._reader import Content, read_model
-from pamrs.rig._switching import Entry, full_name, new_entry, placed, without
+from pamrs.rig._switching import Entry, full_name, named_entries, new_entry, placed, without
 from pamrs.rig._writer import core_json, toml_text
 from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables_of
 
@@ -220,13 +220,9 @@ class Rig:
         ``"leak_muscle.flexor"``.
         """
         found: dict[str, dict[str, float]] = {}
-        ids = [entry["id"] for entry in self._model["effects"]]
-        for entry in self._model["effects"]:
-            full = qualified(entry["id"], entry.get("at", ""))
-            if full in self._effect_std:
-                found[entry["id"] if ids.count(entry["id"]) == 1 else full] = dict(
-                    self._effect_std[full]
-                )
+        for label, entry in named_entries(self):
+            if (full := full_name(entry)) in self._effect_std:
+                found[label] = dict(self._effect_std[full])
         return found
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pamrs._checks import checked_number, checked_table
@@ -13,8 +13,17 @@ from pamrs.rig.schema import qualified
 
 if TYPE_CHECKING:
     from pamrs.effects import Form
+    from pamrs.rig._rig import Rig
 
-__all__ = ["Entry", "full_name", "new_entry", "placed", "without"]
+__all__ = [
+    "Entry",
+    "effect_parameter",
+    "full_name",
+    "named_entries",
+    "new_entry",
+    "placed",
+    "without",
+]
 
 Entry = dict[str, Any]
 """An effect of a model: ``id``, ``parameters``, and ``at`` and ``form`` where they are given."""
@@ -127,3 +136,25 @@ def block_name(block: str, at: Any) -> str:
 def full_name(entry: Entry) -> str:
     """What an effect is called in full, ``leak_muscle.flexor``."""
     return qualified(entry["id"], entry.get("at", ""))
+
+
+def named_entries(rig: Rig) -> Iterator[tuple[str, Entry]]:
+    """Each effect of a rig with the name that its parameters begin with: its id, and behind a dot
+    the block where several have that id.
+    """
+    entries = rig.effects
+    ids = [entry["id"] for entry in entries]
+    for entry in entries:
+        yield entry["id"] if ids.count(entry["id"]) == 1 else full_name(entry), entry
+
+
+def effect_parameter(rig: Rig, name: str) -> tuple[str, str, Entry] | None:
+    """What a dotted name says of an effect that a rig holds, None where it says nothing of one: the
+    name of :func:`named_entries`, the parameter, and the effect. The block may be given where the
+    effect is the only one of its id as well.
+    """
+    full, _, short = name.rpartition(".")
+    for label, entry in named_entries(rig):
+        if full in (label, full_name(entry)) and short in entry["parameters"]:
+            return label, short, entry
+    return None

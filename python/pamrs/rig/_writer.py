@@ -93,7 +93,7 @@ def effect_lines(content: Content, effect: Mapping[str, Any]) -> list[str]:
     spread = content.effect_std.get(full, {})
     for name, value in effect["parameters"].items():
         std = f", std = {_number(spread[name])}" if name in spread else ""
-        std += _OWN if f"{full}.{name}" in content.model.get("own", ()) else ""
+        std += _OWN if content.leaves_open(f"{full}.{name}") else ""
         lines.append(f"{name} = {{ value = {_number(value)}, unit = {_text(units[name])}{std} }}")
     return lines
 
@@ -112,7 +112,7 @@ def block_lines(content: Content, block: str, name: str, table: Mapping[str, Any
         if key.name not in table:
             continue
         dotted = f"{label}.{key.name}"
-        own = dotted in content.model.get("own", ())
+        own = content.leaves_open(dotted)
         entry = entry_text(key, table[key.name], content.tolerances.get(dotted, 0.0), own=own)
         if len(key.where) == 1:
             yield f"{key.name} = {entry}"

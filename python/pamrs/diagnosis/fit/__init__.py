@@ -6,7 +6,7 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
 `with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
-`depends`, `fits`, `places_of` (where effects act); `holdable`, `without_passing`, `named_entries`,
+`depends`, `fits`, `places_of` (where effects act); `holdable`, `without_passing`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
 parameters); `spread_over_pieces` (standard deviations that hold for coloured residuals).
 """
@@ -36,7 +36,6 @@ from pamrs.diagnosis.fit._fitting import (
 from pamrs.diagnosis.fit._held import (
     holdable,
     known_parameters,
-    named_entries,
     with_known,
     without_passing,
 )
@@ -83,7 +82,6 @@ __all__ = [
     "known_parameters",
     "levenberg_marquardt",
     "look_for_events",
-    "named_entries",
     "places_of",
     "predicted_with_doubt",
     "residuals",

@@ -4,15 +4,14 @@ known of it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pamrs.diagnosis.fit._starts import CHOSEN
 from pamrs.effects import CATALOGUE, EFFECTS, Form
-from pamrs.rig import Parameter, Rig
-from pamrs.rig.schema import qualified
+from pamrs.rig import Parameter, Rig, named_entries
 
-__all__ = ["holdable", "known_parameters", "named_entries", "with_known", "without_passing"]
+__all__ = ["holdable", "known_parameters", "with_known", "without_passing"]
 
 # least tolerance of a held effect: its deviation came of a lacking model (decision 34)
 _HELD_SHARE = 0.3
@@ -20,17 +19,6 @@ _HELD_SHARE = 0.3
 
 _FIXED = (*CHOSEN, "threshold")
 """Roles of parameters that stay as the model has them: no fit has a slope in them."""
-
-
-def named_entries(rig: Rig) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Each effect of a rig with the name that its parameters begin with: its id, and behind a dot
-    the block where several have that id.
-    """
-    entries = rig.effects
-    ids = [entry["id"] for entry in entries]
-    for entry in entries:
-        alone = ids.count(entry["id"]) == 1
-        yield entry["id"] if alone else qualified(entry["id"], entry.get("at", "")), entry
 
 
 def _form(entry: Mapping[str, Any]) -> Form:

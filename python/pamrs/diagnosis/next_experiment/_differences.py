@@ -34,8 +34,7 @@ from pamrs.diagnosis.prepare import (
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.recordings import Recording
-from pamrs.rig import Rig
-from pamrs.rig.schema import qualified
+from pamrs.rig import Rig, named_entries
 from pamrs.simulation import Simulation, core_rig, has_frame, reading
 
 __all__ = [
@@ -277,10 +276,7 @@ def _free(problem: Problem, rig: Rig) -> dict[str, float]:
     """Parameters that may move, with the standard deviation of what is known [SI]."""
     out = {name: rig.parameter(name).tol for name in free_baseline(problem, rig.without_effect())}
     known = set(core_rig(rig).parameter_names)
-    ids = [effect["id"] for effect in rig.effects]
-    for effect in rig.effects:
-        alone = ids.count(effect["id"]) == 1
-        label = effect["id"] if alone else qualified(effect["id"], effect.get("at", ""))
+    for label, effect in named_entries(rig):
         spread = rig.effect_std.get(label, {})
         for parameter, given in effect["parameters"].items():
             name, value = f"{label}.{parameter}", abs(given)

@@ -17,7 +17,7 @@ from pamrs.diagnosis.prepare._unread import begins_at, with_tanks
 from pamrs.errors import SimulationError
 from pamrs.recordings import OwnValue, Recording
 from pamrs.report.text import format_number
-from pamrs.rig import Rig
+from pamrs.rig import Rig, effect_parameter
 from pamrs.rig.schema import qualified
 
 __all__ = ["own_of_rig", "said_of_own", "varying", "with_own_values"]
@@ -64,20 +64,17 @@ def _core_name(rig: Rig, name: str) -> str:
     """A parameter as the core has it: of an effect that is the only one of its id, without the
     block at which it acts.
     """
-    full, _, short = name.rpartition(".")
-    ids = [entry["id"] for entry in rig.effects]
-    found = (e["id"] for e in rig.effects if full == qualified(e["id"], e.get("at", "")))
-    alone = next((effect for effect in found if ids.count(effect) == 1), None)
-    return name if alone is None else f"{alone}.{short}"
+    found = effect_parameter(rig, name)
+    return name if found is None else ".".join(found[:2])
 
 
 def _nominal(rig: Rig, name: str) -> float:
     """What the rig file says of one of its parameters, or of one of its effects."""
-    full, _, short = name.rpartition(".")
-    for entry in rig.effects:
-        if full == qualified(entry["id"], entry.get("at", "")):
-            return float(entry["parameters"][short])
-    return rig.parameter(name).value
+    found = effect_parameter(rig, name)
+    if found is None:
+        return rig.parameter(name).value
+    _, short, entry = found
+    return float(entry["parameters"][short])
 
 
 def with_own_values(
