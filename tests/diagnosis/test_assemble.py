@@ -15,10 +15,10 @@ from pamrs.diagnosis.evidence import Candidate, Group, judge
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._assemble import _merged, _settled
 from pamrs.diagnosis.fit import Problem, fit, residuals
-from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import stand_of
 from pamrs.errors import DiagnosisError
+from pamrs.experiments import library
 from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig

@@ -10,7 +10,7 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import Experiment, Outcome, counted, outcome_of
+from pamrs.diagnosis.next_experiment import Outcome, counted, outcome_of
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
@@ -21,6 +21,7 @@ from pamrs.diagnosis.prepare import (
     residual,
 )
 from pamrs.errors import PamrsError
+from pamrs.experiments import Experiment
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import noisy

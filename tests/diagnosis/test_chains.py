@@ -15,25 +15,23 @@ from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain._next import _Question, _telling
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.next_experiment import (
+from pamrs.diagnosis.next_experiment import _planning as plan
+from pamrs.diagnosis.next_experiment import measurable, noise_of, propose
+from pamrs.diagnosis.prepare import available_blocks
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments import (
     Experiment,
     can_shut,
     chains_of,
     experiments_of,
     library,
-    measurable,
-    noise_of,
     pressure_range,
-    propose,
     protocol_of,
 )
-from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment._chains import BANDWIDTH, commands_for, driving
-from pamrs.diagnosis.next_experiment._choice import _LEAST_HIGHEST
-from pamrs.diagnosis.next_experiment._several import _rests, _stairs, _turned
-from pamrs.diagnosis.prepare import available_blocks
-from pamrs.effects import EFFECTS
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments._chains import BANDWIDTH, commands_for, driving
+from pamrs.experiments._protocols import _LEAST_HIGHEST
+from pamrs.experiments._several import _rests, _stairs, _turned
 from pamrs.recordings import Recording, load_recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig, replay
@@ -380,13 +378,13 @@ def test_pressures_that_cannot_be_found_are_told_in_words(monkeypatch) -> None:
         raise SimulationError("the gas leaves its range")
 
     with monkeypatch.context() as patched:
-        patched.setattr("pamrs.diagnosis.next_experiment._chains.simulate", fails)
+        patched.setattr("pamrs.experiments._chains.simulate", fails)
         for rig in (JOINT, pamrs.rigs.shoulder()):
             with pytest.raises(DiagnosisError, match="while its pressures rise.*leaves its range"):
                 library(rig, OWN)
     # an experiment that a model does not survive is left out, whoever simulates it
     with monkeypatch.context() as patched:
-        patched.setattr("pamrs.diagnosis.next_experiment._protocols.simulate", fails)
+        patched.setattr("pamrs.experiments._protocols.simulate", fails)
         left = {e.kind for e in library(pamrs.rigs.named("tube"), OWN)}
         assert left == {"hold_low", "hold_high", "hold_short", "hold_long"}
     text = JOINT.to_toml_text() + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'

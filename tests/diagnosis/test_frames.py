@@ -14,19 +14,13 @@ import pamrs
 from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment import (
-    chains_of,
-    experiments_of,
-    is_sealed,
-    library,
-    measurable,
-    protocol_of,
-)
+from pamrs.diagnosis.next_experiment import measurable
 from pamrs.diagnosis.next_experiment._differences import _FORCE_NOISE
-from pamrs.diagnosis.next_experiment._frame import _LEAST_STROKE
-from pamrs.diagnosis.next_experiment._strokes import _FILLING_TIME
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
+from pamrs.experiments import chains_of, experiments_of, is_sealed, library, protocol_of
+from pamrs.experiments._frame import _LEAST_STROKE
+from pamrs.experiments._strokes import _FILLING_TIME
 from pamrs.recordings import load_recording
 from pamrs.simulation import reading, replay
 from tests.diagnosis import frames

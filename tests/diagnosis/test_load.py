@@ -14,9 +14,10 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
-from pamrs.diagnosis.next_experiment import library, propose
+from pamrs.diagnosis.next_experiment import propose
 from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
 from pamrs.errors import SimulationError
+from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig

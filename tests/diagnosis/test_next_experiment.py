@@ -19,10 +19,8 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.explain._next import _pair, _Question, _telling
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import (
-    Experiment,
     _choice,
     entropy,
-    library,
     linear,
     measurable,
     misfit,
@@ -36,6 +34,7 @@ from pamrs.diagnosis.next_experiment import (
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import term_of
 from pamrs.errors import DiagnosisError, RigError
+from pamrs.experiments import Experiment, library
 from pamrs.recordings import Recording, load_recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig, replay

@@ -13,10 +13,10 @@ from pamrs.cli import main
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment import library, pressure_range, trial_of
-from pamrs.diagnosis.next_experiment._chains import BANDWIDTH
 from pamrs.diagnosis.next_experiment._differences import _KNOWN_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
+from pamrs.experiments import library, pressure_range, trial_of
+from pamrs.experiments._chains import BANDWIDTH
 from pamrs.simulation import core_rig
 
 SETTINGS = DiagnosisSettings()

@@ -10,9 +10,9 @@ import pytest
 import pamrs
 from pamrs.control.linear import linearise
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.errors import DiagnosisError, ParameterError
+from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy

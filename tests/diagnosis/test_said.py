@@ -21,9 +21,9 @@ from pamrs.diagnosis.explain import _assemble, _free_run
 from pamrs.diagnosis.explain._free_run import _OFF_NOISES
 from pamrs.diagnosis.explain._next import _telling, next_experiment
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
-from pamrs.diagnosis.next_experiment import experiments_of
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
+from pamrs.experiments import experiments_of
 from pamrs.findings import (
     BlockVerdict,
     BudgetTerm,

@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.next_experiment import checked_channels, library, measurable
+from pamrs.diagnosis.next_experiment import checked_channels, measurable
 from pamrs.diagnosis.next_experiment._choice import outcome_of
 from pamrs.diagnosis.prepare import available_blocks, thermometers_of
 from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.experiments import library
 from pamrs.recordings import Recording, propose
 from pamrs.report.chain import chain_svg
 from pamrs.rig import parse_rig

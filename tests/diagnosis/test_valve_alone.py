@@ -11,10 +11,10 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment import library
 from pamrs.diagnosis.next_experiment._differences import _PRESSURE_NOISE
 from pamrs.diagnosis.prepare import available_blocks, prepare, residual
 from pamrs.effects import EFFECTS
+from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig

@@ -31,7 +31,7 @@ LAYERS = (
     ("rig",),
     ("recordings", "rigs"),
     ("simulation",),
-    ("report",),
+    ("experiments", "report"),
     ("fit", "library"),
     ("control", "design"),
     ("sweeps",),

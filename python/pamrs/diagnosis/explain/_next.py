@@ -14,25 +14,20 @@ import numpy as np
 
 from pamrs.diagnosis.evidence import Judged, is_parameter
 from pamrs.diagnosis.fit import Problem, depends, without_term
-from pamrs.diagnosis.next_experiment import (
+from pamrs.diagnosis.next_experiment import Hypothesis, apart, noise_of, outcome_of, propose, spoken
+from pamrs.diagnosis.prepare import Block, Prepared
+from pamrs.effects import info_of, is_effect
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments import (
     Chain,
     Experiment,
-    Hypothesis,
-    apart,
     can_shut,
     chains_of,
     experiments_of,
     is_sealed,
     joined,
-    noise_of,
-    outcome_of,
-    propose,
     protocol_of,
-    spoken,
 )
-from pamrs.diagnosis.prepare import Block, Prepared
-from pamrs.effects import info_of, is_effect
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.findings import HEALTHY, NextExperiment, PairExperiment
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig

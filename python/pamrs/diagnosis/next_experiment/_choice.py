@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._losses import Losses
-from pamrs.channels import channel_of, dotted, unit_of
+from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Key, Problem, acts_in, bin_width, two_at_a_time
-from pamrs.diagnosis.next_experiment._chains import chains_of, is_sealed
 from pamrs.diagnosis.next_experiment._differences import (
     Left,
     Linear,
@@ -37,28 +36,24 @@ from pamrs.diagnosis.next_experiment._differences import (
     taken,
     weights_of,
 )
-from pamrs.diagnosis.next_experiment._experiment import Experiment
-from pamrs.diagnosis.next_experiment._frame import seen_in
-from pamrs.diagnosis.next_experiment._protocols import LEAST_SAMPLE_TIME, library
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import info_of, is_effect, place_of, term_in
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
-from pamrs.findings import Curves, NextExperiment, PairExperiment, Protocol, RankedExperiment
+from pamrs.experiments import Experiment, experiments_of, protocol_of
+from pamrs.findings import Curves, NextExperiment, PairExperiment, RankedExperiment
 from pamrs.recordings import Recording
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
-from pamrs.simulation import Simulation, core_rig, has_frame, reading
+from pamrs.simulation import Simulation, core_rig, reading
 
 __all__ = [
     "Outcome",
     "apart",
     "entropy",
-    "experiments_of",
     "information",
     "outcome_of",
     "propose",
-    "protocol_of",
     "ranked",
     "spoken",
 ]
@@ -71,12 +66,6 @@ _SETTLED_ENTROPY = 0.01  # [bit] uncertainty below which no experiment can add t
 _RESOLUTION = 0.02
 _MOST_SHOWN = 5  # experiments in the ranking
 _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests another sensor
-_RATE_WINDOW = 0.3  # [s] over which a rate is counted: noise of a length is then a tenth of a mm/s
-_MOST_SAMPLE_TIME = 0.01  # [s] longest sample time
-_LEAST_SEALED_SAMPLE_TIME = 0.05  # [s] shortest sample time of it
-_MOST_SEALED_SAMPLE_TIME = 1.0  # [s] longest sample time of it
-# [Pa] gauge reach of what was never recorded above: moves no muscle, far above its noise
-_LEAST_HIGHEST = 2e4
 
 
 Array = NDArray[np.float64]
@@ -428,15 +417,6 @@ def _simulated(experiment: Experiment, hypotheses: Sequence[Hypothesis]) -> list
         return None
 
 
-def protocol_of(experiment: Experiment) -> Protocol | None:
-    """The commands of an experiment as a rig can play them; None where nothing is sent."""
-    if not experiment.commands:
-        return None
-    time = np.arange(experiment.rows, dtype=np.float64) * experiment.sample_time
-    units = {channel: unit_of(channel) for channel in experiment.commands}
-    return Protocol(experiment.name, time, experiment.commands, units)
-
-
 def apart(outcome: Outcome, i: int, j: int, *, nested: bool = False) -> tuple[str, float]:
     """How far an experiment tells two hypotheses apart: the channel, and what the one misses of
     what the other predicts, its parameters fitted again [noise levels].
@@ -557,46 +537,6 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
         and name not in own
         and channel_of(name) not in ("line_pressure", "temperature")
     ]
-
-
-def experiments_of(
-    rig: Rig,
-    records: Sequence[Recording],
-    settings: DiagnosisSettings,
-    only: Collection[str] | None = None,
-) -> list[Experiment]:
-    """The experiments of the rig (those of some kinds, if they are given), at the sample time and
-    up to the pressures of what was recorded.
-
-    Raises
-    ------
-    DiagnosisError
-        If there are none for such a rig.
-    """
-    if not records:
-        return library(rig, settings, only=only)
-    shortest, longest = LEAST_SAMPLE_TIME, _MOST_SAMPLE_TIME
-    if is_sealed(rig):
-        shortest, longest = _LEAST_SEALED_SAMPLE_TIME, _MOST_SEALED_SAMPLE_TIME
-    step = min(max(min(r.sample_time for r in records), shortest), longest)
-    every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
-    seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
-    limits = {}
-    for chain, names in seen.items():
-        peaks = [
-            float(np.nanmax(r.channels[name]))
-            for r in records
-            for name in names
-            if name in r.channels and np.isfinite(r.channels[name]).any()
-        ]
-        if peaks:  # of one that nobody filled as well: it is filled no further
-            limits[chain] = max(*peaks, _LEAST_HIGHEST)
-    if limits:
-        # what has no gauge is moved no higher than what has one
-        highest = max(limits.values())
-        limits = {chain: limits.get(chain, highest) for chain in seen}
-    shown = seen_in(rig, records, _RATE_WINDOW) if has_frame(rig) else None
-    return library(rig, settings, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
 _WITHOUT_NAME = {

@@ -46,14 +46,13 @@ from pamrs.diagnosis.next_experiment._differences import (
     usual_noise,
     weights_of,
 )
-from pamrs.diagnosis.next_experiment._experiment import Experiment
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
-from pamrs.diagnosis.next_experiment._protocols import library
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, info_of, term_of
 from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
+from pamrs.experiments import Experiment, library
 from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified

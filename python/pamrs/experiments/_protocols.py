@@ -9,23 +9,25 @@ moved while the others are held, or all are moved at once, none as another one.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import dotted
-from pamrs.diagnosis.next_experiment._chains import (
+from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments._chains import (
     BANDWIDTH,
     Range,
     can_shut,
     chains_of,
+    is_sealed,
     joined,
     pressure_range,
     trial_of,
 )
-from pamrs.diagnosis.next_experiment._experiment import (
+from pamrs.experiments._experiment import (
     MULTISINE_FREQUENCIES,
     Experiment,
     Points,
@@ -37,21 +39,26 @@ from pamrs.diagnosis.next_experiment._experiment import (
     waves,
     within,
 )
-from pamrs.diagnosis.next_experiment._frame import Seen, frame_of
-from pamrs.diagnosis.next_experiment._several import several_library
-from pamrs.diagnosis.next_experiment._stand import Stand
-from pamrs.diagnosis.next_experiment._strokes import stroke_library
-from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.errors import DiagnosisError, ParameterError, SimulationError
+from pamrs.experiments._frame import Rates, Seen, frame_of, seen_in
+from pamrs.experiments._several import several_library
+from pamrs.experiments._stand import Stand
+from pamrs.experiments._strokes import stroke_library
+from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
-__all__ = ["library"]
+__all__ = ["experiments_of", "library"]
 
 _SAMPLE_TIME = 0.005  # [s] sample time of an experiment where no recording tells
-LEAST_SAMPLE_TIME = 0.002  # [s] shortest sample time
+_LEAST_SAMPLE_TIME = 0.002  # [s] shortest sample time
 _SEALED_SAMPLE_TIME = 0.1  # [s] sample time for a chamber without a valve, which changes slowly
+_RATE_WINDOW = 0.3  # [s] over which a rate is counted: noise of a length is then a tenth of a mm/s
+_MOST_SAMPLE_TIME = 0.01  # [s] longest sample time where recordings tell
+_LEAST_SEALED_SAMPLE_TIME = 0.05  # [s] shortest sample time of a sealed chamber
+_MOST_SEALED_SAMPLE_TIME = 1.0  # [s] longest sample time of a sealed chamber
+# [Pa] gauge reach of what was never recorded above: moves no muscle, far above its noise
+_LEAST_HIGHEST = 2e4
 # samples of a pressure that blows over, which may take 1 s to 60 s (20 ms at most)
 _MOST_BLOWN_SAMPLES = 3000
 
@@ -359,7 +366,7 @@ def _sealed_library(rig: Rig, span: Range, sample_time: float) -> list[Experimen
             f"fill {chamber} to {in_bar(span.high):g} bar and the rest to {in_bar(span.low):g} "
             f"bar, open what lies between and record {seconds:.2g} s from that moment"
         )
-        step = max(LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)
+        step = max(_LEAST_SAMPLE_TIME, seconds / _MOST_BLOWN_SAMPLES)
         out.append(_left_alone(f"blow_over.{chamber}", text, begin, seconds, step))
     return out
 
@@ -400,7 +407,7 @@ def _left_alone(
 
 def library(
     rig: Rig,
-    settings: DiagnosisSettings,
+    rates: Rates,
     *,
     sample_time: float | None = None,
     highest: float | Mapping[str, float] | None = None,
@@ -414,8 +421,8 @@ def library(
     rig : Rig
         A rig with valves or regulators, with or without arms or a load; a load frame that sets the
         pressures itself; or chambers that nobody sends a command to.
-    settings : DiagnosisSettings
-        Sample time where none is given, and bandwidth of the pressure loop.
+    rates : Rates
+        How fast a plain testing machine moves, for a rig with a load frame.
     sample_time : float, optional
         Time between samples [s].
     highest : float or mapping of str to float, optional
@@ -457,7 +464,7 @@ def library(
         span = pressure_range(rig, highest=highest)
         sealed = _sealed_library(rig, span, step)
         return [e for e in sealed if only is None or e.name in only or e.kind in only]
-    frame = frame_of(rig, settings, highest, seen) if has_frame(rig) else None
+    frame = frame_of(rig, rates, highest, seen) if has_frame(rig) else None
     stand = Stand(rig, chains, step, BANDWIDTH, frame)
     if len(chains) > 1:
         if not isinstance(highest, Mapping):
@@ -480,6 +487,46 @@ def library(
         except SimulationError:
             continue  # the model does not hold there: nothing to propose to anyone
     return out
+
+
+def experiments_of(
+    rig: Rig,
+    records: Sequence[Recording],
+    rates: Rates,
+    only: Collection[str] | None = None,
+) -> list[Experiment]:
+    """The experiments of the rig (those of some kinds, if they are given), at the sample time and
+    up to the pressures of what was recorded.
+
+    Raises
+    ------
+    DiagnosisError
+        If there are none for such a rig.
+    """
+    if not records:
+        return library(rig, rates, only=only)
+    shortest, longest = _LEAST_SAMPLE_TIME, _MOST_SAMPLE_TIME
+    if is_sealed(rig):
+        shortest, longest = _LEAST_SEALED_SAMPLE_TIME, _MOST_SEALED_SAMPLE_TIME
+    step = min(max(min(r.sample_time for r in records), shortest), longest)
+    every = tuple(dotted("muscle_pressure", name) for name in rig.tables("chamber"))
+    seen = {chain.name: chain.seen for chain in chains_of(rig)} or {"": every}
+    limits = {}
+    for chain, names in seen.items():
+        peaks = [
+            float(np.nanmax(r.channels[name]))
+            for r in records
+            for name in names
+            if name in r.channels and np.isfinite(r.channels[name]).any()
+        ]
+        if peaks:  # of one that nobody filled as well: it is filled no further
+            limits[chain] = max(*peaks, _LEAST_HIGHEST)
+    if limits:
+        # what has no gauge is moved no higher than what has one
+        highest = max(limits.values())
+        limits = {chain: limits.get(chain, highest) for chain in seen}
+    shown = seen_in(rig, records, _RATE_WINDOW) if has_frame(rig) else None
+    return library(rig, rates, sample_time=step, highest=limits or None, seen=shown, only=only)
 
 
 def _of_one(make: _Maker) -> dict[str, Callable[[], Experiment | None]]:

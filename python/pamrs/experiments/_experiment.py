@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.next_experiment._chains import driving
+from pamrs.channels import unit_of
+from pamrs.experiments._chains import driving
+from pamrs.findings import Protocol
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, has_frame, simulate
@@ -27,6 +29,7 @@ __all__ = [
     "nested_triangles",
     "of_commands",
     "other_payload",
+    "protocol_of",
     "then",
     "through",
     "waves",
@@ -139,6 +142,15 @@ class Experiment:
         return simulate(
             self.changed(rig), sample_time=self.sample_time, initial=self.initial, **driven
         )
+
+
+def protocol_of(experiment: Experiment) -> Protocol | None:
+    """The commands of an experiment as a rig can play them; None where nothing is sent."""
+    if not experiment.commands:
+        return None
+    time = np.arange(experiment.rows, dtype=np.float64) * experiment.sample_time
+    units = {channel: unit_of(channel) for channel in experiment.commands}
+    return Protocol(experiment.name, time, experiment.commands, units)
 
 
 def limited(values: Array, most: float) -> Array:

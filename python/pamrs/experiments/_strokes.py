@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.next_experiment._chains import Range, can_shut
-from pamrs.diagnosis.next_experiment._experiment import (
+from pamrs.experiments._chains import Range, can_shut
+from pamrs.experiments._experiment import (
     FREQUENCY_RATIO,
     MM,
     MULTISINE_FREQUENCIES,
@@ -27,8 +27,8 @@ from pamrs.diagnosis.next_experiment._experiment import (
     waves,
     within,
 )
-from pamrs.diagnosis.next_experiment._frame import Frame
-from pamrs.diagnosis.next_experiment._stand import Stand
+from pamrs.experiments._frame import Frame
+from pamrs.experiments._stand import Stand
 
 __all__ = ["stroke_library"]
 

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.next_experiment._chains import (
+from pamrs.experiments._chains import (
     Chain,
     Range,
     Spans,
     can_shut,
     spans_of,
 )
-from pamrs.diagnosis.next_experiment._experiment import (
+from pamrs.experiments._experiment import (
     FREQUENCY_RATIO,
     MULTISINE_FREQUENCIES,
     Experiment,
@@ -36,7 +36,7 @@ from pamrs.diagnosis.next_experiment._experiment import (
     waves,
     within,
 )
-from pamrs.diagnosis.next_experiment._stand import Stand
+from pamrs.experiments._stand import Stand
 
 __all__ = ["several_library"]
 

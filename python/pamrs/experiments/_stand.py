@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.next_experiment._chains import Chain, Range, sent_for
-from pamrs.diagnosis.next_experiment._experiment import (
+from pamrs.experiments._chains import Chain, Range, sent_for
+from pamrs.experiments._experiment import (
     Experiment,
     in_mm,
     limited,
     of_commands,
 )
-from pamrs.diagnosis.next_experiment._frame import Frame
+from pamrs.experiments._frame import Frame
 from pamrs.rig import Rig
 
 __all__ = ["Stand"]

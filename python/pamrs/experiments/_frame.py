@@ -11,18 +11,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import dotted
-from pamrs.diagnosis.next_experiment._chains import Chain, Range, Spans, chains_of, top_of
-from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.experiments._chains import Chain, Range, Spans, chains_of, top_of
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import reading, simulate
 
-__all__ = ["Frame", "Seen", "frame_of", "seen_in"]
+__all__ = ["Frame", "Rates", "Seen", "frame_of", "seen_in"]
 
 # stroke, share of the length: well beyond presliding, well inside what muscles do
 _LEAST_STROKE = 0.1
@@ -34,6 +34,24 @@ _HELD_SHARE = 0.7
 
 
 Array = NDArray[np.float64]
+
+
+class Rates(Protocol):
+    """How fast a plain testing machine moves.
+
+    Attributes
+    ----------
+    length_rate : float
+        Of the length of a muscle on a load frame [m/s].
+    pressure_rate : float
+        Of a pressure that a bench sets [Pa/s].
+    """
+
+    @property
+    def length_rate(self) -> float: ...
+
+    @property
+    def pressure_rate(self) -> float: ...
 
 
 @dataclass(frozen=True)
@@ -144,7 +162,7 @@ class Frame:
 
 def frame_of(
     rig: Rig,
-    settings: DiagnosisSettings,
+    rates: Rates,
     highest: float | Mapping[str, float] | None = None,
     seen: Seen | None = None,
 ) -> Frame:
@@ -152,15 +170,15 @@ def frame_of(
 
     The longest length is the longest that was recorded, else that of the muscle at rest; the
     shortest is where the muscle hardly pulls any more at half of its highest pressure, or, with
-    recordings, the shortest recorded one, at least ``least_stroke`` below the longest. Pressures
-    begin where the muscle pulls at the length that is held, or as low as was recorded.
+    recordings, the shortest recorded one, at least a tenth of the length below the longest.
+    Pressures begin where the muscle pulls at the length that is held, or as low as was recorded.
 
     Parameters
     ----------
     rig : Rig
         A rig with a frame and chains.
-    settings : DiagnosisSettings
-        Rates of a plain testing machine, and the least stroke.
+    rates : Rates
+        Of a plain testing machine.
     highest : float or mapping of str to float, optional
         Gauge pressures that are not to be exceeded [Pa].
     seen : Seen, optional
@@ -195,9 +213,9 @@ def frame_of(
     return Frame(
         rig,
         lengths,
-        max(settings.length_rate, 0.0 if seen is None else seen.rate),
+        max(rates.length_rate, 0.0 if seen is None else seen.rate),
         held,
-        max(settings.pressure_rate, 0.0 if seen is None else seen.pressure_rate),
+        max(rates.pressure_rate, 0.0 if seen is None else seen.pressure_rate),
         Spans({name: span.at(0.5) for name, span in alone.items()}, alone),
     )
 

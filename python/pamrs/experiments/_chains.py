@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import dotted
-from pamrs.control import OrificeInverse
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
@@ -224,19 +223,20 @@ def driving(commands: Mapping[str, Array]) -> dict[str, Any]:
 class _Valve:
     """A valve backwards: from the mass flow that is wanted in its chamber to its command."""
 
-    def __init__(self, rig: Rig, name: str, orifice: OrificeInverse) -> None:
+    def __init__(self, rig: Rig, name: str) -> None:
         gas, table = rig.tables("gas")[""], rig.tables("valve")[name]
         fed = rig.ports("valve")[name]["from"]
         kind, _, place = fed.partition(".")
         self.channel = dotted("valve_command", name)
         self.fed = dotted("supply_pressure" if kind == "supply" else "muscle_pressure", place)
-        self.orifice, self.ambient = orifice, gas["ambient_pressure"]
+        self.gas = _core.Gas(*(gas[key.name] for key in BLOCKS["gas"]))
+        self.ambient = gas["ambient_pressure"]
         self.null, self.half = table["null_voltage"], table["half_range"]
         self.table = table
         if table["flow"] == "orifice":
             self.fills = self.vents = self.widest = table["discharge_area_max"]
         else:  # the loop makes good what the widest misses of the larger path
-            unit = _core.Gas(*(gas[key.name] for key in BLOCKS["gas"])).area_of_conductance(1.0)
+            unit = self.gas.area_of_conductance(1.0)
             self.fills = unit * table["fill_conductance"]
             self.vents = unit * table["vent_conductance"]
             self.widest = unit * max(table["fill_conductance"], table["vent_conductance"])
@@ -246,7 +246,8 @@ class _Valve:
 
     def _flow(self, up: float, down: float) -> float:
         """Flow per area that a command is found for [kg/(s m2)]."""
-        return float(max(self.orifice.flow(up, down), _LEAST_SHARE * self.orifice.flow(up, 0.0)))
+        flow, choked = self.gas.mass_flow(1.0, up, np.array([down, 0.0]))
+        return float(max(flow, _LEAST_SHARE * choked))
 
     def answer(self, mass: float, inside: float, supply: float, dither: float) -> float:
         """The command for a mass flow [kg/s] into a chamber, between absolute pressures."""
@@ -335,10 +336,7 @@ def commands_for(
     n = next(iter(references.values())).size
     gas = rig.tables("gas")[""]
     ambient, warm = gas["ambient_pressure"], gas["gas_constant"] * gas["temperature"]
-    orifice = OrificeInverse(
-        ambient, gas["temperature"], gas["gas_constant"], gas["heat_capacity_ratio"]
-    )
-    valves = {c.name: [_Valve(rig, name, orifice) for name in c.valves] for c in chains}
+    valves = {c.name: [_Valve(rig, name) for name in c.valves] for c in chains}
     slopes = {name: np.gradient(values, sample_time) for name, values in references.items()}
     every = max(1, round(0.01 / sample_time))
 
