@@ -36,8 +36,13 @@ def diagnosed(recordings: list[pamrs.Recording], model: pamrs.Rig) -> pamrs.Diag
     return pamrs.diagnose(pamrs.Case("shoulder", SHOULDER, recordings, Path()), rig=model)
 
 
-def test_what_is_missing_beside_a_held_effect_is_named(recordings) -> None:
-    found = diagnosed(recordings, LEAKING)
+@pytest.fixture(scope="module")
+def found(recordings) -> pamrs.Diagnosis:
+    """With a model that has the leak already."""
+    return diagnosed(recordings, LEAKING)
+
+
+def test_what_is_missing_beside_a_held_effect_is_named(found) -> None:
     assert found.verdict == "effects"
     assert [effect.id for effect in found.effects] == ["muscle_hysteresis"]
     assert found.where.block == "arm"
@@ -55,7 +60,24 @@ def test_what_is_missing_beside_a_held_effect_is_named(recordings) -> None:
     assert isinstance(found.rig, pamrs.Rig)
     assert [entry["id"] for entry in found.rig.effects] == ["leak_muscle", "muscle_hysteresis"]
     assert found.rig.effect_std["leak_muscle"]["conductance"] == pytest.approx(fitted.std)
-    jsonschema.validate(json.loads(found.to_json()), schema())
+
+
+def test_a_diagnosis_has_the_keys_of_schema_2(found) -> None:
+    content = json.loads(found.to_json())
+    jsonschema.validate(content, schema())
+    assert content["schema"] == "pamrs.diagnosis/2"
+    (named,) = [t for t in content["budget"] if t["kind"] == "effect"]
+    assert (named["id"], named["at"]) == ("muscle_hysteresis", "")
+    told = found.effects[0].parameters["friction_constant"].value
+    assert named["parameters"]["friction_constant"]["value"] == told
+    (run,) = content["free_run"]
+    assert run["recording"] == "again"
+    angle = run["channels"]["joint_angle"]
+    assert angle["after"] < 0.5 * angle["before"]
+    assert content["settings"] == found.settings.to_dict() == {}
+    assert content["version"] == pamrs.__version__
+    for kept in content["unexplained"]:
+        assert kept["share"] is None or kept["interval"][0] <= kept["share"] <= kept["interval"][1]
 
 
 @pytest.mark.slow
@@ -88,12 +110,16 @@ def test_an_effect_that_the_plant_does_not_have_is_a_wrong_parameter() -> None:
     assert wrong.value < 0.02 * wrong.nominal
 
 
-def test_the_command_goes_on_from_the_model_that_it_wrote(recordings, tmp_path, capsys) -> None:
+def test_the_command_goes_on_from_the_model_that_it_wrote(
+    recordings, found, tmp_path, capsys, monkeypatch
+) -> None:
     given = pamrs.Case("shoulder", LEAKING, recordings, tmp_path)
     home = again.written(given, tmp_path / "case")
     model, further = tmp_path / "found" / "model.toml", tmp_path / "found" / "further.toml"
     model.parent.mkdir()
-    assert cli.main(["diagnose", str(home), "--model", str(model)]) == 0
+    with monkeypatch.context() as first:
+        first.setattr(pamrs.diagnosis, "diagnose", lambda case, consider: found)
+        assert cli.main(["diagnose", str(home), "--model", str(model)]) == 0
     assert "muscle_hysteresis" in model.read_text(encoding="utf-8")
     assert pamrs.load_rig(model).case == "../case"
     capsys.readouterr()

@@ -46,19 +46,6 @@ def test_each_suspicion_has_its_share_and_its_probability(asked: pamrs.Diagnosis
     assert base.probability < 0.05
 
 
-def test_a_wrong_value_that_is_asked_for_is_named() -> None:
-    volume = RIG.parameters["chamber.dead_volume"].value
-    truth = RIG.with_parameters({"chamber.dead_volume": 2.4 * volume})
-    found = pamrs.diagnose(again.case(truth, RIG), consider=["chamber.dead_volume"])
-    (own,) = found.considered
-    assert own.left is not None
-    assert own.left < 0.05
-    assert own.probability == pytest.approx(
-        found.blocks[0].probabilities["chamber.dead_volume"], abs=1e-6
-    )
-    assert [wrong.name for wrong in found.wrong_parameters] == ["chamber.dead_volume"]
-
-
 @pytest.mark.slow
 def test_what_cannot_be_fitted_together_is_said() -> None:
     """Two effects that happen at times of their own, and one beside a wrong value."""

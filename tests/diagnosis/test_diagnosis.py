@@ -232,7 +232,8 @@ def test_printed_chambers(name: str, leaks: bool) -> None:
         assert slow > 1e4
 
 
-@pytest.mark.parametrize("kind", [pytest.param("none", marks=pytest.mark.slow), "leak_muscle"])
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["none", "leak_muscle"])
 def test_small_blinded_trial(kind: str, tmp_path: Path) -> None:
     from trial import make_case
 

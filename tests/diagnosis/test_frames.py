@@ -5,6 +5,8 @@ that it plays, and settles what small strokes leave open.
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -35,13 +37,23 @@ OPEN = {
 """Effects that small strokes at one speed do not tell apart."""
 
 
+def after(effect: str, *moved: np.ndarray) -> pamrs.Diagnosis:
+    """The diagnosis with one more recording."""
+    truth = BENCH.with_effect(effect, OPEN[effect])
+    return pamrs.diagnose(frames.with_one_more(frames.case(truth), truth, *moved))
+
+
+@pytest.fixture(scope="module")
+def strokes() -> Callable[[str], pamrs.Diagnosis]:
+    """Of small strokes of a bench with an effect."""
+    return cache(lambda e: pamrs.diagnose(frames.case(BENCH.with_effect(e, OPEN[e]))))
+
+
 @pytest.mark.parametrize(
     "effect", ["muscle_hysteresis", pytest.param("muscle_creep", marks=pytest.mark.slow)]
 )
-def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect: str) -> None:
-    truth = BENCH.with_effect(effect, OPEN[effect])
-    given = frames.case(truth)
-    first = pamrs.diagnose(given)
+def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect, strokes) -> None:
+    first = strokes(effect)
     names = {name for names in first.ambiguity for name in names}
     assert set(OPEN) <= names
     told = first.next_experiment
@@ -55,13 +67,18 @@ def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect: st
     protocol = told.protocol
     assert protocol is not None
     assert protocol.units == {"pressure_command": "Pa", "length": "m"}
-    moved = (protocol.commands["length"], protocol.commands["pressure_command"])
-    best = pamrs.diagnose(frames.with_one_more(given, truth, *moved))
+    best = after(effect, protocol.commands["length"], protocol.commands["pressure_command"])
     assert best.ambiguity == []
     assert best.probabilities[effect] > 0.8
-    # the first recording once more, for as long
-    again = frames.strokes(0, protocol.time.size)
-    repeated = pamrs.diagnose(frames.with_one_more(given, truth, *again))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", OPEN)
+def test_small_strokes_once_more_settle_nothing(effect, strokes) -> None:
+    first = strokes(effect)
+    protocol = first.next_experiment.protocol
+    # the first recording once more, for as long as what is proposed
+    repeated = after(effect, *frames.strokes(0, protocol.time.size))
     assert repeated.ambiguity != []
     assert repeated.probabilities[effect] < 0.65
 

@@ -184,29 +184,6 @@ def test_what_happened_in_one_recording_is_in_its_free_run_only() -> None:
     assert quiet.after == quiet.before
 
 
-def test_a_diagnosis_has_the_keys_of_schema_2() -> None:
-    rig = pamrs.rigs.shoulder()
-    late = rig.with_effect("leak_muscle", {"conductance": 3e-9})
-    records = [recorded(late, f"r{k}", "fit", seed=k) for k in range(2)]
-    records.append(recorded(late, "r2", "held_out", seed=2))
-    found = pamrs.diagnose(pamrs.Case("leaky", rig, records, Path()))
-    content = json.loads(found.to_json())
-    jsonschema.validate(content, schema())
-    assert content["schema"] == "pamrs.diagnosis/2"
-    named = [t for t in content["budget"] if t["kind"] == "effect"]
-    assert {t["id"] for t in named} == {"leak_muscle"}
-    assert named[0]["parameters"]["conductance"]["value"] == pytest.approx(3e-9, rel=0.2)
-    assert named[0]["at"] == ""
-    (run,) = content["free_run"]
-    assert run["recording"] == "r2"
-    pressure = run["channels"]["muscle_pressure"]
-    assert pressure["after"] < 0.5 * pressure["before"]
-    assert content["settings"] == found.settings.to_dict() == {}
-    assert content["version"] == pamrs.__version__
-    for kept in content["unexplained"]:
-        assert kept["share"] is None or kept["interval"][0] <= kept["share"] <= kept["interval"][1]
-
-
 @pytest.mark.parametrize(("name", "read"), [("1", True), ("2", True), ("3", False)])
 def test_results_of_the_first_schema_can_still_be_read(
     tmp_path: Path, name: str, read: bool

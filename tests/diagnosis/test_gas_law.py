@@ -54,6 +54,7 @@ def test_a_true_model_misses_nothing() -> None:
     assert diagnosed(nominal, nominal).verdict == "none"
 
 
+@pytest.mark.slow
 def test_a_wall_that_takes_three_times_the_heat_is_named() -> None:
     nominal = parse_rig(TEXT)
     found = diagnosed(nominal, nominal.with_parameters({WALL: 60.0}))

@@ -65,6 +65,7 @@ def test_a_healthy_valve_misses_nothing() -> None:
     assert diagnosed().verdict == "none"
 
 
+@pytest.mark.slow
 def test_a_wrong_vent_is_named() -> None:
     found = diagnosed(vent_conductance=1.5)
     assert found.verdict == "parameters"

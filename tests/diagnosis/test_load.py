@@ -93,12 +93,10 @@ def test_the_load_is_a_block_and_its_sensitivities_are_those_of_differences() ->
         assert np.abs(slope - jacobian[:, k]).max() < 1e-3 * np.abs(slope).max(), name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "true",
-    [
-        pytest.param({"load.mass": 40.08, "muscle.modulus_scale": 1.04}, marks=pytest.mark.slow),
-        {"muscle.rest_length": 0.277},
-    ],
+    [{"load.mass": 40.08, "muscle.modulus_scale": 1.04}, {"muscle.rest_length": 0.277}],
 )
 def test_a_true_model_of_a_load_misses_nothing(true: dict[str, float]) -> None:
     found = pamrs.diagnose(case(RIG.with_parameters(true)))

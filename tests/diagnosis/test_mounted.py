@@ -44,7 +44,7 @@ def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:
     [
         ("", 0.0),
         pytest.param("joint.stiffness", 35.0, marks=pytest.mark.slow),
-        ("arm.base_angle", math.radians(-20.0)),
+        pytest.param("arm.base_angle", math.radians(-20.0), marks=pytest.mark.slow),
     ],
 )
 def test_what_is_wrong_in_the_file_is_named(name: str, true: float) -> None:

@@ -266,7 +266,9 @@ def test_every_block_has_its_own_experiment(
     assert all(name.startswith(kind) for name, kind in zip(told, kinds, strict=True))
 
 
-@pytest.mark.parametrize("wrong", [False, True], ids=["effect", "parameter"])
+@pytest.mark.parametrize(
+    "wrong", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["effect", "parameter"]
+)
 def test_every_open_pair_has_an_experiment(wrong: bool, monkeypatch) -> None:
     monkeypatch.setattr(_choice, "_LEAST_PROBABILITY", 5e-4)
     volume = SHOULDER.parameter("chamber.dead_volume")
@@ -295,6 +297,7 @@ def test_every_open_pair_has_an_experiment(wrong: bool, monkeypatch) -> None:
     assert found.to_dict()["next_experiment"]["pairs"]
 
 
+@pytest.mark.slow
 def test_an_open_place_of_an_effect_gets_an_experiment_that_plays(
     tmp_path, capsys, monkeypatch
 ) -> None:

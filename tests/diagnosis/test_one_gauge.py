@@ -84,6 +84,7 @@ def test_a_true_model_misses_nothing() -> None:
     assert not found.wrong_parameters
 
 
+@pytest.mark.slow
 def test_a_slow_regulator_is_a_wrong_value() -> None:
     found = pamrs.diagnose(case(RIG.with_parameters({"supply.time_constant": 0.25})))
     assert found.verdict == "parameters"

@@ -252,20 +252,18 @@ def effect_words() -> str:
     return info_of("leak_muscle").name
 
 
-def test_the_model_has_it_there_and_serves_again(leaking, tmp_path, capsys) -> None:
-    home = again.written(case(leaking.rig), tmp_path / "case")
+def test_the_model_has_it_there_and_is_replayed(leaking, tmp_path) -> None:
+    again.written(case(leaking.rig), tmp_path / "case")
     model = leaking.rig.with_case("case").to_toml(tmp_path / "model.toml")
     assert 'at = "flexor"' in model.read_text(encoding="utf-8")
     (entry,) = pamrs.load_rig(model).effects
     assert (entry["id"], entry["at"]) == ("leak_muscle", "flexor")
     assert pamrs.load_rig(model).effect_std["leak_muscle"]["conductance"] > 0.0
     assert cli.main(["replay", str(model), "--recording", "slow"]) == 0
-    capsys.readouterr()
-    found = pamrs.diagnose(pamrs.load_case(home), rig=pamrs.load_rig(model))
+
+
+@pytest.mark.slow
+def test_beside_what_the_model_has_there_nothing_is_missing(leaking) -> None:
+    found = pamrs.diagnose(case(leaking.rig), rig=leaking.rig)
     assert found.verdict in ("none", "parameters")
     assert "leak_muscle at flexor" in found.warnings[0]
-
-
-def test_nothing_is_named_in_a_healthy_pair() -> None:
-    found = pamrs.diagnose(case(PAIR))
-    assert found.verdict in ("none", "parameters")

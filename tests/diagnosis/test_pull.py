@@ -151,6 +151,7 @@ def test_a_torque_tells_friction_of_the_joint_from_that_of_the_muscle() -> None:
     assert not torque.fitted.refit.more_than_noise
 
 
+@pytest.mark.slow
 def test_a_muscle_that_is_a_table_is_diagnosed_as_others_are() -> None:
     """No force model: its measured map, with a kink in pressure that no other model has."""
     given = BENCH.muscle

@@ -80,7 +80,9 @@ def test_every_block_of_a_full_log_is_judged() -> None:
     ]
 
 
-@pytest.mark.parametrize("what", ["area", "leak", "nothing", "level"])
+@pytest.mark.parametrize(
+    "what", ["area", pytest.param("leak", marks=pytest.mark.slow), "nothing", "level"]
+)
 def test_valve_and_chamber_are_judged_without_a_gauge_at_the_tank(what: str) -> None:
     name = "valve.discharge_area_max"
     area, level = RIG.parameter(name), RIG.parameter("supply.initial_pressure")

@@ -63,8 +63,14 @@ def case(true: pamrs.Rig, nominal: pamrs.Rig, *, force: float = 0.0) -> pamrs.Ca
 def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor: float) -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.parameter(name).value * factor
-    found = pamrs.diagnose(case(rig.with_parameters({name: true}), rig))
+    found = pamrs.diagnose(case(rig.with_parameters({name: true}), rig), consider=[name])
     assert found.verdict == "parameters"
+    (asked,) = found.considered
+    assert asked.left is not None
+    assert asked.left < 0.05
+    assert asked.probability == pytest.approx(
+        max(b.probabilities.get(name, 0.0) for b in found.blocks), abs=1e-6
+    )
     (wrong,) = found.wrong_parameters
     assert wrong["name"] == name
     assert wrong["nominal"] == rig.parameter(name).value

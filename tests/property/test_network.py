@@ -112,27 +112,31 @@ def test_what_falls_on_a_stop(run: Run, block: str) -> None:
     assert not beyond(misses(got, run.reference(1e-10)), STOPPED)
 
 
-# A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
-# take.
-@settings(
-    max_examples=40,
-    deadline=None,
-    phases=[Phase.explicit, Phase.reuse, Phase.generate],
-    suppress_health_check=[
-        HealthCheck.too_slow,
-        HealthCheck.data_too_large,
-        HealthCheck.filter_too_much,
-    ],
-)
-@given(networks())
-def test_networks(drawn: tuple[Blocks, Run]) -> None:
-    run = drawn[1]
-    got = run.core(1e-5)
-    assume(not stops(got))
-    # the reference, too, can be off where a flow turns: it is asked again with a smaller tolerance
-    assert not beyond(misses(got, run.reference(1e-10)), SMOOTH) or not beyond(
-        misses(got, run.reference(1e-11)), SMOOTH
+@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.slow)])
+def test_networks(examples: int) -> None:
+    # A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
+    # take.
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        phases=[Phase.explicit, Phase.reuse, Phase.generate],
+        suppress_health_check=[
+            HealthCheck.too_slow,
+            HealthCheck.data_too_large,
+            HealthCheck.filter_too_much,
+        ],
     )
+    @given(networks())
+    def agree(drawn: tuple[Blocks, Run]) -> None:
+        run = drawn[1]
+        got = run.core(1e-5)
+        assume(not stops(got))
+        # the reference, too, can be off where a flow turns: it is asked again, more exactly
+        assert not beyond(misses(got, run.reference(1e-10)), SMOOTH) or not beyond(
+            misses(got, run.reference(1e-11)), SMOOTH
+        )
+
+    agree()
 
 
 def bottled(front: dict[str, Any], dead_band: float, *, line: bool) -> pamrs.Rig:

@@ -229,26 +229,22 @@ class MuscleTable:
         self, scale: float, pieces: list[tuple[float, float, list[Chebyshev], Chebyshev]]
     ) -> None:
         self.scale = scale
-        self.pieces = pieces
+        self.pieces = []
+        for low, high, fits, slope in pieces:
+            order = np.arange(fits[0].coef.size)
+            rows = [*(f.coef for f in fits), np.append(slope.coef, 0.0)]
+            self.pieces.append((low, high, order, np.array(rows)))
 
     def __call__(self, e: float, pressure: float) -> tuple[float, float, float]:
         """Force (N), air volume (m^3) and dV/de (m^3) at contraction ratio `e`, gauge `pressure`
         (Pa).
         """
-        for low, high, fits, slope in self.pieces:
+        for low, high, order, rows in self.pieces:
             if low <= e <= high:
-                a_gas, a_elastic, b_elastic, volume = (_clenshaw(f, e) for f in fits)
+                # T_k(cos t) = cos(k t)
+                angle = math.acos(max(-1.0, min(1.0, (2.0 * e - low - high) / (high - low))))
+                found = (rows @ np.cos(order * angle)).tolist()
+                a_gas, a_elastic, b_elastic, volume, slope = found
                 force = pressure * a_gas + self.scale * (pressure * a_elastic + b_elastic)
-                return force, volume, _clenshaw(slope, e)
+                return force, volume, slope
         raise ValueError(f"contraction ratio {e} outside the table")
-
-
-def _clenshaw(series: Chebyshev, x: float) -> float:
-    """Value of a Chebyshev series at one point (plain floats: the integrator calls this often)."""
-    low, high = series.domain
-    y = 2.0 * (2.0 * x - low - high) / (high - low)
-    b1 = b2 = 0.0
-    coef = series.coef.tolist()
-    for c in coef[:0:-1]:
-        b1, b2 = c + y * b1 - b2, b1
-    return float(coef[0] + 0.5 * y * b1 - b2)
