@@ -22,7 +22,7 @@ from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
 from pamrs.experiments import chains_of, experiments_of, is_sealed, library, protocol_of
 from pamrs.experiments._frame import _LEAST_STROKE
-from pamrs.experiments._strokes import _FILLING_TIME
+from pamrs.experiments._maker import _FILLING_TIME
 from pamrs.recordings import load_recording
 from pamrs.simulation import reading, replay
 from tests.diagnosis import frames

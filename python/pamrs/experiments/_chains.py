@@ -613,7 +613,7 @@ class Spans:
 def spans_of(
     rig: Rig,
     *,
-    highest: Mapping[str, float] | None = None,
+    highest: float | Mapping[str, float] | None = None,
 ) -> Spans:
     """Pressures of a rig of several chains: all rise together, which says at which each is held;
     then each rises alone.
@@ -622,8 +622,8 @@ def spans_of(
     ----------
     rig : Rig
         A rig of several chains.
-    highest : mapping of str to float, optional
-        Gauge pressures by chain that are not to be exceeded [Pa].
+    highest : float or mapping of str to float, optional
+        Gauge pressures, by chain or of all, that are not to be exceeded [Pa].
 
     Raises
     ------

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,50 +16,9 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, has_frame, simulate
 
-__all__ = [
-    "BAR",
-    "MM",
-    "Experiment",
-    "Points",
-    "in_bar",
-    "in_mm",
-    "limited",
-    "listed",
-    "nested_triangles",
-    "of_commands",
-    "other_payload",
-    "protocol_of",
-    "then",
-    "through",
-    "waves",
-    "within",
-]
-
-# [Hz] of a multisine, lowest first: from slow creep to the band of an arm's joint
-MULTISINE_FREQUENCIES = (0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1)
-# from one to the next, shared by multisines of several chains: just below their mean, 1.77
-FREQUENCY_RATIO = 1.7
-
+__all__ = ["Experiment", "in_bar", "in_mm", "limited", "other_payload", "protocol_of"]
 
 Array = NDArray[np.float64]
-Points = list[tuple[float, float]]
-
-
-@dataclass(frozen=True)
-class Said:
-    """How a quantity is said: its unit, the factor from SI, and digits behind the point."""
-
-    unit: str
-    factor: float
-    digits: int
-
-    def __call__(self, value: float) -> float:
-        """A value in SI as it is said."""
-        return round(value * self.factor, self.digits)
-
-
-BAR = Said("bar", 1e-5, 2)  # pressures are told in hundredths of a bar
-MM = Said("mm", 1e3, 1)  # lengths in tenths of a millimetre
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,48 +124,14 @@ def limited(values: Array, most: float) -> Array:
     return out
 
 
-def waves(frequencies: Array, time: Array, turned: float) -> Array:
-    """A sum of sines (n,) that grow smaller above 0.6 Hz, their phases by Schroeder's rule and
-    turned by an angle [rad], so that its peaks are low.
-    """
-    count = frequencies.size
-    size = 1.0 / np.sqrt(1.0 + (frequencies / 0.6) ** 2)
-    phase = -np.pi * np.arange(count) * np.arange(1, count + 1) / count + turned
-    each = np.sin(2 * np.pi * frequencies[:, None] * time + phase[:, None])
-    return np.asarray((size[:, None] * each).sum(axis=0))
-
-
-def listed(words: Sequence[str]) -> str:
-    """``a``, ``a and b``, ``a, b and c``."""
-    *first, last = words
-    return f"{', '.join(first)} and {last}" if first else last
-
-
-def through(points: Points, sample_time: float) -> Array:
-    """Straight lines through (time, value) points."""
-    end = points[-1][0]
-    time = np.arange(round(end / sample_time) + 1) * sample_time
-    return np.asarray(
-        np.interp(time, [p[0] for p in points], [p[1] for p in points]), dtype=np.float64
-    )
-
-
-def then(points: Points, *legs: tuple[float, float]) -> Points:
-    """Points continued by (duration, value) legs."""
-    out = list(points)
-    for duration, value in legs:
-        out.append((out[-1][0] + duration, value))
-    return out
-
-
 def in_bar(pressure: float) -> float:
-    """A pressure as it is said [bar]."""
-    return BAR(pressure)
+    """A pressure as it is said: in hundredths of a bar."""
+    return round(pressure * 1e-5, 2)
 
 
 def in_mm(length: float) -> float:
-    """A length as it is said [mm]."""
-    return MM(length)
+    """A length as it is said: in tenths of a millimetre."""
+    return round(length * 1e3, 1)
 
 
 def other_payload(rig: Rig) -> tuple[str, float, str] | None:
@@ -229,77 +153,3 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
         return None
     other = max(others, key=lambda m: abs(m - now)) if others else 0.5 * now
     return name, other, "" if others else f"another payload, about {other:.3g} kg"
-
-
-def nested_triangles(
-    low: float,
-    high: float,
-    what: str,
-    said: Said = BAR,
-    periods: tuple[float, float] = (12.0, 1.2),
-) -> tuple[Points, str, dict[str, Any]]:
-    """Triangles of three sizes around the middle of a range of pressures [Pa] or lengths [m], slow
-    and then fast: corners, words and numbers.
-    """
-    middle, reach = low + 0.5 * (high - low), 0.45 * (high - low)
-    sizes = (1.0, 0.6, 0.3)
-    points: Points = then([(0.0, 0.0)], (2.0, middle))
-    for period in periods:
-        for share in sizes:
-            points = then(
-                points,
-                (0.25 * period, middle + share * reach),
-                (0.5 * period, middle - share * reach),
-                (0.25 * period, middle),
-            )
-    reaches, unit = [said(share * reach) for share in sizes], said.unit
-    text = (
-        f"drive {what} in nested triangles around {said(middle):g} {unit}, of "
-        f"±{reaches[0]:g}, ±{reaches[1]:g} and ±{reaches[2]:g} {unit}, "
-        f"first with a period of {periods[0]:g} s, then of {periods[1]:g} s"
-    )
-    numbers = {
-        f"middle_{unit}": said(middle),
-        f"reach_{unit}": reaches,
-        "periods_s": list(periods),
-    }
-    return points, text, numbers
-
-
-def of_commands(
-    name: str,
-    text: str,
-    excitation: dict[str, Any],
-    sent: Mapping[str, Array],
-    sample_time: float,
-    *,
-    initial: dict[str, float] | None = None,
-    changes: dict[str, float] | None = None,
-    extra: float = 0.0,
-    needs: str = "",
-) -> Experiment:
-    """The experiment that plays commands (n,), by channel, and takes ``extra`` seconds more."""
-    (channel, command), *also = sent.items()
-    seconds = (command.size - 1) * sample_time
-    return Experiment(
-        name,
-        text,
-        {"kind": name, **excitation, "duration_s": round(seconds, 1)},
-        command,
-        command.size,
-        sample_time,
-        initial or {},
-        changes or {},
-        seconds + extra,
-        channel,
-        needs,
-        dict(also),
-    )
-
-
-def within(rows: int, sample_time: float, spans: list[tuple[float, float]]) -> NDArray[np.bool_]:
-    """Which of so many samples lie in one of some spans of time [s], the ends of spans left out."""
-    time, inside = np.arange(rows) * sample_time, np.zeros(rows, dtype=bool)
-    for begin, end in spans:
-        inside |= (time >= begin) & (time < end)
-    return inside
