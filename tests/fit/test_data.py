@@ -433,11 +433,11 @@ def test_descriptions_find_delimiter_and_decimal_mark(described):
     [
         (
             "length [mm],pressure [bar],force [N]\n300,5,1,0,12,3\n290,5,1,0,8,5\n",
-            "3 cells, row 2 has 6.*both part.*delimiter and decimal",
+            "3 cells .*: row 2 has 6.*both part.*delimiter and decimal",
         ),
         (
             "bench 7\nlength [mm];pressure [bar];force [N]\n300;1;12\n",
-            "'bench 7', is not parted.*delimiter and decimal",
+            "'bench 7'.*must hold the headings; give delimiter and decimal",
         ),
         (
             "length_mm;pressure_bar;force_N\n300,5;1.5;12\n290;1;8\n",

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
-from pamrs.fit._dialect import decimal_of, delimiter_of
 from pamrs.recordings import load_recording
 from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
-from pamrs.recordings.logs import ENDINGS, read_log
+from pamrs.recordings.dialect import decimal_of, dialect_of
+from pamrs.recordings.logs import read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, read_text
 from pamrs.units import parse_unit, same_dimension, to_si
 
@@ -95,8 +95,7 @@ def read_map(
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     _one_character(delimiter, decimal, source)
-    delimiter = delimiter or _delimiter(file)
-    table = _table(file, delimiter, columns)
+    delimiter, table = _table(file, delimiter, decimal, columns)
     headings, lines = _renamed(table, columns, source)
     found, strange = _understood(headings, lines, source)
     decimal = decimal or decimal_of(_texts(table, found), source)
@@ -174,58 +173,36 @@ def _one_character(delimiter: str | None, decimal: str | None, source: str) -> N
         )
 
 
-def _delimiter(file: Path) -> str:
-    if not is_text(file) or _is_log(file):
-        return ","
-    return delimiter_of(read_text(file), str(file))
-
-
-def _is_log(file: Path) -> bool:
-    """Whether a file is a log of a kind that only :mod:`pamrs.recordings.logs` reads."""
-    kind = Path(file.name.lower().removesuffix(".gz")).suffix
-    return kind in ENDINGS and kind not in (".csv", ".tsv", ".txt", ".dat", ".parquet")
-
-
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:
     """Cells of the columns with numbers, where they are text."""
     columns = [
-        table.cells[column.position] for channel, column in found.items() if channel != "direction"
+        table.cells(column.position) for channel, column in found.items() if channel != "direction"
     ]
     return [cells for cells in columns if not isinstance(cells, np.ndarray)]
 
 
-def _table(file: Path, delimiter: str, columns: Columns | None) -> Table:
-    """The table of a file, with headings or, where they are listed, without."""
-    if _is_log(file):
-        return _table_of_log(file)
-    if is_text(file):
-        listed = columns is not None and not isinstance(columns, Mapping)
-        table = read_table(file, delimiter=delimiter, header=True)
-        if not any(_NUMERIC.fullmatch(cell.strip()) for cell in table.header or []):
-            return table
-        if not listed:
-            raise RecordingError(
-                f"{file}: the first row has numbers, {', '.join(table.header or [])[:60]!r}, and "
-                'no headings: say what each column is, columns = ["length [mm]", "force [N]", "", '
-                '"pressure [bar]"] in a .toml description (in Python: the argument columns)'
-            )
-        return read_table(file, delimiter=delimiter, header=False)
-    return read_table(file, delimiter=delimiter, header=True)
-
-
-def _table_of_log(file: Path) -> Table:
-    """The columns of a log that are as long as most."""
-    log = read_log(file)
-    counts = [len(series.values) for series in log.series.values()]
-    usual = max(set(counts), key=counts.count)
-    header: list[str] = []
-    cells: list[Sequence[str] | Array] = []
-    for series in log.series.values():
-        if len(series.values) == usual:
-            header.append(f"{series.name} [{series.unit}]" if series.unit else series.name)
-            texts = [series.labels[int(at)] for at in series.values] if series.labels else None
-            cells.append(series.values if texts is None else texts)
-    return Table(header, cells, list(range(2, usual + 2)), list(log.remarks))
+def _table(
+    file: Path, delimiter: str | None, decimal: str | None, columns: Columns | None
+) -> tuple[str, Table]:
+    """The table of a file, with headings or, where they are listed, without, and what separates
+    its cells.
+    """
+    if not is_text(file):
+        return ",", table_of(read_log(file))
+    if delimiter is None:
+        lines = [line for line in read_text(file).splitlines() if line.strip()]
+        delimiter = dialect_of(lines[1:], str(file), None, decimal).delimiter
+    listed = columns is not None and not isinstance(columns, Mapping)
+    table = read_table(file, delimiter=delimiter, header=True)
+    if not any(_NUMERIC.fullmatch(cell) for cell in table.header or []):
+        return delimiter, table
+    if not listed:
+        raise RecordingError(
+            f"{file}: the first row has numbers, {', '.join(table.header or [])[:60]!r}, and "
+            'no headings: say what each column is, columns = ["length [mm]", "force [N]", "", '
+            '"pressure [bar]"] in a .toml description (in Python: the argument columns)'
+        )
+    return delimiter, read_table(file, delimiter=delimiter, header=False)
 
 
 def _renamed(
@@ -240,7 +217,7 @@ def _renamed(
             f"{source}: columns = {columns!r} is not allowed: a table from headings to headings, "
             "or a list of one for each column"
         )
-    count = len(table.cells)
+    count = table.width
     if not isinstance(columns, Mapping):
         if len(columns) != count:
             raise RecordingError(
@@ -378,9 +355,9 @@ def _has(name: str, header: Sequence[str]) -> str:
 
 
 def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: str) -> Array:
-    if channel == "direction" and not isinstance(table.cells[column.position], np.ndarray):
+    if channel == "direction" and not isinstance(table.cells(column.position), np.ndarray):
         return _direction_cells(
-            [str(cell) for cell in table.cells[column.position]],
+            [str(cell) for cell in table.cells(column.position)],
             column.heading,
             table.row_numbers,
             source,
@@ -437,14 +414,14 @@ def _cells(table: Table, heading: str, source: str) -> list[str]:
         raise RecordingError(
             f"{source}: where names the column {heading!r}, but {_has(heading, header)}"
         )
-    return [str(cell).strip() for cell in table.cells[header.index(heading)]]
+    return [str(cell).strip() for cell in table.cells(header.index(heading))]
 
 
 def _kept(
     table: Table, where: Mapping[str, str], decimal: str, source: str
 ) -> tuple[NDArray[np.bool_], list[str]]:
     """Rows that ``where`` asks for, and a note about the others."""
-    keep = np.ones(len(table.cells[0]), dtype=bool)
+    keep = np.ones(len(table.row_numbers), dtype=bool)
     for heading, value in where.items():
         cells = _cells(table, heading, source)
         same = np.array([_alike(cell, value, decimal) for cell in cells])
@@ -494,10 +471,10 @@ def _channels(table: Table, found: Mapping[str, _Column]) -> list[str]:
         raise RecordingError(
             "a recording with a time column needs the column length, not contraction"
         )
-    headings = [""] * len(table.cells)
+    headings = [""] * table.width
     for channel, (index, _, unit, _) in found.items():
         if channel == "pressure":
-            held = len(set(np.asarray(table.cells[index]).tolist())) < _SET_POINTS
+            held = len(set(np.asarray(table.cells(index)).tolist())) < _SET_POINTS
             headings[index] = f"{'reference' if held else 'muscle_pressure'} [{unit}]"
         elif channel != "direction":
             headings[index] = f"{channel} [{unit}]"

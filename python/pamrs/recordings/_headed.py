@@ -20,7 +20,8 @@ from pamrs.recordings._gauge import made_gauge
 from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS, Issue, Recording
 from pamrs.recordings._several_clocks import recording_of, sampled
 from pamrs.recordings._stamps import Ticks, ticks
-from pamrs.recordings.table import Table, read_table, thousands_of
+from pamrs.recordings.logs import read_log, table_of
+from pamrs.recordings.table import Table, is_text, read_table, thousands_of
 from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["load_recording"]
@@ -46,7 +47,8 @@ def load_recording(
     Parameters
     ----------
     path : path-like
-        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``) or ``.parquet``.
+        ``.csv``, ``.tsv``, ``.txt``, ``.dat`` (each also ``.gz``), or any other log that
+        :func:`pamrs.recordings.logs.read_log` reads, such as ``.parquet``.
     columns : sequence or mapping of str, optional
         Headings ``"name [unit]"`` to use instead of the file's: one for each column in order, or a
         mapping from the file's headings. An empty heading leaves the column out.
@@ -95,7 +97,10 @@ def load_recording(
         raise RecordingError(
             f"{source}: without a header, columns must list what each column is: 'name [unit]'"
         )
-    table = read_table(file, delimiter=delimiter, header=header, decimal=decimal)
+    if is_text(file):
+        table = read_table(file, delimiter=delimiter, header=header)
+    else:
+        table = table_of(read_log(file))
     wanted = _understood(_headings(table, columns, source), source)
     remarks = [("time", text) for text in table.remarks]
     raw, units = _si_columns(table, wanted, source, thousands, decimal, remarks)
@@ -149,10 +154,9 @@ def _headings(
                 f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
             )
         return [columns.get(heading, heading) for heading in given]
-    if len(columns) != len(table.cells):
+    if len(columns) != table.width:
         raise RecordingError(
-            f"{source}: columns lists {len(columns)} headings, but there are {len(table.cells)} "
-            "columns"
+            f"{source}: columns lists {len(columns)} headings, but there are {table.width} columns"
         )
     return list(columns)
 

@@ -1,71 +1,177 @@
-"""Reads the table of a recording: text or Parquet in, columns of numbers out.
+"""The reader of text tables: bytes in, rows of one width and columns of numbers out.
 
-Nothing is judged here but whether a cell is a number; empty cells and the usual words for "no
-value" become NaN.
+Whole blocks of rows are parsed by NumPy; only blocks with a cell that is no number are taken apart
+cell by cell. Empty cells and the usual words for "no value" become NaN. Which columns are what is
+for those who call it.
 """
 
 from __future__ import annotations
 
 import csv
-import io
 import math
 import zlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._files import MOST_BYTES, MOST_SIZE, read_file
+from pamrs._files import MOST_SIZE, read_file
 from pamrs.errors import RecordingError
-from pamrs.recordings._gate import admit_arrow, check_size
+from pamrs.recordings._gate import check_size
 
 __all__ = [
     "NO_VALUE",
+    "TEXT",
+    "Lines",
     "Table",
     "is_text",
-    "numbers_in",
-    "numbers_of_cells",
+    "lines_of",
+    "lines_of_rows",
     "read_table",
     "read_text",
+    "same_width",
     "split_rows",
+    "thousands_of",
     "told_cells",
     "told_rows",
+    "usual_width",
 ]
 
 Array = NDArray[np.float64]
 
 NO_VALUE = frozenset({"", "nan", "na", "n/a", "null", "none", "-", "--", "inf", "-inf", "+inf"})
-_TEXT = (".csv", ".tsv", ".txt", ".dat", "")
+#: Endings of files that are read as text; each may be packed (``.gz``).
+TEXT: Final = (".csv", ".tsv", ".txt", ".dat", "")
+_PART: Final = "\x1f"  # stands between cells that were quoted, or are no text of a file
+_BLOCK: Final = 2000  # rows that are parsed together
+_CUT: Final = 20  # one row in so many may be cut short
+
+
+class Lines(NamedTuple):
+    """Rows of a text.
+
+    Attributes
+    ----------
+    lines : list of str
+        One for each row.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
+    numbers : sequence of int
+        Number of each in the file, from 1, as an editor counts.
+    """
+
+    lines: list[str]
+    delimiter: str
+    numbers: Sequence[int]
+
+    def rows(self, start: int = 0, stop: int | None = None) -> list[list[str]]:
+        """Cells of some rows, without blanks around them."""
+        return [[cell.strip() for cell in self.parted(line)] for line in self.lines[start:stop]]
+
+    def parted(self, line: str) -> list[str]:
+        """Cells of one row."""
+        return line.split() if self.delimiter == " " else line.split(self.delimiter)
+
+    def widths(self) -> list[int]:
+        """How many cells each row has."""
+        if self.delimiter == " ":
+            return [len(line.split()) for line in self.lines]
+        return [line.count(self.delimiter) + 1 for line in self.lines]
+
+    def only(self, places: Sequence[int]) -> Lines:
+        """Some of the rows."""
+        if len(places) == len(self.lines):
+            return self
+        return Lines(
+            [self.lines[i] for i in places], self.delimiter, [self.numbers[i] for i in places]
+        )
+
+    def after(self, count: int) -> Lines:
+        """The rows below the first ones."""
+        return Lines(self.lines[count:], self.delimiter, self.numbers[count:])
 
 
 class Table:
-    """Raw columns of a file.
+    """Columns of a file.
 
     Parameters
     ----------
     header : list of str or None
         The file's own headings, None when it has none.
-    cells : sequence of columns
-        For text files the cells of each column, for others numbers.
-    row_numbers : list of int
-        Number of each row (from 1, as an editor counts them; the header and blank rows count).
-    remarks : list of str
+    body : Lines or sequence of columns
+        Rows of one width; for files that are no text the cells or numbers of each column.
+    remarks : sequence of str
         Rows that were left out, and why.
     """
 
     def __init__(
         self,
         header: list[str] | None,
-        cells: Sequence[Sequence[str] | Array],
-        row_numbers: Sequence[int],
-        remarks: list[str],
+        body: Lines | Sequence[Sequence[str] | Array],
+        remarks: Sequence[str] = (),
     ) -> None:
         self.header = header
-        self.cells = cells
-        self.row_numbers = row_numbers
-        self.remarks = remarks
+        self.remarks = list(remarks)
+        self._lines = body if isinstance(body, Lines) else None
+        self._columns: dict[int, Sequence[str] | Array] = {}
+        self._matrices: dict[str, _Matrix] = {}
+        if isinstance(body, Lines):
+            self.row_numbers = body.numbers
+            self.width = len(body.parted(body.lines[0])) if body.lines else 0
+        else:
+            self._columns = dict(enumerate(body))
+            self.width = len(body)
+            self.row_numbers = range(2, 2 + len(body[0]))
+
+    def cells(self, index: int) -> Sequence[str] | Array:
+        """Column ``index`` as the file has it: texts, or numbers where it is no text file."""
+        if index not in self._columns and self._lines is not None:
+            part = self._lines.parted
+            self._columns[index] = [part(line)[index].strip() for line in self._lines.lines]
+        return self._columns[index]
+
+    def cell(self, index: int, row: int) -> str:
+        """One cell of a column."""
+        if index in self._columns or self._lines is None:
+            return str(self.cells(index)[row])
+        return self._lines.parted(self._lines.lines[row])[index].strip()
+
+    def read(self, index: int, thousands: str | None, decimal: str) -> tuple[Array, list[int]]:
+        """Numbers of column ``index``.
+
+        Parameters
+        ----------
+        index : int
+            Which column.
+        thousands : str or None
+            Mark between groups of digits.
+        decimal : str
+            Decimal mark.
+
+        Returns
+        -------
+        values : (n,) array
+            NaN where there is no number.
+        strange : list of int
+            Rows of cells that are neither a number nor a usual word for none.
+        """
+        if thousands is None and self._lines is not None:
+            if decimal not in self._matrices:
+                self._matrices[decimal] = _matrix(self._lines, decimal, self.width)
+            matrix = self._matrices[decimal]
+            if index not in matrix.whole:
+                return matrix.values[index], matrix.strange[index]
+        cells = self.cells(index)
+        if isinstance(cells, np.ndarray):
+            return cells, []
+        return _numbers_of_cells(cells, thousands, decimal)
+
+    def doubtful(self, index: int, decimal: str) -> bool:
+        """Whether only all cells of a column together tell how its numbers are written."""
+        matrix = self._matrices.get(decimal)
+        return matrix is not None and index in matrix.whole
 
     def samples(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -84,16 +190,14 @@ class Table:
         RecordingError
             If too many are none: the column is written in another way, or is another one.
         """
-        cells = self.cells[index]
-        if isinstance(cells, np.ndarray):
-            return cells, ""
-        values, strange = numbers_of_cells(cells, thousands, decimal)
+        values, strange = self.read(index, thousands, decimal)
         if not strange:
             return values, ""
-        hint = _number_hint(cells[strange[0]], thousands, decimal)
-        if len(strange) > len(cells) // (20 if hint else 5):
+        cells = [self.cell(index, row) for row in strange]
+        hint = _number_hint(cells[0], thousands, decimal)
+        if len(strange) > len(values) // (20 if hint else 5):
             self.numbers(index, label, source, thousands, decimal)  # says which
-        return values, told_cells([cells[row] for row in strange])
+        return values, told_cells(cells)
 
     def numbers(
         self, index: int, label: str, source: str, thousands: str | None, decimal: str
@@ -105,12 +209,9 @@ class Table:
         RecordingError
             If a cell is not a number; the message names column, row and cell.
         """
-        cells = self.cells[index]
-        if isinstance(cells, np.ndarray):
-            return cells
-        values, strange = numbers_of_cells(cells, thousands, decimal)
+        values, strange = self.read(index, thousands, decimal)
         for row in strange:
-            text = cells[row].strip()
+            text = self.cell(index, row)
             raise RecordingError(
                 f"{source}: column {label!r}, row {self.row_numbers[row]}: {text[:40]!r} is not a "
                 "number" + _number_hint(text, thousands, decimal)
@@ -118,27 +219,62 @@ class Table:
         return values
 
 
-def numbers_of_cells(
+class _Matrix(NamedTuple):
+    """Numbers of all columns, the rows of each whose cells are none, and the columns that only all
+    their cells together tell how to read.
+    """
+
+    values: Array
+    strange: list[list[int]]
+    whole: set[int]
+
+
+def _matrix(body: Lines, decimal: str, width: int) -> _Matrix:
+    values = np.full((width, len(body.lines)), math.nan)
+    strange: list[list[int]] = [[] for _ in range(width)]
+    whole: set[int] = set()
+    for start in range(0, len(body.lines), _BLOCK):
+        wanted = [index for index in range(width) if index not in whole]
+        lines = body.lines[start : start + _BLOCK]
+        stop = start + len(lines)
+        parsed = _parsed(lines, body.delimiter, decimal, wanted if whole else None)
+        if parsed is not None:
+            values[wanted, start:stop] = parsed.T
+            continue
+        columns = list(zip(*map(body.parted, lines), strict=True))
+        for index in wanted:
+            own, odd = _numbers_of_cells(columns[index], None, decimal)
+            values[index, start:stop] = own
+            strange[index] += [start + row for row in odd]
+            pointed = decimal == "," and any("." in cell for cell in columns[index])
+            if pointed or 2 * len(odd) > len(lines):
+                whole.add(index)
+    values[~(np.abs(values) < MOST_SIZE)] = math.nan
+    return _Matrix(values, strange, whole)
+
+
+def _parsed(
+    lines: list[str], delimiter: str, decimal: str, columns: list[int] | None
+) -> Array | None:
+    """Rows of nothing but numbers, as NumPy reads them; None where a cell is none, or may be read
+    in two ways.
+    """
+    if decimal != ".":
+        text = "\n".join(lines)
+        if "." in text:  # points may part thousands
+            return None
+        lines = text.replace(decimal, ".").split("\n")
+    mark = None if delimiter == " " else delimiter
+    try:
+        values = np.loadtxt(lines, delimiter=mark, ndmin=2, comments=None, usecols=columns)
+    except ValueError:
+        return None
+    return values if len(values) == len(lines) else None
+
+
+def _numbers_of_cells(
     cells: Sequence[str], thousands: str | None, decimal: str
 ) -> tuple[Array, list[int]]:
-    """Numbers of cells.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        As they stand in the file.
-    thousands : str or None
-        Mark between groups of digits.
-    decimal : str
-        Decimal mark.
-
-    Returns
-    -------
-    values : (n,) array
-        NaN where there is no number.
-    strange : list of int
-        Rows of cells that are neither a number nor a usual word for none.
-    """
     plain = [cell.replace(thousands, "") for cell in cells] if thousands else cells
     if decimal != ".":
         plain = [cell.replace(decimal, ".") for cell in plain]
@@ -148,11 +284,10 @@ def numbers_of_cells(
     except ValueError:
         values = np.full(len(plain), math.nan)
         for row, cell in enumerate(plain):
-            text = cell.strip()
-            if text.lower() not in NO_VALUE:
-                try:
-                    values[row] = float(text)
-                except ValueError:
+            try:
+                values[row] = float(cell)
+            except ValueError:
+                if cell.strip().lower() not in NO_VALUE:
                     strange.append(row)
     values[~(np.abs(values) < MOST_SIZE)] = math.nan
     return values, strange
@@ -166,6 +301,13 @@ def told_cells(cells: Sequence[str]) -> str:
     return f"{count} ({some}): taken as missing"
 
 
+def told_rows(numbers: Sequence[int], what: str) -> list[str]:
+    """What is said of rows that are left out: none where there is none."""
+    if not numbers:
+        return []
+    return [f"{what}: {len(numbers)} (first: row {numbers[0]}), left out"]
+
+
 def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
     if decimal == "." and "," in text:
         return " (give decimal=',' if the comma is the decimal mark)"
@@ -174,19 +316,213 @@ def _number_hint(text: str, thousands: str | None, decimal: str) -> str:
     return ""
 
 
-def read_table(path: Path, *, delimiter: str, header: bool, decimal: str = "") -> Table:
-    """Read the table of one file.
+def is_text(path: Path) -> bool:
+    """Whether a file is read as text, by its ending; the others are logs of their own kinds."""
+    ending = path.with_suffix("").suffix if path.suffix.lower() == ".gz" else path.suffix
+    return ending.lower() in TEXT
+
+
+def read_text(path: Path) -> str:
+    """Text of a file, unpacked.
 
     Parameters
     ----------
     path : Path
-        The file; the ending tells the format.
+        The file; ``.gz`` is unpacked.
+
+    Returns
+    -------
+    str
+        By its mark of byte order, by its zero bytes, as UTF-8, or as Windows writes it.
+
+    Raises
+    ------
+    RecordingError
+        If the file is missing, unreadable, empty or no text.
+    """
+    try:
+        data = read_file(path, packed=path.suffix.lower() == ".gz")
+    except (OSError, EOFError, zlib.error) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise RecordingError(f"{path}: cannot be read ({reason})") from error
+    encoding = "utf-8-sig"
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        encoding = "utf-16"
+    elif data[1:400:2].count(0) > len(data[1:400:2]) // 2:
+        encoding = "utf-16-le"
+    elif data[0:400:2].count(0) > len(data[0:400:2]) // 2:
+        encoding = "utf-16-be"
+    try:
+        text = data.decode(encoding)
+    except UnicodeDecodeError:
+        text = data.decode("cp1252", errors="replace")
+    if "\x00" in text:
+        raise RecordingError(f"{path}: not a text file (it has zero bytes)")
+    if not text.strip():
+        raise RecordingError(f"{path}: the file is empty")
+    return text
+
+
+def lines_of(text: str, delimiter: str, source: str, comments: tuple[str, ...] = ()) -> Lines:
+    """Rows of a text, without empty ones.
+
+    Parameters
+    ----------
+    text : str
+        All of it.
     delimiter : str
-        What separates cells in text files; ``" "`` means any run of blanks.
+        What separates cells; ``" "`` means any run of blanks.
+    source : str
+        The file, for messages.
+    comments : tuple of str
+        Beginnings of lines that are no rows.
+
+    Returns
+    -------
+    Lines
+        Cells in quotes may hold the delimiter; what parts them then is another mark.
+
+    Raises
+    ------
+    RecordingError
+        If there are more than are read.
+    """
+    count = text.count("\n") + 1
+    marks = 0 if delimiter == " " else text.count(delimiter)
+    width = 1 + text[: text.find("\n") % (len(text) + 1)].count(delimiter)
+    check_size(count, count + marks, source, width)
+    lines = text.splitlines()
+    if '"' in text and delimiter != " ":
+        kept = (
+            "" if comments and line.lstrip().startswith(comments) else f"{line}\n" for line in lines
+        )
+        reader = csv.reader(kept, delimiter=delimiter)
+        rows = ((reader.line_num, row) for row in reader)
+        return _joined((number, row) for number, row in rows if any(map(str.strip, row)))
+    blank = f"{delimiter} \t"
+    places = [
+        number
+        for number, line in enumerate(lines)
+        if line.strip(blank) and not (comments and line.lstrip().startswith(comments))
+    ]
+    if len(places) == len(lines):
+        return Lines(lines, delimiter, range(1, len(lines) + 1))
+    return Lines([lines[i] for i in places], delimiter, [i + 1 for i in places])
+
+
+def lines_of_rows(rows: Iterable[Sequence[str]]) -> Lines:
+    """Rows whose cells are parted already, as of a sheet; without empty ones."""
+    return _joined((number, row) for number, row in enumerate(rows, start=1) if any(row))
+
+
+def _joined(rows: Iterable[tuple[int, Sequence[str]]]) -> Lines:
+    lines, numbers = [], []
+    for number, row in rows:
+        lines.append(_PART.join(" ".join(cell.split("\n")) for cell in row))
+        numbers.append(number)
+    return Lines(lines, _PART, numbers)
+
+
+def split_rows(text: str, delimiter: str) -> list[list[str]]:
+    """Cells of each row; ``" "`` means any run of blanks."""
+    if delimiter == " ":
+        return [line.split() for line in text.splitlines()]
+    if '"' in text:
+        return list(csv.reader(text.splitlines(), delimiter=delimiter))
+    return [line.split(delimiter) for line in text.splitlines()]
+
+
+def usual_width(widths: Sequence[int]) -> int:
+    """How many cells most rows have; 0 where there are no rows."""
+    return max(set(widths), key=widths.count) if widths else 0
+
+
+def same_width(
+    body: Lines, width: int, headings: Sequence[Sequence[str]], source: str, *, strict: bool
+) -> tuple[Lines, list[int], list[str]]:
+    """Rows of one width, without those that repeat the headings.
+
+    Parameters
+    ----------
+    body : Lines
+        Rows below the headings.
+    width : int
+        How many cells each has.
+    headings : sequence of sequence of str
+        The rows above them, as far as they are headings.
+    source : str
+        The file, for messages.
+    strict : bool
+        Whether many rows that are shorter are an error; else their last cells are empty, as
+        programs write that end a row with its last value.
+
+    Returns
+    -------
+    rows : Lines
+        Those that are left.
+    part : list of int
+        How often the headings came again before each of them; empty where they never did.
+    remarks : list of str
+        What was left out.
+
+    Raises
+    ------
+    RecordingError
+        If `strict` and more than one row in twenty has another width.
+    """
+    counts = body.widths()
+    heads = [list(row) for row in headings if row and row[0]]
+    first = tuple({row[0] for row in heads})
+    again = [
+        place
+        for place, line in enumerate(body.lines)
+        if first and line.lstrip(" \t").startswith(first)
+        if [cell.strip() for cell in body.parted(line)] in heads
+    ]
+    repeated = set(again)
+    short = [i for i, count in enumerate(counts) if count < width and i not in repeated]
+    wide = [i for i, count in enumerate(counts) if count > width and i not in repeated]
+    odd = sorted([*short, *wide])
+    many = max(1, len(counts) // _CUT)
+    if strict and len(odd) > many:
+        above = f" as the first row has, {headings[0][0][:60]!r}, ..." if headings else ""
+        both = " (commas cannot both part the cells and mark the decimals)"
+        raise RecordingError(
+            f"{source}: {len(odd)} of {len(counts)} rows do not have {width} cells{above}: row "
+            f"{body.numbers[odd[0]]} has {counts[odd[0]]} with the delimiter {body.delimiter!r}"
+            f"{both * (body.delimiter == ',')}. The first row must hold the headings; give "
+            "delimiter and decimal, like delimiter = ';' and decimal = ','"
+        )
+    if len(short) > many:
+        padded = list(body.lines)
+        for place in short:
+            blank = " nan" if body.delimiter == " " else body.delimiter
+            padded[place] += blank * (width - counts[place])
+        body, short = Lines(padded, body.delimiter, body.numbers), []
+    remarks = []
+    for gone, what in (
+        (short, f"rows with fewer than {width} cells"),
+        (wide, f"rows with more than {width} cells"),
+        (again, "rows that repeat the headings, where a recording starts again"),
+    ):
+        remarks += told_rows([body.numbers[i] for i in gone], what)
+    left = {*again, *wide, *short}
+    places = [i for i in range(len(counts)) if i not in left] if left else range(len(counts))
+    part = np.searchsorted(again, places).tolist() if again else []
+    return body.only(places), part, remarks
+
+
+def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
+    """Read a text file whose first row has the headings, or which has none.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    delimiter : str
+        What separates cells; ``" "`` means any run of blanks.
     header : bool
-        Whether the first row of a text file has the headings.
-    decimal : str
-        Decimal mark of a file of which only numbers are wanted: then its cells may be numbers.
+        Whether the first row has the headings.
 
     Returns
     -------
@@ -198,206 +534,17 @@ def read_table(path: Path, *, delimiter: str, header: bool, decimal: str = "") -
     RecordingError
         If the file is missing, unreadable, empty or has no rows.
     """
-    if not is_text(path):
-        return _READERS[path.suffix.lower()](path)
-    return _parse(read_text(path), str(path), delimiter, header, decimal)
-
-
-def is_text(path: Path) -> bool:
-    """Whether a file is read as text, by its ending; the other kinds have a reader of their own."""
-    return path.suffix.lower() not in _READERS
-
-
-def read_text(path: Path) -> str:
-    """Text of a file, unpacked.
-
-    Parameters
-    ----------
-    path : Path
-        The file; the ending tells the format.
-
-    Returns
-    -------
-    str
-        What is in it.
-
-    Raises
-    ------
-    RecordingError
-        If the file is missing, unreadable or no text in UTF-8.
-    """
-    packed = path.suffix == ".gz"
-    ending = (path.with_suffix("").suffix if packed else path.suffix).lower()
-    if ending not in _TEXT:
-        raise RecordingError(
-            f"{path}: the format {ending!r} is not read here; readable are {_READABLE}"
-        )
-    try:
-        raw = read_file(path, packed=packed)
-        wide = raw.startswith((b"\xff\xfe", b"\xfe\xff"))
-        text = raw.decode("utf-16" if wide else "utf-8-sig")
-    except UnicodeDecodeError:
-        raise RecordingError(
-            f"{path}: not a text file in UTF-8; readable are {_READABLE}"
-        ) from None
-    except (OSError, EOFError, zlib.error) as error:
-        raise RecordingError(
-            f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})"
-        ) from error
-    if "\x00" in text:
-        raise RecordingError(
-            f"{path}: not a text file (it has zero bytes); readable are {_READABLE}"
-        )
-    return text
-
-
-def _parse(text: str, source: str, delimiter: str, header: bool, decimal: str) -> Table:
-    lines = text.count("\n") + 1
-    marks = 0 if delimiter == " " else text.count(delimiter)
-    width = 1 + text[: text.find("\n") % (len(text) + 1)].count(delimiter)
-    check_size(lines, lines + marks, source, width)
-    quick = _quick(text, delimiter, header, decimal)
-    if quick is not None:
-        return quick
-    rows, numbers = [], []
-    for number, row in enumerate(split_rows(text, delimiter), start=1):
-        if any(cell.strip() for cell in row):
-            rows.append(row)
-            numbers.append(number)
-    if not rows:
-        raise RecordingError(f"{source}: the file is empty")
-    headings = [cell.strip() for cell in rows.pop(0)] if header else None
-    numbers = numbers[int(header) :]
-    if not rows:
+    source = str(path)
+    body = lines_of(read_text(path), delimiter, source)
+    headings = body.rows(0, 1) if header else []
+    body = body.after(len(headings))
+    if not body.lines:
         raise RecordingError(f"{source}: a header without rows")
-    width = len(headings) if headings is not None else _usual_width(rows)
-    again = [
-        index
-        for index, row in enumerate(rows)
-        if len(row) == width and headings and [cell.strip() for cell in row] == headings
-    ]
-    ragged = [index for index, row in enumerate(rows) if len(row) != width]
-    if len(ragged) > max(1, len(rows) // 20):
-        raise RecordingError(
-            f"{source}: {len(ragged)} of {len(rows)} rows do not have {width} cells (first: row "
-            f"{numbers[ragged[0]]}, delimiter {delimiter!r})"
-        )
-    remarks = told_rows([numbers[i] for i in ragged], f"rows that do not have {width} cells")
-    remarks += told_rows([numbers[i] for i in again], "rows that repeat the headings")
-    gone = {*ragged, *again}
-    kept = [index for index in range(len(rows)) if index not in gone]
-    if not kept:
+    width = len(headings[0]) if headings else usual_width(body.widths())
+    body, _, remarks = same_width(body, width, headings, source, strict=True)
+    if not body.lines:
         raise RecordingError(f"{source}: no row has {width} cells")
-    columns = list(zip(*(rows[index] for index in kept), strict=True))
-    return Table(headings, columns, [numbers[index] for index in kept], remarks)
-
-
-def told_rows(numbers: Sequence[int], what: str) -> list[str]:
-    """What is said of rows that are left out: none where there is none."""
-    if not numbers:
-        return []
-    return [f"{what}: {len(numbers)} (first: row {numbers[0]}), left out"]
-
-
-def _quick(text: str, delimiter: str, header: bool, decimal: str) -> Table | None:
-    """A table of nothing but numbers, as NumPy reads it; None if it is not one."""
-    if not decimal or '"' in text:
-        return None
-    heading, _, body = text.partition("\n") if header else ("", "", text)
-    values = numbers_in(body.splitlines(), delimiter, decimal)
-    headings = [cell.strip() for cell in split_rows(heading, delimiter)[0]] if heading else None
-    if values is None or not heading.strip() and header:
-        return None
-    if headings is not None and len(headings) != len(values):
-        return None
-    return Table(headings, list(values), range(1 + header, 1 + header + values.shape[1]), [])
-
-
-def numbers_in(lines: Sequence[str], delimiter: str, decimal: str) -> Array | None:
-    """Columns of lines that hold nothing but numbers.
-
-    Parameters
-    ----------
-    lines : sequence of str
-        One for each row.
-    delimiter : str
-        What separates cells; ``" "`` means any run of blanks.
-    decimal : str
-        Decimal mark.
-
-    Returns
-    -------
-    (columns, rows) array or None
-        None where a cell is missing or no number, or a line is empty.
-    """
-    if not lines or not lines[0].strip():
-        return None
-    if decimal != ".":
-        lines = [line.replace(decimal, ".") for line in lines]
-    try:
-        values = np.loadtxt(
-            lines, delimiter=None if delimiter == " " else delimiter, ndmin=2, comments=None
-        )
-    except ValueError:
-        return None
-    if len(values) != len(lines) or not values.size:
-        return None
-    values[~np.isfinite(values)] = math.nan
-    return np.ascontiguousarray(values.T)
-
-
-def split_rows(text: str, delimiter: str) -> list[list[str]]:
-    """Cells of each row; ``" "`` means any run of blanks."""
-    if delimiter == " ":
-        return [line.split() for line in text.splitlines()]
-    if '"' in text:
-        return list(csv.reader(io.StringIO(text), delimiter=delimiter))
-    return [line.split(delimiter) for line in text.splitlines()]
-
-
-def _usual_width(rows: list[list[str]]) -> int:
-    widths = [len(row) for row in rows]
-    return max(set(widths), key=widths.count)
-
-
-def _parquet(path: Path) -> Table:
-    if not path.is_file():
-        what = "it is not a regular file" if path.exists() else "no such file"
-        raise RecordingError(f"{path}: cannot be read ({what})")
-    if path.stat().st_size > MOST_BYTES:
-        raise RecordingError(f"{path}: more than {MOST_BYTES >> 20} MB, and at most that is read")
-    try:
-        import pandas as pd
-    except ImportError as error:
-        raise RecordingError(
-            f"{path}: Parquet needs pandas and pyarrow: pip install 'pamrs[io]' pyarrow"
-        ) from error
-    try:
-        admit_arrow(path)
-        frame = pd.read_parquet(path)
-    except RecordingError:
-        raise
-    except Exception as error:  # each engine has its own kinds for a broken file
-        raise RecordingError(f"{path}: cannot be read ({error})") from error
-    columns = []
-    for place, name in enumerate(frame.columns):
-        try:
-            columns.append(np.asarray(frame.iloc[:, place], dtype=np.float64))
-        except (TypeError, ValueError) as error:
-            raise RecordingError(
-                f"{path}: column {str(name)!r} does not hold numbers only ({error})"
-            ) from error
-    if not len(frame):
-        raise RecordingError(f"{path}: a header without rows")
-    return Table([str(name) for name in frame.columns], columns, range(1, len(frame) + 1), [])
-
-
-_READERS: Final[dict[str, Callable[[Path], Table]]] = {".parquet": _parquet}
-"""Reader of each ending whose files are not text: a new kind is one function and its entry here."""
-_READABLE: Final = (
-    f"{', '.join(ending for ending in _TEXT if ending)} (each also .gz) and {', '.join(_READERS)}; "
-    "other logs with the key channels (pamrs import LOG writes it)"
-)
+    return Table(headings[0] if headings else None, body, remarks)
 
 
 def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | None:

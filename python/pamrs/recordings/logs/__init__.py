@@ -16,7 +16,7 @@ from pamrs._files import check_regular
 from pamrs.errors import MissingPackageError, PamrsError, RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings.logs._hdf import read_hdf
-from pamrs.recordings.logs._log import Log, Series, TextFormat
+from pamrs.recordings.logs._log import Log, Series, TextFormat, table_of
 from pamrs.recordings.logs._matlab import read_matlab
 from pamrs.recordings.logs._measurement import read_mdf, read_tdms
 from pamrs.recordings.logs._ros import read_bag, read_mcap
@@ -34,6 +34,7 @@ __all__ = [
     "check_readable",
     "read_log",
     "split_heading",
+    "table_of",
     "understood_unit",
 ]
 

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
+from pamrs.recordings.table import Table
 
-__all__ = ["Log", "Series", "TextFormat", "collected", "numbers_of"]
+__all__ = ["Log", "Series", "TextFormat", "collected", "numbers_of", "table_of"]
 
 Array = NDArray[np.float64]
 
@@ -124,6 +125,30 @@ class Log:
         raise RecordingError(
             f"{self.path}: there is no channel {name!r}; {hint}the log has: {_few(self.series)}"
         )
+
+
+def table_of(log: Log) -> Table:
+    """The series of a log that are as long as most, with their units in the headings.
+
+    Parameters
+    ----------
+    log : Log
+        Any.
+
+    Returns
+    -------
+    Table
+    """
+    counts = [len(series.values) for series in log.series.values()]
+    usual = max(set(counts), key=counts.count)
+    header: list[str] = []
+    cells: list[Sequence[str] | Array] = []
+    for series in log.series.values():
+        if len(series.values) == usual:
+            header.append(f"{series.name} [{series.unit}]" if series.unit else series.name)
+            texts = [series.labels[int(at)] for at in series.values] if series.labels else None
+            cells.append(series.values if texts is None else texts)
+    return Table(header, cells, log.remarks)
 
 
 def _few(names: Any, most: int = 12) -> str:

@@ -15,7 +15,8 @@ from pamrs._files import MOST_BYTES, read_file
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
 from pamrs.recordings.logs._log import Log, Series, TextFormat, collected
-from pamrs.recordings.logs._text import log_of_rows
+from pamrs.recordings.logs._text import log_of_lines
+from pamrs.recordings.table import lines_of_rows
 
 __all__ = ["read_sheets"]
 
@@ -53,7 +54,7 @@ def read_sheets(path: Path, form: TextFormat) -> Log:
         rows, commas = _texts(cells)
         said = [f"numbers that are texts with a decimal comma: {commas}, read"] if commas else []
         try:
-            tables[name] = log_of_rows(path, rows, form, ".", said)
+            tables[name] = log_of_lines(path, lines_of_rows(rows), form, ".", said)
         except RecordingError as error:
             unread[f"sheet {name}"] = str(error).removeprefix(f"{path}: ")
     found: list[Series] = []

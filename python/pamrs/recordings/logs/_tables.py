@@ -50,7 +50,7 @@ def read_arrow(path: Path, form: TextFormat) -> Log:
             labels = tuple(dict.fromkeys(texts))
             place = {label: float(index) for index, label in enumerate(labels)}
             codes = np.array([place[text] for text in texts])
-            found.append(Series(name, codes, "", None, labels))
+            found.append(Series(name, codes, unit, None, labels))
             continue
         stamps = str(column.type).startswith(("timestamp", "duration", "time"))
         if stamps:

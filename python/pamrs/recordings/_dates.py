@@ -9,10 +9,11 @@ from datetime import date
 from typing import Final
 
 import numpy as np
-
-from pamrs.recordings.logs._log import Array
+from numpy.typing import NDArray
 
 __all__ = ["is_moment", "moments"]
+
+Array = NDArray[np.float64]
 
 _MOMENT: Final = re.compile(
     r"(?:(?P<a>\d{1,4})(?P<mark>[-./])(?P<b>\d{1,2})(?P=mark)(?P<c>\d{1,4})(?:,? +|T))?"
