@@ -262,6 +262,7 @@ def _recordings(
     _check_logs(home, entries)
     recordings: list[Recording] = []
     logs: dict[Any, Log] = {}
+    told: set[tuple[str, str, str]] = set()
     for index, entry in enumerate(entries):
         label = f"recording[{index}]."
         before = len(problems)
@@ -292,12 +293,15 @@ def _recordings(
                 options |= {"role": role, "name": entry.get("name"), "ambient_pressure": ambient}
                 whole = load_recording(file, **options)
                 parts = [whole.between(entry.get("start"), entry.get("stop"))]
-            recordings += [_on_its_turn(replace(part, parameters=own), rig) for part in parts]
+            recordings += [
+                _on_its_turn(replace(_once(part, told), parameters=own), rig) for part in parts
+            ]
         except RecordingError as error:
             problems.append(str(error))
     names = [recording.name for recording in recordings]
     problems += [
-        f"two recordings are called {name!r}"
+        f'two recordings are called {name!r}: give one another name (name = "..." in its '
+        "[[recording]])"
         for name in dict.fromkeys(names)
         if names.count(name) > 1
     ]
@@ -308,6 +312,18 @@ def _recordings(
     ):
         problems.append("no recording has the role 'fit': nothing is left to fit")
     return recordings
+
+
+def _once(recording: Recording, told: set[tuple[str, str, str]]) -> Recording:
+    """The same without what was said of its file with a recording before."""
+    issues = []
+    for issue in recording.issues:
+        said = (recording.source, issue.channel, issue.text)
+        if issue.kind != "log" or said not in told:
+            issues.append(issue)
+        if issue.kind == "log":
+            told.add(said)
+    return replace(recording, issues=issues)
 
 
 def _on_its_turn(recording: Recording, rig: Rig | None) -> Recording:

@@ -34,7 +34,10 @@ _MONTHS: Final = {
     )
     for word in words.split()
 }
+_WORLD: Final = re.compile("UTC|GMT|Z$")
 _DAY: Final = 86400.0
+_HOUR: Final = 3600.0
+_SOON: Final = 10.0  # usual steps, within which a clock that was set back went on
 
 
 def _match(cell: str) -> re.Match[str] | None:
@@ -75,7 +78,7 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
     month_first, remark = _order({match[0]: match for match in there})
     seconds = np.full(len(cells), math.nan)
     days: dict[tuple[str, str, str], float] = {}
-    passed, before = 0.0, -math.inf
+    passed, before, first = 0.0, -math.inf, math.nan
     whole = 3600.0 if there[0]["minutes"] else _DAY
     for row, match in enumerate(found):
         if match is None:
@@ -89,9 +92,31 @@ def moments(cells: Sequence[str]) -> tuple[Array, str] | None:
         written = (match["a"], match["b"], match["c"])
         if written not in days:
             days[written] = _day(written, month_first)
-        seconds[row] = days[written] * _DAY + value
+        first = first if math.isfinite(first) else days[written]
+        seconds[row] = (days[written] - first) * _DAY + value  # of few digits: exact to 1e-11 s
+    if not any(match["zone"] or _WORLD.search(match[0]) for match in there[:1]):
+        seconds, back = _through_the_autumn(seconds)
+        if back >= 0:
+            said = f"the clock goes back by an hour after {cells[back]!r}, as at the end of summer "
+            remark = "; ".join([*filter(None, [remark]), said + "time: counted on from there"])
     good = seconds[np.isfinite(seconds)]
     return (seconds - good[0], remark) if len(good) else None
+
+
+def _through_the_autumn(seconds: Array) -> tuple[Array, int]:
+    """Times of a clock that was set back by an hour while it went on, and the row after which; -1
+    where it never was.
+    """
+    rows = np.flatnonzero(np.isfinite(seconds))
+    steps = np.diff(seconds[rows])
+    back = np.flatnonzero(steps < 0.0)
+    if len(back) != 1 or not np.any(steps > 0.0):
+        return seconds, -1
+    usual = float(np.median(steps[steps > 0.0]))
+    if not 0.0 <= steps[back[0]] + _HOUR <= _SOON * usual:
+        return seconds, -1
+    at = int(rows[back[0]])
+    return seconds + _HOUR * (np.arange(len(seconds)) > at), at
 
 
 def _order(there: dict[str, re.Match[str]]) -> tuple[bool, str]:

@@ -20,7 +20,7 @@ from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
 from pamrs.recordings._recording import CHANNELS, Issue, Recording
 from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
-from pamrs.recordings._stamps import Ticks, ticks, unit_of_stamps
+from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.units import same_dimension, to_si
 
@@ -197,11 +197,12 @@ def recordings_of(
         series = log.find(cut.column)
         ticks = clocks.of(series, clock)
         column = Split(series.values[ticks.rows], ticks, series.labels)
-    found, remarks = parts(channels, cut, column, pieces, source)
+    found, left, remarks = parts(channels, cut, column, pieces, source)
     made = [
         recording_of(f"{name}_{part.label}", role, part.channels, source, sample_time, said)
         for part in found
     ]
+    made = [replace(each, left=tuple(left)) for each in made]
     return _told(made, log, channels, remarks)
 
 
@@ -232,8 +233,11 @@ def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
             f"{log.path}: {item.column!r} holds texts like {series.labels[0]!r}, no numbers for "
             f"{item.channel!r}"
         )
-    values, unit = item.si(series.values), _si_unit(item)
-    return sampled(item.channel, values, clocks.of(series, clock), unit, item.hold)
+    raw, said = series.values, ""
+    if channel_of(item.channel) in ("joint_angle", "length"):
+        raw, said = counted_on(raw)
+    made = sampled(item.channel, item.si(raw), clocks.of(series, clock), _si_unit(item), item.hold)
+    return replace(made, remarks=(said, *made.remarks)) if said else made
 
 
 class Clocks:

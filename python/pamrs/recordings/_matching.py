@@ -334,6 +334,8 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
         )
         return Open(name, series.name, usual, (), text)
     unit, why = _unit_for(name, series, rig, stated)
+    if _AIR & set(words_of(series.name)) and channel in PRESSURES:
+        unit, why = "", "ATM in its name may be the unit, or say that it is the air outdoors"
     if not unit:
         text = f"{series.name} is called like {name}, and has no unit in the log: {why}; give it"
         return Open(name, series.name, usual, (), text)
@@ -341,6 +343,7 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
     return Match(name, series, unit, absolute, assumed=why)
 
 
+_AIR: Final = frozenset(("atm",))
 _ABSOLUTE: Final = frozenset(("abs", "absolute", "absolut"))
 _READINGS: Final[dict[str, tuple[float, ...]]] = {"A": (4.0, 20.0), "V": (0.0, 10.0)}
 """What transmitters give, from the lower end of their range to the upper one."""

@@ -91,6 +91,8 @@ class LogProposal:
         How many are not.
     remarks : list of str
         What to look at.
+    name : str
+        The key ``name``; empty where the file says it.
     """
 
     log: Log
@@ -102,6 +104,7 @@ class LogProposal:
     pieces: list[int] = field(default_factory=list)
     short: int = 0
     remarks: list[str] = field(default_factory=list)
+    name: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +174,8 @@ class Proposal:
         said = item.remarks if role == "fit" or pieces is None else []
         lines = ["", *(f"# {shown(text)}" for text in said)]
         lines += ["[[recording]]", f"file = {_toml(Path(file).as_posix())}", f'role = "{role}"']
+        if item.name:
+            lines.append(f"name = {_toml(item.name)}")
         if self.columns is not None:
             lines.append(f"columns = {_toml(list(self.columns))}")
         if item.time:
@@ -254,8 +259,29 @@ def propose(
         sample_time = positive("sample_time", sample_time)
     wanted = channels_of(rig)
     read = [read_log(Path(path), form) for path in paths]
-    proposals = [_proposal(log, wanted, rig, sample_time) for log in read]
+    proposals = [each for log in read for each in _proposals(log, wanted, rig, sample_time)]
     return Proposal(proposals, sample_time, form.columns if form else None)
+
+
+def _proposals(
+    log: Log, wanted: Sequence[str], rig: Rig | None, sample_time: float | None
+) -> list[LogProposal]:
+    """What is proposed for a log: for each of its tables, where the same channels are in several;
+    else one recording of all.
+    """
+    whole = _proposal(log, wanted, rig, sample_time)
+    each = [_proposal(log.only(table), wanted, rig, sample_time) for table in log.tables]
+    channels = [match.channel for item in each for match in item.matches]
+    if len(set(channels)) == len(channels):
+        return [whole]
+    made = []
+    for table, item in zip(log.tables, each, strict=True):
+        sheet = table.rstrip("/")
+        if not item.matches:
+            item.remarks.append(f"no channel was recognised in {sheet}: nothing is proposed for it")
+        stem = log.path.name.removesuffix(".gz").rsplit(".", 1)[0]
+        made.append(replace(item, name=f"{stem}_{sheet}"))
+    return made
 
 
 def _proposal(

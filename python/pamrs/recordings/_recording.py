@@ -177,6 +177,8 @@ class Recording:
     logged : dict of str to (float, (m,) array)
         Of a channel that was sampled more slowly than its grid, and is interpolated between its
         samples: how far these are apart as a rule [s], and their values, NaN where there is none.
+    left : tuple of str
+        Parts of its log that were not asked for with it.
     """
 
     name: str
@@ -193,6 +195,7 @@ class Recording:
     commands: dict[str, Array] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
     logged: dict[str, tuple[float, Array]] = field(default_factory=dict)
+    left: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])

@@ -94,7 +94,7 @@ def parts(
     column: Split | None,
     pieces: Sequence[int | str] | None,
     source: str,
-) -> tuple[list[Part], list[str]]:
+) -> tuple[list[Part], list[str], list[str]]:
     """Part the channels of a log.
 
     Parameters
@@ -114,6 +114,8 @@ def parts(
     -------
     parts : list of Part
         In the order of the log.
+    left : list of str
+        What the parts are called that `pieces` does not name.
     remarks : list of str
         Parts that are left out, since a channel has fewer than two samples there.
 
@@ -146,7 +148,8 @@ def parts(
             f"{len(short)} of {len(made)} parts ({', '.join(short[:8])}) are left out: a channel "
             f"has fewer than {_FEWEST} samples there"
         )
-    return chosen, remarks
+    left = [] if pieces is None else [part.label for part in made if part not in chosen]
+    return chosen, left, remarks
 
 
 def stretches_of(cut: Cut, time: Array, column: Split | None) -> list[Stretch]:

@@ -18,6 +18,7 @@ __all__ = [
     "CLOCK_WORDS",
     "Rows",
     "Ticks",
+    "counted_on",
     "filled_rows",
     "spread",
     "ticks",
@@ -416,18 +417,49 @@ def unwound(angle: Array) -> tuple[Array, str]:
         What was done; empty where nothing was.
     """
     turn = 2.0 * np.pi
-    good = np.flatnonzero(np.isfinite(angle))
-    data = angle[good]
+    least = float(np.min(angle, initial=0.0, where=np.isfinite(angle)))
+    result, leaps = _unwrapped(angle, turn, 0.0 if least >= -1e-3 * turn else 0.5 * turn)
+    return result, f"leaps by a full turn: {leaps}, unwrapped" if leaps else ""
+
+
+def counted_on(counts: Array) -> tuple[Array, str]:
+    """Counts of an encoder without the leaps of a counter that overflows, up or down.
+
+    Parameters
+    ----------
+    counts : (n,) array
+        Numbers of the log, NaN where there is none.
+
+    Returns
+    -------
+    counts : (n,) array
+        Near zero; the same where nothing leaps, or they are no whole numbers.
+    remark : str
+        What was done; empty where nothing was.
+    """
+    good = counts[np.isfinite(counts)]
+    if not len(good) or np.any(good % 1.0 != 0.0):
+        return counts, ""
+    for bits in (16, 32):
+        result, leaps = _unwrapped(counts, 2.0**bits, 0.0)
+        if leaps:
+            return result, f"overflows of a counter of {bits} bits: {leaps}, counted on"
+    return counts, ""
+
+
+def _unwrapped(values: Array, turn: float, middle: float) -> tuple[Array, int]:
+    """Values without leaps by a turn, on that nearest to `middle`, and the number of leaps."""
+    good = np.flatnonzero(np.isfinite(values))
+    data = values[good]
     steps = np.diff(data)
     leaps = np.abs(steps) > 0.5 * turn
     if not leaps.any() or leaps.mean() > 0.1 or float(np.ptp(data)) > 1.001 * turn:
-        return angle, ""
+        return values, 0
     beyond = np.abs(np.abs(steps[leaps]) - turn)
     if float(beyond.max()) > _SAME * float(np.max(np.abs(steps[~leaps]), initial=0.0)):
-        return angle, ""
-    laid = np.unwrap(data)
-    middle = 0.0 if float(data.min()) >= -1e-3 * turn else 0.5 * turn
+        return values, 0
+    laid = np.unwrap(data, period=turn)
     laid -= turn * np.round((float(np.median(laid)) - middle) / turn)
-    result = angle.copy()
+    result = values.copy()
     result[good] = laid
-    return result, f"leaps by a full turn: {int(leaps.sum())}, unwrapped"
+    return result, int(leaps.sum())

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Final
+
 import numpy as np
 
 from pamrs.recordings import Case, suspicions
 
 __all__ = ["noted_units", "suspected_units"]
 
+_FEW: Final = 8  # parts that are named
+
 
 def noted_units(case: Case) -> list[str]:
     """How the numbers of a case's files became values where the files alone do not say: units that
-    were assumed, ambient pressures that were subtracted.
+    were assumed, ambient pressures that were subtracted, parts that no recording takes.
 
     Parameters
     ----------
@@ -27,7 +32,17 @@ def noted_units(case: Case) -> list[str]:
     for recording in case.recordings:
         for channel, note in recording.notes.items():
             where.setdefault(f"{channel} {note}", []).append(recording.name)
-    return [f"{', '.join(names)}: {text}" for text, names in where.items()]
+    told = [f"{', '.join(names)}: {text}" for text, names in where.items()]
+    for source in dict.fromkeys(recording.source for recording in case.recordings):
+        lefts = [recording.left for recording in case.recordings if recording.source == source]
+        lost = [part for part in lefts[0] if all(part in left for left in lefts)]
+        some = ", ".join(lost[:_FEW]) + " and so on" * (len(lost) > _FEW)
+        if lost:
+            told.append(
+                f"{Path(source).name}: {len(lost)} of the parts of this log ({some}) are in no "
+                "recording of the case (pieces in case.toml)"
+            )
+    return told
 
 
 def suspected_units(case: Case) -> list[str]:

@@ -85,12 +85,22 @@ class Log:
         What of the file is no series, and why.
     remarks : list of str
         What was left out, joined or taken for missing as it was read.
+    tables : tuple of str
+        Beginnings of the names of each table, where there are several, as sheets of a workbook.
     """
 
     path: Path
     series: dict[str, Series]
     unread: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    tables: tuple[str, ...] = ()
+
+    def only(self, table: str) -> Log:
+        """The same with one of its tables alone."""
+        some = {name: each for name, each in self.series.items() if name.startswith(table)}
+        said = [text for text in self.remarks if text.startswith(table)]
+        lost = {name: why for name, why in self.unread.items() if name.startswith(table)}
+        return replace(self, series=some, unread=lost, remarks=said, tables=())
 
     def find(self, name: str) -> Series:
         """The series of that name, or the only one whose last parts are that name.
@@ -188,23 +198,27 @@ def collected(
     """
     check_size(0, 0, str(path), len(found))
     series: dict[str, Series] = {}
+    twice: list[str] = []
     for item in found:
         name, again = item.name, 2
         while name in series:
             name, again = f"{item.name} ({again})", again + 1
         same = item if name == item.name else replace(item, name=name)
+        if same is not item:
+            twice.append(f"the name {item.name!r} is there again: this one is {name!r} here")
         series[name] = same
     if not series:
         why = "; ".join(f"{name}: {text}" for name, text in list((unread or {}).items())[:3])
         raise RecordingError(
             f"{path}: no channel with numbers was found" + (f" ({why})" if why else "")
         )
-    log = Log(path, series, dict(unread or {}), list(remarks))
+    log = Log(path, series, dict(unread or {}), [*remarks, *twice[:_MOST_SAID]])
     for name in list(series):
         _join(log, name)
     return log
 
 
+_MOST_SAID: Final = 8  # names that are there again, and are said
 _SECONDS: Final = frozenset({"sec", "secs", "second", "seconds", "s"})
 _BEYOND: Final = {
     word: scale

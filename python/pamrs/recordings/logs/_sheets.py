@@ -64,7 +64,8 @@ def read_sheets(path: Path, form: TextFormat) -> Log:
         found += [replace(item, name=before + item.name) for item in log.series.values()]
         unread |= {before + key: why for key, why in log.unread.items()}
         remarks += [before + text for text in log.remarks]
-    return collected(path, found, unread, remarks)
+    log = collected(path, found, unread, remarks)
+    return replace(log, tables=tuple(f"{name}/" for name in tables) if len(tables) > 1 else ())
 
 
 def _sheets(path: Path) -> dict[str, list[list[Any]]]:

@@ -15,11 +15,20 @@ _BRACKETS = re.compile(
     r"^\s*(?P<name>.*?)[\s_]*(?:\[(?P<square>[^\[\]]*)\]"
     r"|(?P<other>\((?:[^()]|\([^()]*\))*\)|\{[^{}]*\}|<[^<>]*>))\s*$"
 )
+_INSIDE = re.compile(
+    r"^\s*[^\[\](){}<>]+?[\s_]*(?P<unit>\[[^\[\]]+\]|\([^()]+\)|\{[^{}]+\}|<[^<>]+>)"
+    r"[\s_-]*(?P<rest>\(?[^\[\](){}<>]+\)?)\s*$"
+)
 _SLASH = re.compile(r"^\s*(?P<name>.+?)\s+(?:/|in)\s*(?P<unit>[^\s/]+)\s*$")
 _DIVIDED = re.compile(r"^\s*(?P<name>[^/]+)/(?P<unit>[^/\s]+)\s*$")  # as DIN has it, U/V
 _TAIL = re.compile(
     r"^\s*.+?[_.\s-](?P<unit>(?P<alone>[A-Za-z°]+(?:[2-3]?[A-Za-z]*)?)"
     r"(?:[_\s-]*\(?(?:a|g|abs|gauge)\)?)?)\s*$"
+)
+_INCHES: Final = re.compile(
+    r"(?P<name>.*(?:length|laenge|länge|stroke|disp\w*|position|pos|travel|lvdt|height|distance))"
+    r"[_.\s-]in",
+    re.IGNORECASE,
 )
 _NUMBER: Final = r"\s*(?P<{}>[-+]?\d+(?:[.,]\d+)?)\s*"
 _RANGE: Final = _NUMBER + r"(?:\.{{2,3}}|…|-|–|to|bis|~)" + _NUMBER
@@ -173,7 +182,7 @@ _ELECTRIC: Final = tuple(parse_unit(unit).dimension for unit in ("A", "V"))
 
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit of a heading: ``p1 [bar]``, ``p1 (bar)``, ``p1_{bar}``, ``p1/bar``, ``p1 in
-    bar``, ``p1_bar``, ``p1 bar``.
+    bar``, ``p1_bar``, ``p1 bar``, ``p1 [bar] abs``, ``p1_bar_filt``.
 
     Parameters
     ----------
@@ -199,11 +208,34 @@ def split_heading(heading: str) -> tuple[str, str]:
     match = _DIVIDED.match(heading)
     if match and measured_from(match["unit"])[0] in _TAILS | {"m", "A", "°"}:
         return match["name"], match["unit"]
+    match = _INSIDE.match(heading)
+    if match and understood_unit(match["unit"]):
+        unit, rest = unwrapped(match["unit"]), unwrapped(match["rest"])
+        from_what = measured_from(f"{unit} {rest}")[1]
+        return heading.strip(), f"{unit} {rest}" if from_what else unit
     match = _TAIL.match(heading)
     known = match and (match["alone"] in _TAILS or match["alone"].upper() in _CAPITALS)
     if match and known and understood_unit(match["unit"]):
         return heading.strip(), match["unit"].replace("_", " ")
-    return heading.strip(), ""
+    if _INCHES.fullmatch(heading.strip()):
+        return heading.strip(), "in"
+    return heading.strip(), _unit_among(heading)
+
+
+def _unit_among(heading: str) -> str:
+    """The unit that stands between other words, ``p1_psi_filt``; empty where there is none, or more
+    than one. What stands first is no unit, nor is a single letter.
+    """
+    for text in (heading.strip(), re.sub(r"(?<=[a-zäöü0-9])(?=[A-Z])", "_", heading.strip())):
+        words = re.split(r"[_.\s-]+", text)[1:]
+        units = {
+            word
+            for word in words
+            if (len(word) > 1 and word in _TAILS or word.upper() in _CAPITALS) and word != "atm"
+        }
+        if units:
+            return units.pop() if len(units) == 1 else ""
+    return ""
 
 
 def _like_a_unit(text: str) -> bool:
