@@ -132,7 +132,7 @@ def _refitted(inner: Problem, nominal: Rig) -> tuple[Fit, Fit | None]:
     far as a diagnosis lets a freed parameter go (None where that model cannot be run).
     """
     first = refitted(inner, nominal, dict.fromkeys((b.name for b in inner.blocks), 1.0))
-    best, weights = with_autocorrelation(inner, nominal, first)
+    best, weights = with_autocorrelation(inner, nominal, first, {})
     own = inner.settings
     try:
         free = fit(

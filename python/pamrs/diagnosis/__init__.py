@@ -471,7 +471,8 @@ def _problems(
         for block in every_block
         if block.name not in judged
     ]
-    fitted, held = ([begun_alike(blocks, core, p) for p in part] for part in (fitted, held))
+    known = {n: p.tol for n, p in rig.parameters.items() if 0.0 < p.tol < math.inf}
+    fitted, held = ([begun_alike(blocks, core, p, known) for p in part] for part in (fitted, held))
     thin = {
         b.name: share
         for b in blocks

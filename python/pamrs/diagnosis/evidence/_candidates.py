@@ -289,8 +289,8 @@ class Attempts:
         return self.outer.recordings is self.inner.recordings
 
     def autocorrelation(self, found: Fit) -> dict[str, float]:
-        """Weights of the autocorrelation that a fit leaves."""
-        return autocorrelation_of(self.inner, found)
+        """Weights of the autocorrelation that a fit leaves, and at the least that of the noise."""
+        return autocorrelation_of(self.inner, found, self.noise_level)
 
     def start_of(self, found: Fit, effect: str) -> Start:
         """Where another fit goes on from an effect as it was fitted."""
@@ -695,10 +695,20 @@ def without_autocorrelation(blocks: Iterable[Block]) -> dict[str, float]:
     return dict.fromkeys((b.name for b in blocks), 1.0)
 
 
-def autocorrelation_of(problem: Problem, found: Fit) -> dict[str, float]:
-    """Weights of the autocorrelation that a fit leaves in each block."""
+def autocorrelation_of(
+    problem: Problem, found: Fit, noise_level: Mapping[Key, NoiseLevel]
+) -> dict[str, float]:
+    """Weights of the autocorrelation that a fit leaves in each block, and at the least that of the
+    noise: parameters that follow the noise of a drive leave too little of it.
+    """
+
+    def noise_of(block: Block) -> float:
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        levels = [noise_level[key].inflation for key in keys if key in noise_level]
+        return float(np.mean(levels)) if levels else 1.0
+
     return {
-        b.name: inflation(b, problem.recordings, found.residuals, FIT_BIN_TIME)
+        b.name: max(noise_of(b), inflation(b, problem.recordings, found.residuals, FIT_BIN_TIME))
         for b in problem.blocks
     }
 

@@ -558,7 +558,7 @@ def _settled(
                 start_of(candidate.fit, effect, LEAST_START) for effect in effects
             )
             settled = {n: other.values[n] for n, other in common.items()}
-            autocorrelation = autocorrelation_of(own, candidate.fit)
+            autocorrelation = autocorrelation_of(own, candidate.fit, judged[k].group.noise_level)
             with contextlib.suppress(SimulationError):  # it then stays as it was fitted
                 again = fit(
                     own,

@@ -54,6 +54,8 @@ LEAST_START = 1e-3  # share of a typical size from which a parameter goes on tha
 # [s] stable integration step below which a model is not tried: it would take too long
 _LEAST_STEP = 4e-4
 _LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model
+# [tolerances] shift of a parameter to whose value the core has no sensitivities
+_SHIFT_TOLERANCES = 0.01
 # the same in a fit to its end: one that stopped early looked like physics (decision 22)
 FINAL_STEP_SHARE = 1e-5
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
@@ -214,7 +216,8 @@ def residuals(
     problem: Problem, rig: Rig, names: Sequence[str] = (), events: Events | None = None
 ) -> dict[Key, Residual]:
     """Residuals of a model for every block and recording; jacobians for the names that a block
-    depends on.
+    depends on. What the core has no sensitivities to, the shape of a muscle or of its tendon, is
+    shifted by a share of its tolerance.
 
     Parameters
     ----------
@@ -227,29 +230,55 @@ def residuals(
     events : Events, optional
         What happens in single recordings, beside the model.
     """
-    core = _compiled(problem, rig)
-    own = {
-        name: _compiled(problem, events.put_into(rig, name))
-        for name in (prepared.recording.name for prepared in problem.recordings)
-        if events is not None and events.values.get(name)
+    recordings = [prepared.recording.name for prepared in problem.recordings]
+    happened = [n for n in recordings if events is not None and events.values.get(n)]
+
+    def models(rig: Rig) -> dict[str, _core.Rig]:
+        """The compiled rig in each recording, with what happens there."""
+        core = _compiled(problem, rig)
+        own = {n: _compiled(problem, events.put_into(rig, n)) for n in happened if events}
+        return dict.fromkeys(recordings, core) | own
+
+    cores = models(rig)
+    steps = _steps(rig, cores, names)
+    shifted = {
+        name: models(rig.with_parameters({name: rig.parameters[name].value + step}))
+        for name, step in steps.items()
     }
 
     def one(block: Block, prepared: Prepared) -> Residual:
         relevant = [name for name in names if depends(block, name)]
-        if (
-            events is not None and prepared.recording.name not in own
-        ):  # nothing happens here that could be differentiated
+        at = prepared.recording.name
+        if events is not None and at not in happened:  # nothing here could be differentiated
             relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
-        told = core_names(rig, relevant)
-        found = residual(block, own.get(prepared.recording.name, core), prepared, told)
-        if len(relevant) == len(names):
+        told = [name for name in relevant if name not in steps]
+        found = residual(block, cores[at], prepared, core_names(rig, told))
+        if told == list(names):
             return found
         full = np.zeros((found.value.size, len(names)))
-        if relevant:
-            full[:, [list(names).index(name) for name in relevant]] = found.jacobian
+        if told:
+            full[:, [list(names).index(name) for name in told]] = found.jacobian
+        for name in set(relevant) - set(told):
+            there = change(block, shifted[name][at], prepared, found)
+            full[:, list(names).index(name)] = (found.value - there) / steps[name]
         return replace(found, jacobian=full)
 
     return _everywhere(problem, one)
+
+
+def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> dict[str, float]:
+    """By how much each parameter is shifted to whose value the core has no sensitivities."""
+    told, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
+    return {
+        name: _SHIFT_TOLERANCES * known[name].tol * (-1.0 if _at_end(known[name]) else 1.0)
+        for name in names
+        if name in known and name not in told
+    }
+
+
+def _at_end(known: Parameter) -> bool:
+    """Whether a parameter cannot be shifted upwards."""
+    return known.value + _SHIFT_TOLERANCES * known.tol > known.upper
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:
@@ -313,13 +342,10 @@ def free_baseline(problem: Problem, nominal: Rig) -> list[str]:
     """Baseline parameters with a finite tolerance that some block depends on, those of effects that
     the model holds included.
     """
-    differentiable = set(core_rig(nominal).parameter_names)
     return [
         name
         for name, parameter in known_parameters(nominal).items()
-        if name in differentiable
-        and 0.0 < parameter.tol < math.inf
-        and any(depends(block, name) for block in problem.blocks)
+        if 0.0 < parameter.tol < math.inf and any(depends(block, name) for block in problem.blocks)
     ]
 
 

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.fit import Key, bin_width
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
-__all__ = ["CORRELATED_VARIANCE", "correlation_time", "inflation"]
+__all__ = ["CORRELATED_VARIANCE", "correlation_time", "inflated", "inflation"]
 
 # variance times autocorrelation time of residuals that weights a fit again (decision 20)
 CORRELATED_VARIANCE = 2.0
@@ -32,17 +32,22 @@ def correlation_time(values: Array) -> float:
     return max(1.0, 1.0 + 2.0 * float(rho[1:stop].sum()))
 
 
+def inflated(values: Array, rows: NDArray[np.bool_], width: int, noise: float) -> float:
+    """Variance of the bin means of a residual (n,) relative to white noise of single samples, times
+    their correlation time; 0 where no bin has a sample.
+    """
+    means, counts = binned(values, rows, width)
+    scaled = (means * np.sqrt(counts))[counts > 0] / noise
+    return float(np.mean(scaled**2)) * correlation_time(scaled) if scaled.size else 0.0
+
+
 def inflation(
     block: Block, recordings: list[Prepared], found: dict[Key, Residual], width: float
 ) -> float:
     """Variance of a block's bin means relative to white sample noise, times their correlation time
     (>= 1).
     """
-    values = []
-    for prepared in recordings:
-        r = found[block.name, prepared.recording.name]
-        means, counts = binned(r.value, r.rows, bin_width(prepared, width))
-        scaled = (means * np.sqrt(counts))[counts > 0] / r.noise
-        if scaled.size:
-            values.append(float(np.mean(scaled**2)) * correlation_time(scaled))
-    return max(1.0, float(np.mean(values))) if values else 1.0
+    residuals = [(p, found[block.name, p.recording.name]) for p in recordings]
+    values = [inflated(r.value, r.rows, bin_width(p, width), r.noise) for p, r in residuals]
+    seen = [value for value in values if value > 0.0]
+    return max(1.0, float(np.mean(seen))) if seen else 1.0

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, t
 
 from pamrs import _core
-from pamrs.diagnosis.fit import PIECE_TIME, Key, Problem, bin_width
+from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Key, Problem, bin_width
+from pamrs.diagnosis.noise._autocorrelation import inflated
 from pamrs.diagnosis.noise._discrepancy import Stated, curves, visited, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -59,6 +60,9 @@ class NoiseLevel:
     curves : (m, k) array or None
         What each curve of the stated error, one standard deviation high, does to the bin means;
         None where no error is stated.
+    inflation : float
+        Variance of the means of a fit's bins relative to white noise of the output, times their
+        correlation time: by so much fits take a block's residual less seriously.
     """
 
     sample: float
@@ -68,6 +72,7 @@ class NoiseLevel:
     beside: float = 0.0
     rest: float = 0.0
     curves: Array | None = field(default=None, repr=False, compare=False)
+    inflation: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -129,11 +134,13 @@ def noise_levels(
     settings, known = problem.settings, stated or {}
     ranges = {b.name: visited(b, problem.recordings) for b in problem.blocks if known}
     for prepared in problem.recordings:
-        rng = np.random.default_rng([settings.seed, crc32(prepared.recording.name.encode())])
+        seed = [settings.seed, crc32(prepared.recording.name.encode())]
+        rng, white_noise = np.random.default_rng(seed), np.random.default_rng([*seed, 1])
         for block in problem.blocks:
             base = residual(block, core, prepared, [])
             width = bins_of(prepared)
             powers: list[list[float]] = []
+            weights: list[float] = []
             noisy = [name for name in block.drives if name in prepared.signals]
             rows = base.rows
             _, counts = binned(base.value, rows, width)
@@ -149,6 +156,8 @@ def noise_levels(
                         else shaken
                     )
                 means, _ = binned(shaken, rows, width)
+                raw = shaken + base.freed(white_noise.normal(0.0, base.noise, prepared.n))
+                weights.append(inflated(raw, rows, bin_width(prepared, FIT_BIN_TIME), base.noise))
                 own = _own(block, base, prepared, counts, width, rng)[seen]
                 told = (shaken[rows], means[seen], means[seen] + own, own)
                 powers.append([float(np.mean(v**2)) for v in told])
@@ -181,6 +190,7 @@ def noise_levels(
                 math.sqrt(noise + rest),
                 rest / (noise + rest),
                 bent,
+                max(1.0, float(np.mean(weights))) if weights else 1.0,
             )
     return found
 

@@ -5,13 +5,14 @@ is set to: at rest all three are the same, and a log that begins as a stopcock i
 bars apart. Along a tube of segments gas stands or flows: at rest its pressure is that of its ends,
 and a log that begins while air flows has a gradient there. What a block predicts from either tells
 the samples that depend on it; these are not judged. A gas with a balance of energy that is let
-out, or filled, as a log begins, is not as warm as the room: where it began is fitted.
+out, or filled, as a log begins, is not as warm as the room: where it began is fitted. A joint
+begins at rest where that suits what follows better than the slope of its first samples.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -54,9 +55,15 @@ _REST_LIKELIHOOD = 1000.0
 
 
 Array = NDArray[np.float64]
+Tolerances = Mapping[str, float]
 
 
-def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) -> Prepared:
+def begun_alike(
+    blocks: Sequence[Block],
+    core: _core.Rig,
+    prepared: Prepared,
+    tolerances: Tolerances | None = None,
+) -> Prepared:
     """A recording whose first samples are not judged in blocks that remember where a regulator
     without a gauge stood, or what flowed along a tube.
 
@@ -68,12 +75,15 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
         The nominal model, compiled.
     prepared : Prepared
         The recording.
+    tolerances : mapping of str to float, optional
+        Of the rig's parameters, by dotted name [SI]; without them no motion is said to begin at
+        rest.
 
     Returns
     -------
     Prepared
-        With `unsettled`, the samples by the channel that each such block predicts, and
-        `temperatures` at which gases began.
+        With `unsettled`, the samples by the channel that each such block predicts, `temperatures`
+        at which gases began, and motions that begin `at_rest`.
     """
     beginnings = _Beginnings(blocks, core, prepared)
     counts = {block.channel: beginnings.remembered(block) for block in blocks}
@@ -84,7 +94,37 @@ def begun_alike(blocks: Sequence[Block], core: _core.Rig, prepared: Prepared) ->
         for block in blocks
         if block.warm is not None
     }
-    return replace(prepared, temperatures=began) if began else prepared
+    prepared = replace(prepared, temperatures=began) if began else prepared
+    moving = [block for block in blocks if block.mechanical and block.window is not None]
+    rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
+    return replace(prepared, at_rest=frozenset(rests)) if rests else prepared
+
+
+def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:
+    """Whether a motion begins at rest: the model, freed of where its first window starts, follows
+    it better from there than from the speed that its first samples have.
+
+    A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
+    window is freed of is linear in where it starts.
+    """
+    names = [n for n in core.parameter_names if n in block.parameters and n in tolerances]
+    tol = np.array([tolerances[n] for n in names])
+    left = []
+    for channels in (frozenset[str](), frozenset({block.channel})):
+        there = replace(prepared, at_rest=channels, _begun={})
+        try:
+            found = residual(block, core, there, names)
+        except SimulationError:
+            return False
+        if not names or found.jacobian is None or not found.starts or found.starts[0][0] > 0:
+            return False
+        last = found.starts[0][1]
+        slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
+        rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
+        rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
+        left.append(float(rows @ rows))
+    seen, still = left
+    return seen - still > _STILL_DEVIATIONS**2
 
 
 def _began_at(block: Block, rest: float, core: _core.Rig, prepared: Prepared) -> float:

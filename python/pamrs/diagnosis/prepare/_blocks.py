@@ -196,21 +196,7 @@ _VALVE = (
 _LINE = ("length", "diameter", "discharge_area", "inlet_volume")
 _WAVES = ("alpha",)  # of a tube that has segments
 _CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
-_MUSCLE = ("modulus_scale", "softening", "temperature")
-_ARM = (
-    "inertia",
-    "first_moment",
-    "payload",
-    "viscous",
-    "coulomb",
-    "base_angle",
-    "centre_angle",
-)
-_JOINT = ("stiffness", "spring_angle")
-_LOAD = ("mass", "viscous", "coulomb")
-_LINK = ("length", "mass", "centre", "inertia", "payload", "viscous", "coulomb")
-
-
+_SHAPE = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness")  # gives a volume
 _PRESSURE = {
     "supply": "supply_pressure",
     "line": "line_pressure",
@@ -353,6 +339,17 @@ class _Map:
             for kind, _, name in read
         }
 
+    def of(self, kind: str, *names: str) -> set[str]:
+        """All parameters of some blocks of a kind."""
+        own = tuple(f"{qualified(kind, name)}." for name in names)
+        return {name for name in self.rig.parameters if name.startswith(own)}
+
+    def of_motion(self, joints: Iterable[str]) -> set[str]:
+        """Parameters of what turns the lengths of muscles into the angles of some joints."""
+        there = set(joints)
+        pulling = [m for m, joint in self.joint_of.items() if joint in there]
+        return self.of("joint", *there) | self.of("transmission", *pulling)
+
     def of_ways(self, block: str) -> set[str]:
         """Parameters of the valves and lines at a block."""
         names: set[str] = set()
@@ -492,6 +489,13 @@ class _Map:
             | {f"{full}.{key}" for key in _CHAMBER}
             | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
             | self.zeros(self.nodes_at(full), joints or [""])
+            | self.of_motion(joints)
+            | {
+                f"{qualified('muscle', m)}.{key}"
+                for m, chamber in self.pulling.items()
+                if chamber == name
+                for key in _SHAPE
+            }
         )
         step = _GAS_STEP if fed else _SEALED_STEP
         window = _CHAMBER_WINDOW if fed else None
@@ -576,20 +580,10 @@ class _Map:
         name, covers = qualified("arm", joint), "muscle, joint and arm" + _called(joint)
         if lacking := self.lacking(name, covers, (*drives, *self.angles)):
             return lacking
-        names = {f"arm.{key}" for key in _ARM} | {
-            f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
-        }
-        names |= {
-            f"{qualified('joint', name)}.{key}"
-            for name in self.rig.tables("joint")
-            for key in _JOINT
-        }
-        names |= {
-            f"{qualified('link', link)}.{key}" for link in self.rig.tables("link") for key in _LINK
-        }
-        names |= self.zeros(
-            (qualified("chamber", c) for c in self.pulling.values()), self.rig.tables("joint")
-        )
+        joints, links = self.rig.tables("joint"), self.rig.tables("link")
+        names = self.of("arm", "") | self.of("link", *links) | self.of("muscle", *self.pulling)
+        names |= self.of_motion(joints)
+        names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), joints)
         return Block(
             name,
             dotted("joint_angle", joint),
@@ -608,9 +602,7 @@ class _Map:
         covers = "muscle and load"
         if lacking := self.lacking("load", covers, (*drives, *self.angles)):
             return lacking
-        names = {f"load.{key}" for key in _LOAD} | {
-            f"{qualified('muscle', m)}.{key}" for m in self.pulling for key in _MUSCLE
-        }
+        names = self.of("load", "") | self.of("muscle", *self.pulling)
         names |= self.zeros((qualified("chamber", c) for c in self.pulling.values()), ())
         return Block("load", "length", drives, _ARM_WINDOW, frozenset(names), _ARM_STEP, covers)
 
@@ -624,7 +616,7 @@ class _Map:
         moving = ("length",) if loaded else (dotted("joint_angle", joint),)
         if not pulling or not {channel, *drives, *self.angles} <= self.has:
             return None
-        names = {f"{qualified('muscle', m)}.{key}" for m in pulling for key in _MUSCLE}
+        names = self.of("muscle", *pulling) | (set() if loaded else self.of_motion([joint]))
         names |= self.zeros([qualified("chamber", self.pulling[m]) for m in pulling], [joint])
         return Block(
             "force" if loaded else qualified("torque", joint),

@@ -112,6 +112,8 @@ class Prepared:
         of it.
     simulated : tuple of str
         Channels among the signals that nobody measured: pressures of tanks without a gauge.
+    at_rest : frozenset of str
+        Channels of motions that begin at rest, as what follows tells.
     """
 
     recording: Recording
@@ -126,6 +128,7 @@ class Prepared:
     unsettled: dict[str, int] = field(default_factory=dict)
     temperatures: dict[str, float] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
+    at_rest: frozenset[str] = frozenset()
     _begun: dict[tuple[str, tuple[int, ...]], tuple[Array, Array]] = field(
         repr=False, default_factory=dict
     )
@@ -194,6 +197,9 @@ class Prepared:
                     self.dt,
                     at,
                 )
+                if at == 0 and channel in self.at_rest:
+                    rows = np.flatnonzero(self.recording.mask[channel])[:_START_LEAST_SAMPLES]
+                    state = float(np.median(self.raw[channel][rows])), 0.0
                 if state is not None:
                     value[at], slope[at] = state
             self._begun[key] = value, slope

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
-from pamrs.diagnosis.evidence import autocorrelation_of
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, autocorrelation_of
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
@@ -15,7 +16,7 @@ from pamrs.diagnosis.fit import (
     fit,
     known_parameters,
 )
-from pamrs.diagnosis.noise import CORRELATED_VARIANCE
+from pamrs.diagnosis.noise import CORRELATED_VARIANCE, NoiseLevel
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -24,15 +25,19 @@ __all__ = ["refitted", "thorough", "with_autocorrelation"]
 
 
 def with_autocorrelation(
-    problem: Problem, nominal: Rig, first: Fit
+    problem: Problem, nominal: Rig, first: Fit, noise_level: Mapping[Key, NoiseLevel]
 ) -> tuple[Fit, dict[str, float]]:
     """The refitted baseline, fitted on with the autocorrelation that it leaves as weights where
-    that is large, and the weights.
+    that is large, and the weights. What then lies at the end of its tolerances may have followed
+    the noise there: it is fitted from the nominal values too.
     """
-    autocorrelation = autocorrelation_of(problem, first)
+    autocorrelation = autocorrelation_of(problem, first, noise_level)
     if max(autocorrelation.values()) <= CORRELATED_VARIANCE:
         return first, autocorrelation
-    return thorough(problem, nominal, autocorrelation, first), autocorrelation
+    found = thorough(problem, nominal, autocorrelation, first)
+    if any(abs(moved) >= WALL_TOLERANCES for moved in found.moved.values()):
+        found = min(found, thorough(problem, nominal, autocorrelation, None), key=lambda f: f.cost)
+    return found, autocorrelation
 
 
 def thorough(problem: Problem, nominal: Rig, inflation: dict[str, float], warm: Fit | None) -> Fit:

@@ -136,7 +136,7 @@ def find_closure(
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    autocorrelation = autocorrelation_of(problem, found)
+    autocorrelation = autocorrelation_of(problem, found, {})
     candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
     second = _select(
         _Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values

@@ -255,7 +255,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     noise_level = noise_levels(inner, core_rig(first.rig, inner.core), stated)
     if not same:
         noise_level |= noise_levels(outer, core_rig(first.rig, outer.core), stated)
-    baseline, autocorrelation = with_autocorrelation(inner, nominal, first)
+    baseline, autocorrelation = with_autocorrelation(inner, nominal, first, noise_level)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
         return {b.name: excess(b, problem.recordings, found, noise_level, settings) for b in blocks}
