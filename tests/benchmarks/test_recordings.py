@@ -66,4 +66,9 @@ def test_shares_of_a_cylinder_add_up() -> None:
     told = cylinder_budget(load_friction_folder(FRICTION).cylinders["Kidney_lc"])
     assert np.isclose(sum(v for v, _, _ in told["shares"].values()), 1.0)
     assert told["after"] < told["constant"] < told["before"]
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not FRICTION.is_dir(), reason="the recordings are not there")
+def test_every_cylinder_has_a_row() -> None:
     assert len(cylinder_rows(FRICTION)) == 4

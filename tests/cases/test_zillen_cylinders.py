@@ -15,6 +15,7 @@ from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder, 
 from cases.zillen_cylinders.strokes import find_strokes, onset_at_rest, pair_strokes
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.levels import fit_levels
+from tests.tables import rows_of
 
 DATA = (
     Path(__file__).parents[2]
@@ -320,21 +321,7 @@ def test_motion_without_reversal_or_with_too_few_strokes():
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [
-        (
-            {"fit_on": (1e5,)},
-            r"1 pressure \(100 kPa\): the slope f1 of friction over pressure is not determinable",
-        ),
-        (
-            {"fit_on": (1e5, 7e5), "law": "quadratic"},
-            r"2 pressures .* the 3 coefficients of the law 'quadratic' are not determinable",
-        ),
-        (
-            {"fit_on": (1e5,), "law": "constant"},
-            "the piston area is not determinable from one pressure; give area",
-        ),
-        ({"area": 1e-1}, r"friction comes out as .* N with area = 0.1 m2"),
-    ],
+    rows_of(__file__, "what_the_runs_do_not_determine_is_named"),
 )
 def test_what_the_runs_do_not_determine_is_named(options, message):
     with pytest.raises(RecordingError, match=message):

@@ -11,6 +11,7 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.findings import Protocol
+from tests.tables import rows_of
 
 RIG = Path(pamrs.__file__).parent / "rigs" / "shoulder.toml"
 
@@ -270,17 +271,7 @@ def test_simulate_draws_channels_and_motion(capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "part"),
-    [
-        (["simulate", "sholder"], "'sholder' is neither a file nor a rig of the package; did you"),
-        (["rig", "check", "knee"], "there are: shoulder, antagonistic_joint, bench"),
-        (["diagnose", "--plan", "elbo"], "did you mean 'elbow'?"),
-        (["simulate", "shoulder", "--hold", "valve_comand = 6 V"], "'valve_command'?"),
-        (["simulate", "sealed_chamber", "--hold", "valve_command = 6 V"], "there are: pressure"),
-        (["simulate", "two_joint_arm", "--hold", "valve_command.elbo = 6 V"], "command.elbow'?"),
-        (["simulate", "two_joint_arm", "--hold", "valve_command = 6 V"], "valve_command.elbow, "),
-        (["simulate", "shoulder"], "give --hold 'valve_command = 5 V, 8 V @ 1 s', or --input"),
-        (["simulate", "shoulder", "--initial", "muscle_presure = 2 bar"], "muscle_pressure'?"),
-    ],
+    rows_of(__file__, "a_name_that_is_almost_right_is_recognised"),
 )
 def test_a_name_that_is_almost_right_is_recognised(capsys, words, part):
     code, out, err = run(capsys, *words)

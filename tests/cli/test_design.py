@@ -11,6 +11,7 @@ import pytest
 from pamrs import Joint, cli, library, rigs
 from pamrs.cli import design as cli_design
 from pamrs.rig import parse_rig
+from tests.tables import rows_of
 
 ARGUMENTS = {
     "--muscle": "pam_a_1in",
@@ -144,26 +145,7 @@ def test_no_design_of_the_direct_search_is_said():
 
 @pytest.mark.parametrize(
     ("changes", "more", "part"),
-    [
-        ({"muscle": "nobody"}, [], "nobody"),
-        ({"count": "0"}, [], "count"),
-        ({"torque": "788"}, [], "--torque"),
-        ({"torque": "788 bar"}, [], "--torque"),
-        ({"torque": "788 +- 2 N m"}, [], "standard deviation"),
-        ({"max_angle": "10 deg"}, [], "max_angle"),
-        ({"pressure": "-1 bar"}, [], "pressure"),
-        ({"evaluations": "3"}, [], "evaluations"),
-        ({}, ["--method", "newton"], "--method"),
-        ({}, ["--mutation", "2"], "mutation"),
-        ({}, ["--seed", "-1"], "seed"),
-        ({}, ["--max-stroke", "15"], "--max-stroke"),
-        ({}, ["--bounds", "lu"], "--bounds"),
-        ({}, ["--bounds", "xx=1:2 mm"], "--bounds"),
-        ({}, ["--bounds", "lu=60:10 mm"], "upper_axial"),
-        ({}, ["--bounds", "lu=1:2 bar"], "--bounds"),
-        ({}, ["--bounds", "lu=10:20 mm", "--bounds", "upper_axial=10:20 mm"], "twice"),
-        ({}, ["--png", "/no/such/folder/a.png"], "does not exist"),
-    ],
+    rows_of(__file__, "wrong_input_is_named"),
 )
 def test_wrong_input_is_named(capsys, changes, more, part):
     code, out, err = run(capsys, words(*more, **changes))

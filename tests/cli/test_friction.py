@@ -9,6 +9,7 @@ import pytest
 from pamrs import cli
 from pamrs.fit import fit_friction, load_force_map
 from pamrs.rig import Muscle
+from tests.tables import rows_of
 
 C0, C1 = 0.16, -0.145e-6  # (2.36)
 REST = 0.276
@@ -189,23 +190,7 @@ def test_a_description_brings_its_muscle(capsys, table):
 
 @pytest.mark.parametrize(
     ("words", "parts"),
-    [
-        ([], ["the rest length is missing", "--rest-length", "--muscle"]),
-        (["--rest-length", "276"], ["--rest-length = '276' is not allowed"]),
-        (["--rest-length", "3 bar"], ["--rest-length = '3 bar'", "wrong dimension"]),
-        (["--rest-length", "3 mm"], ["wrong unit"]),
-        ([*OPTIONS, "--rest-diameter", "20 mm"], ["give --braid-angle, --wall-thickness"]),
-        (["--muscle", "no_such"], ["--muscle = 'no_such' is neither a file nor in the library"]),
-        ([*OPTIONS, "--floor", "1.5"], ["floor = 1.5 is not allowed"]),
-        ([*OPTIONS, "--floor", "nan"], ["floor = nan is not allowed"]),
-        ([*OPTIONS, "--where", "direction"], ["--where = 'direction' is not allowed"]),
-        (
-            [*OPTIONS, "--where", "direction=1"],
-            ["no pressure gives a coefficient", "0 rows while contracting"],
-        ),
-        ([*OPTIONS, "--clipped", "0"], ["--clipped = '0' is not allowed"]),
-        ([*OPTIONS, "--colour", "red"], ["--colour"]),
-    ],
+    rows_of(__file__, "wrong_input_is_one_line_and_writes_nothing"),
 )
 def test_wrong_input_is_one_line_and_writes_nothing(capsys, table, tmp_path, words, parts):
     code, out, err = run(

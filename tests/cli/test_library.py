@@ -11,6 +11,7 @@ import pytest
 from pamrs import cli, library, load_rig
 from pamrs.design.sizing import Filling, Requirement, size
 from pamrs.library.published import compare
+from tests.tables import rows_of
 
 POINTS = ["--point", "0 mm:18 kN", "--point", "30 mm:7 kN"]
 PAIR = ["elbow_0625in", "large_2in_effective"]
@@ -214,37 +215,7 @@ def test_what_is_not_feasible_is_printed_with_its_reason(capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "parts"),
-    [
-        ([], ["--point"]),
-        (["--point", "18"], ["--point = '18' is not allowed", "POSITION:FORCE"]),
-        (["--point", "0:4 kN"], ["--point = '0' is not allowed", "unit like 'mm'"]),
-        (["--point", "0 mm:4 bar"], ["--point = '4 bar'", "wrong dimension"]),
-        (
-            ["--point", "3 mm:4 kN", "--point", "3 %:2 kN"],
-            ["3 mm:4 kN, 3 %:2 kN", "all contractions"],
-        ),
-        (
-            ["--point", "3 mm:4 kN", "--point", "2 mm:5 kN"],
-            ["3 mm:4 kN, 2 mm:5 kN", "positions must increase"],
-        ),
-        (["--point", "3 mm:4 +- 1 kN"], ["--point = '4 +- 1 kN'", "standard deviation"]),
-        (["--point", "-3 mm:4 kN"], ["-3 mm:4 kN", "none below zero"]),
-        (
-            [*POINTS, "no_such"],
-            ["MUSCLE = 'no_such' is neither a file nor in the library", "elbow_0625in"],
-        ),
-        ([*POINTS, "no_such.toml", "--pressure", "5 bar"], ["no_such.toml: cannot be read"]),
-        ([*POINTS, "pam_a_1in", "pam_a_1in"], ["'pam_a_1in' is used twice"]),
-        ([*POINTS, "--valve", "3"], ["--valve = '3' is not allowed"]),
-        ([*POINTS, "--valve", "3 kg"], ["--valve = '3 kg'", "wrong dimension"]),
-        ([*POINTS, "--valve", "0 mm2"], ["--valve = '0 mm2'", "above zero"]),
-        ([*POINTS, "--valve", "0 l/(s bar)"], ["--valve = '0 l/(s bar)'", "above zero"]),
-        ([*POINTS, "--supply", "-1 bar"], ["--supply = '-1 bar'", "above zero"]),
-        ([*POINTS, "--pressure", "0 bar"], ["--pressure = '0 bar'", "above zero"]),
-        ([*POINTS, "--dead-volume", "-1 l"], ["--dead-volume = '-1 l'", "from zero"]),
-        ([*POINTS, "--core", "-1 mm"], ["--core = '-1 mm'", "from zero"]),
-        ([*POINTS, "--max-count", "0"], ["max_count = 0 is not allowed"]),
-    ],
+    rows_of(__file__, "wrong_words_to_size_write_nothing"),
 )
 def test_wrong_words_to_size_write_nothing(capsys, tmp_path, monkeypatch, words, parts):
     monkeypatch.chdir(tmp_path)

@@ -28,6 +28,7 @@ from pamrs.control import (
     Sliding,
     cascaded_pid,
 )
+from tests.tables import rows_of
 
 SHOULDER = pamrs.rigs.shoulder()
 FULL = ArmModel.from_rig(SHOULDER)
@@ -234,36 +235,7 @@ def commands(answer):
 
 
 #: What the controllers of each rig read.
-CHANNELS = {
-    "pair": [
-        "joint_angle.elbow",
-        "muscle_pressure.flexor",
-        "muscle_pressure.extensor",
-        "supply_pressure",
-    ],
-    "arm": [
-        "joint_angle.elbow",
-        "joint_angle.wrist",
-        "muscle_pressure.elbow",
-        "muscle_pressure.wrist",
-        "supply_pressure",
-    ],
-    "mass": ["length", "muscle_pressure", "supply_pressure"],
-    "regulated": ["joint_angle", "muscle_pressure", "supply_pressure"],
-    "whole": [
-        "joint_angle.shoulder",
-        "muscle_pressure.pair_1",
-        "muscle_pressure.pair_2",
-        "muscle_pressure.pair_3",
-        "supply_pressure",
-    ],
-    "bundle": [
-        "joint_angle.shoulder",
-        "muscle_pressure.pair_1",
-        "muscle_pressure.pair_3",
-        "supply_pressure",
-    ],
-}
+CHANNELS = rows_of(__file__, "channels")
 
 
 def singles(measurement, row=None):

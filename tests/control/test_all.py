@@ -28,6 +28,7 @@ from tests.control.cases import (
     smooth,
     told,
 )
+from tests.tables import rows_of
 
 ALL = pytest.mark.parametrize("name", CONTROLLERS)
 
@@ -50,7 +51,7 @@ def aim_of(name, time):
 
 @ALL
 def test_a_batch_of_plants_is_its_plants(name):
-    n, count = 3, fewer(name, 400)
+    n, count = 3, fewer(name, 200)
     batch, single = CONTROLLERS[name](1.0), [CONTROLLERS[name](1.0) for _ in range(n)]
     for k, sample in enumerate(samples(count, shape=(n,))):
         sample = told(name, sample)
@@ -79,7 +80,7 @@ def agrees(answer, each):
 
 @ALL
 def test_a_sweep_of_gains_is_its_gains(name):
-    factors, count = np.array([0.5, 1.0, 1.7]), fewer(name, 300)
+    factors, count = np.array([0.5, 1.0, 1.7]), fewer(name, 150)
     batch, single = CONTROLLERS[name](factors), [CONTROLLERS[name](float(x)) for x in factors]
     for k, sample in enumerate(samples(count, seed=3)):
         sample = singles(told(name, sample))
@@ -96,27 +97,27 @@ def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name,
     controller = CONTROLLERS[name](1.0)
     rows = [
         singles(told(name, sample)) if shape == () else told(name, sample)
-        for sample in samples(300, seed=5, shape=shape)
+        for sample in samples(160, seed=5, shape=shape)
     ]
 
     def play(one, numbers):
         answers = [one.update(k * PERIOD, rows[k], aim_of(name, k * PERIOD)) for k in numbers]
         return [list(commands(answer).values()) for answer in answers]
 
-    first = play(controller, range(150))
+    first = play(controller, range(80))
     kept, state, fresh = (
         pickle.dumps(controller),
         copy.deepcopy(controller.state),
         CONTROLLERS[name](1.0),
     )
-    rest = play(controller, range(150, 300))
-    assert np.array_equal(play(pickle.loads(kept), range(150, 300)), rest)
+    rest = play(controller, range(80, 160))
+    assert np.array_equal(play(pickle.loads(kept), range(80, 160)), rest)
     fresh.restore(state)
-    assert np.array_equal(play(fresh, range(150, 300)), rest)
+    assert np.array_equal(play(fresh, range(80, 160)), rest)
     controller.restore(state)
-    assert np.array_equal(play(controller, range(150, 300)), rest)
+    assert np.array_equal(play(controller, range(80, 160)), rest)
     controller.reset()
-    assert np.array_equal(play(controller, range(150)), first)
+    assert np.array_equal(play(controller, range(80)), first)
     if shape == () and not name.startswith("rig arm "):  # several joints are arrays, as a batch is
         json.dumps(state)  # plain numbers, lists and mappings
     with pytest.raises(ParameterError, match="state"):
@@ -280,34 +281,7 @@ def test_what_is_not_a_state_is_refused_and_changes_nothing(name):
 
 #: Root mean square and largest absolute error [deg] from 6 s on, on a shoulder some per cent off
 #: its model: measured, and 15 % more.
-BOUNDS = {
-    "pid": (10.99, 25.94),
-    "pid back-calculation": (12.19, 24.82),
-    "pid measured rate": (11.50, 30.42),
-    "fuzzy": (11.67, 22.01),
-    "fuzzy quoted": (11.93, 21.82),
-    "feedforward": (6.84, 10.62),
-    "feedforward friction": (5.66, 8.26),
-    "feedforward measured": (14.26, 18.20),
-    "feedforward + pid": (1.73, 3.45),
-    "feedforward + fuzzy": (2.91, 5.03),
-    "feedforward + cascade": (0.91, 1.29),
-    "feedforward pressure": (6.14, 9.03),
-    "cascaded pid": (0.87, 1.23),
-    "cascaded pi": (5.60, 10.55),
-    "sliding": (1.21, 1.66),
-    "sliding signum": (0.20, 0.48),
-    "sliding estimates": (1.21, 1.66),
-    "adaptive": (0.24, 0.52),
-    "adaptive free": (1.14, 1.58),
-    "adaptive published": (1.45, 1.97),
-    "neural zero": (6.00, 10.79),
-    "neural model": (0.45, 0.76),
-    "neural gaylord": (3.63, 6.98),
-    "hysteresis sliding": (1.48, 1.92),
-    "hysteresis feedforward": (9.33, 14.29),
-    "dead zone": (11.48, 23.63),
-}
+BOUNDS = rows_of(__file__, "bounds")
 
 
 ON_SHOULDER = [n for n in CONTROLLERS if n != "pressure loop" and not n.startswith("rig ")]

@@ -13,6 +13,7 @@ from pamrs.control.linear import equilibrium, linearise
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.simulation import core_rig
+from tests.tables import rows_of
 
 SAMPLE = 2.5e-4  # s
 STEP = 1e-5  # s, so that the integrator's error is none beside that of the differences
@@ -30,30 +31,7 @@ WIDTHS = {
 }
 #: Where the typical values show little: sums of terms are zero without coefficients, and a delay is
 #: none.
-GIVEN = {
-    "closure_torque": {
-        "creep": 5.0,
-        "pressure_memory": 0.5,
-        "slip": 3.0,
-        "pressure_rate": -0.3,
-        "sign": -0.4,
-        "memory_time": 0.1,
-    },
-    "closure_flow": {
-        "pressure_memory": -2e-4,
-        "opening_memory": 1e-4,
-        "opening": 3e-4,
-        "abs_opening": 2e-4,
-        "volume_rate": 1e-5,
-        "memory_time": 0.1,
-    },
-    "closure_supply": {"pressure_memory": -1e-4, "opening": 1e-3, "memory_time": 0.1},
-    "input_path_lag": {"time_constant": 0.01, "delay": 0.03},
-    "muscle_creep": {"stiffness": 2e4, "time_constant": 0.05},
-    "pressure_lag": {"time_constant": 0.02},
-    "heat_transfer": {"share": 0.6, "initial_temperature_rise": 5.0},
-    "tube_flow_restriction": {"tap": 1.0},
-}
+GIVEN = rows_of(__file__, "given")
 #: Chambers that do not hold the joint: where they are at ambient pressure, a muscle may have a
 #: corner.
 PRESSED = {

@@ -15,26 +15,11 @@ from pamrs.control.trajectories import step
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from tests.control.helpers import SmallPid
+from tests.tables import rows_of
 
 ANGLE = math.radians(45)
 #: What each moving effect adds, where the model has to show it.
-MOVING = {
-    "pressure_lag": ({"time_constant": 0.02}, ["pressure_lag"]),
-    "input_path_lag": (
-        {"time_constant": 0.01, "delay": 0.03},
-        [f"input_path_lag.{k}" for k in ("lag", "delay_1", "delay_2", "delay_3")],
-    ),
-    "muscle_creep": ({"stiffness": 2e4, "time_constant": 0.05}, ["muscle_creep"]),
-    "heat_transfer": ({"initial_temperature_rise": 5.0}, ["heat_transfer.air_mass"]),
-    "base_flexibility": ({}, ["base_flexibility.angle", "base_flexibility.rate"]),
-    "payload_swing": ({}, ["payload_swing.angle", "payload_swing.rate"]),
-    "muscle_hysteresis": ({}, []),
-    "closure_torque": (
-        {"creep": 5.0, "pressure_memory": 0.5, "slip": 3.0, "memory_time": 0.1},
-        ["closure_torque.angle", "closure_torque.pressure"],
-    ),
-    "closure_flow": ({"pressure_memory": -2e-4, "memory_time": 0.1}, ["closure_flow.pressure"]),
-}
+MOVING = rows_of(__file__, "moving")
 #: effects that have no linear model
 KINKED = (
     "valve_dead_zone",

@@ -10,42 +10,9 @@ from hypothesis import strategies as st
 
 from pamrs.errors import PamrsError, ParameterError
 from pamrs.units import DIMENSIONS, from_si, measured_from, parse_unit, same_dimension, to_si
+from tests.tables import rows_of
 
-KNOWN = [
-    (1.0, "bar", "Pa", 1e5),
-    (2.0, "mbar", "pressure", 200.0),
-    (1.0, "psi", "pressure", 6894.757293168361),
-    (7.0, "barg", "pressure", 7e5),
-    (7.0, "bar(g)", "pressure", 7e5),
-    (7.0, "kPa gauge", "pressure", 7e3),
-    (2.0, "atü", "pressure", 2 * 98066.5),
-    (1.0, "at", "pressure", 98066.5),
-    (1.0, "kgf/cm2", "pressure", 98066.5),
-    (760.0, "Torr", "pressure", 101325.0),
-    (1000.0, "mmHg", "pressure", 133322.387415),
-    (1.0, "mH2O", "pressure", 9806.65),
-    (1.0, "inH2O", "pressure", 249.08891),
-    (4.0, "mA", "current", 4e-3),
-    (180.0, "deg", "angle", math.pi),
-    (60.0, "rpm", "rad/s", 2 * math.pi),
-    (1500.0, "us", "time", 1.5e-3),
-    (2.0, "min", "time", 120.0),
-    (1.0, "in", "length", 0.0254),
-    (10.0, "cm3", "volume", 1e-5),
-    (10.0, "cm^3", "volume", 1e-5),
-    (3.0, "l", "volume", 3e-3),
-    (3.0, "ml", "volume", 3e-6),
-    (1.0, "lb", "mass", 0.45359237),
-    (20.0, "degC", "temperature", 293.15),
-    (68.0, "degF", "temperature", 293.15),
-    (1.0, "l/(s bar)", "conductance", 1e-8),
-    (1.0, "m3/s/Pa", "conductance", 1.0),
-    (1.0, "kg cm2", "inertia", 1e-4),
-    (1.0, "kN mm", "torque", 1.0),
-    (1.0, "N m/deg", "N m/rad", 180 / math.pi),
-    (5.0, "%", "1", 0.05),
-    (-3.0, "mV", "V", -3e-3),
-]
+KNOWN = rows_of(__file__, "known")
 
 
 @pytest.mark.parametrize(("value", "unit", "dimension", "expected"), KNOWN)

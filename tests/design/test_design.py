@@ -27,6 +27,7 @@ from pamrs.design import (
 from pamrs.design._genetic import child, decode, redraw_one
 from pamrs.design._problem import _areas
 from reproduction.joints import CASES, facts_of_geometry
+from tests.tables import rows_of
 
 INCH = 0.0254
 GOOD = [0.0145, 0.0204, 0.0282, -0.0085]
@@ -234,23 +235,7 @@ def test_the_published_joint_law_gives_less_torque():
 
 @pytest.mark.parametrize(
     ("changes", "word"),
-    [
-        ({"count": 0}, "count"),
-        ({"count": 2.5}, "count"),
-        ({"points": 2}, "points"),
-        ({"torque": -1.0}, "torque"),
-        ({"torque": math.nan}, "torque"),
-        ({"pressure": 0.0}, "pressure"),
-        ({"max_contraction": math.inf}, "max_contraction"),
-        ({"penalty": -1.0}, "penalty"),
-        ({"min_angle": 2.5}, "min_angle"),
-        ({"max_angle": math.nan}, "max_angle"),
-        ({"kind": "pulley"}, "kind"),
-        ({"bounds": {"lu": (0.01, 0.02)}}, "'lu'"),
-        ({"bounds": {"upper_offset": (0.02, 0.01)}}, "upper_offset"),
-        ({"bounds": {"upper_offset": (0.02, math.nan)}}, "upper_offset"),
-        ({"bounds": {"lower_axial": (0.0, 0.01)}}, "lower_axial"),
-    ],
+    rows_of(__file__, "impossible_problems_are_named"),
 )
 def test_impossible_problems_are_named(changes, word):
     with pytest.raises(ParameterError, match=word):

@@ -13,8 +13,8 @@ NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4
 ROLES = (("slow", "fit"), ("fast", "fit"), ("again", "held_out"))
 
 
-def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1800) -> Recording:
-    """A shoulder moved by two sines of its valve, 9 s at 200 Hz, with the noise of transducers."""
+def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1200) -> Recording:
+    """A shoulder moved by two sines of its valve, 6 s at 200 Hz, with the noise of transducers."""
     rng = np.random.default_rng([31, seed])
     time, speed = 0.005 * np.arange(n), 1.0 + 0.4 * seed
     command = (
@@ -31,10 +31,10 @@ def recorded(rig: pamrs.Rig, name: str, role: str, seed: int, n: int = 1800) -> 
     return Recording(name, role, run.time, 0.005, channels, mask, [], units)
 
 
-def case(truth: pamrs.Rig, nominal: pamrs.Rig, home: Path = Path()) -> pamrs.Case:
+def case(truth: pamrs.Rig, nominal: pamrs.Rig, n: int = 1200) -> pamrs.Case:
     """Two recordings of a plant to fit and one held out, with a nominal model."""
-    found = [recorded(truth, name, role, seed) for seed, (name, role) in enumerate(ROLES)]
-    return pamrs.Case("shoulder", nominal, found, home)
+    found = [recorded(truth, name, role, seed, n) for seed, (name, role) in enumerate(ROLES)]
+    return pamrs.Case("shoulder", nominal, found, Path())
 
 
 def written(given: pamrs.Case, home: Path) -> Path:

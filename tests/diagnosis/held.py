@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -12,11 +13,35 @@ from pamrs.diagnosis.evidence import Attempts
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import available_blocks, prepare
+from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import noisy
 
 SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.sealed_chamber()
+
+
+def hold(
+    conductance: float,
+    seconds: float,
+    *,
+    name: str = "hold",
+    seed: int = 1,
+    step: float | None = 0.01,
+    **leak: float,
+) -> Recording:
+    """The chamber from 7 bar at 10 Hz with 150 Pa of noise, with a leak (0 for none)."""
+    known = {"conductance": conductance, **leak}
+    truth = RIG.with_effect("leak_muscle", known) if conductance else RIG
+    begin = {"muscle_pressure": 7e5}
+    run = pamrs.simulate(truth, duration=seconds, sample_time=0.1, step=step, initial=begin)
+    channels = {"muscle_pressure": run["muscle_pressure"]}
+    return noisy(name, "fit", 0.1, channels, {"muscle_pressure": 150.0}, [seed])
+
+
+def held(conductance: float, seconds: float, **options: Any) -> pamrs.Case:
+    """A case of one such hold."""
+    return pamrs.Case("hold", RIG, [hold(conductance, seconds, **options)], Path())
 
 
 def attempts(plant: pamrs.Rig, pressures: Sequence[float], noise: float) -> Attempts:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +30,12 @@ def noisy(
     found = {
         n: v + rng.normal(0.0, noise[n], v.size) if n in noise else v for n, v in channels.items()
     }
-    size = next(iter(found.values())).size
-    return Recording(
-        name,
-        role,
-        dt * np.arange(size),
-        dt,
-        found,
-        {n: np.ones(size, dtype=bool) for n in found},
-        units=dict.fromkeys(found, ""),
-        parameters=dict(parameters or {}),
-    )
+    return replace(whole(name, role, dt, found), parameters=dict(parameters or {}))
+
+
+def whole(name: str, role: str, dt: float, channels: dict[str, NDArray[np.float64]]) -> Recording:
+    """A recording without holes, of channels as they are."""
+    size = next(iter(channels.values())).size
+    mask = {n: np.ones(size, dtype=bool) for n in channels}
+    units = dict.fromkeys(channels, "")
+    return Recording(name, role, dt * np.arange(size), dt, channels, mask, units=units)

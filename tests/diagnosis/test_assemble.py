@@ -23,6 +23,7 @@ from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import whole
 
 SETTINGS = DiagnosisSettings()
 
@@ -32,9 +33,9 @@ NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 def recorded(
     rig: pamrs.Rig, name: str, role: str, *, leave_out: str = "", seed: int = 1
 ) -> Recording:
-    """Ten seconds of a shoulder at 200 Hz, with the noise of transducers."""
+    """Six seconds of a shoulder at 200 Hz, with the noise of transducers."""
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 10.0, 0.005)
+    time = np.arange(0.0, 6.0, 0.005)
     command = (
         5.0 + 0.4 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.2 * np.sin(2 * np.pi * 0.7 * time)
     )
@@ -49,8 +50,7 @@ def recorded(
     channels = {
         n: values[n] + noise[n] * rng.standard_normal(time.size) for n in NAMES if n != leave_out
     }
-    mask = {n: np.ones(time.size, dtype=bool) for n in channels}
-    return Recording(name, role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
+    return whole(name, role, 0.005, channels)
 
 
 def test_an_effect_of_two_blocks_is_named_once() -> None:
@@ -100,17 +100,7 @@ def test_a_rig_without_tolerances_can_be_diagnosed() -> None:
         initial={"muscle_pressure": 7e5},
     )
     pressure = run["muscle_pressure"] + np.random.default_rng(3).normal(0.0, 150.0, run.time.size)
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    hold = Recording(
-        "hold",
-        "fit",
-        run.time,
-        0.1,
-        {"muscle_pressure": pressure},
-        mask,
-        [],
-        {"muscle_pressure": "Pa"},
-    )
+    hold = whole("hold", "fit", 0.1, {"muscle_pressure": pressure})
     found = pamrs.diagnose(pamrs.Case("bare", bare, [hold], Path()))
     assert found.effects[0]["id"] == "leak_muscle"
 

@@ -17,7 +17,7 @@ from pamrs.diagnosis.fit import Events, Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block, available_blocks
 from pamrs.diagnosis.search import _hypotheses
-from pamrs.recordings import Recording
+from tests.diagnosis.noisy import whole
 
 SETTINGS = DiagnosisSettings()
 
@@ -41,13 +41,8 @@ def shoulder_case(truth: pamrs.Rig, fitted: int = 2, speed: float = 1.0) -> pamr
             name: run[name] + rng.normal(0.0, sigma, time.size) for name, sigma in NOISE.items()
         }
         channels["valve_command"] = command
-        mask = {channel: np.ones(time.size, dtype=bool) for channel in channels}
         role = "held_out" if number == fitted else "fit"
-        found.append(
-            Recording(
-                f"run_{number}", role, time, 0.005, channels, mask, [], dict.fromkeys(channels, "")
-            )
-        )
+        found.append(whole(f"run_{number}", role, 0.005, channels))
     return pamrs.Case("below_noise", pamrs.rigs.shoulder(), found, Path())
 
 
@@ -104,15 +99,6 @@ def test_a_lost_activation_pressure_and_a_shifted_zero_stay_a_set() -> None:
     assert "sensors.pressure_zero by +2." in found.where["text"]
     told = found.effects[0]["parameters"]["threshold"]
     assert abs(told["value"] - 2400.0) < 600.0
-
-
-def test_a_zero_inside_its_tolerance_is_no_effect() -> None:
-    shoulder = pamrs.rigs.shoulder()
-    found = pamrs.diagnose(
-        shoulder_case(shoulder.with_parameters({"sensors.pressure_zero": 900.0}))
-    )
-    assert found.verdict in ("none", "parameters")
-    assert found.effects == []
 
 
 @pytest.mark.slow

@@ -36,6 +36,7 @@ from pamrs.recordings import Recording, load_recording
 from pamrs.rig import Rig, parse_rig
 from pamrs.simulation import core_rig, replay
 from tests.diagnosis import synthetic
+from tests.diagnosis.noisy import whole
 from tests.simulation.test_spools import PAIR
 
 SETTINGS = DiagnosisSettings()
@@ -213,10 +214,8 @@ def test_experiments_keep_to_what_rig_and_recordings_allow(rig: Rig) -> None:
 
 
 def recording(peaks: dict[str, float]) -> Recording:
-    time = 0.01 * np.arange(200)
     channels = {name: np.linspace(0.0, peak, 200) for name, peak in peaks.items()}
-    mask = {name: np.ones(200, dtype=bool) for name in channels}
-    return Recording("r", "fit", time, 0.01, channels, mask, [], {})
+    return whole("r", "fit", 0.01, channels)
 
 
 def test_each_chain_stays_inside_its_own_recorded_pressures() -> None:

@@ -21,6 +21,7 @@ from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import whole
 
 SETTINGS = DiagnosisSettings()
 CLOSURES = [effect for effect in EFFECTS.values() if not effect.catalogue]
@@ -54,8 +55,7 @@ def recorded(truth: pamrs.Rig, kind: str, seed: int) -> Recording:
     channels = {
         name: run[name] + rng.normal(0.0, 1.0, ROWS) * level for name, level in NOISE.items()
     }
-    mask = {name: np.ones(ROWS, dtype=bool) for name in channels}
-    return Recording(kind, "fit", run.time, DT, channels, mask, [], dict.fromkeys(channels, "SI"))
+    return whole(kind, "fit", DT, channels)
 
 
 class Case:

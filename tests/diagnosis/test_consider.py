@@ -12,6 +12,7 @@ import pamrs
 from pamrs import cli
 from pamrs.diagnosis.result import schema
 from tests.diagnosis import again
+from tests.tables import rows_of
 
 RIG = pamrs.rigs.shoulder()
 LEAK = {"conductance": 2e-10}
@@ -20,7 +21,7 @@ LEAK = {"conductance": 2e-10}
 @pytest.fixture(scope="module")
 def asked() -> pamrs.Diagnosis:
     """A leak, with three suspicions, one of them twice."""
-    given = again.case(RIG.with_effect("leak_muscle", LEAK), RIG)
+    given = again.case(RIG.with_effect("leak_muscle", LEAK), RIG, 1800)
     suspicions = [
         "valve_area",
         "leak_muscle + heat_transfer",
@@ -75,16 +76,7 @@ def test_without_a_mismatch_there_is_nothing_to_explain() -> None:
 
 @pytest.mark.parametrize(
     ("name", "said"),
-    [
-        ("leak_muscel", "did you mean 'leak_muscle'"),
-        ("chamber.dead_volum", "did you mean 'chamber.dead_volume'"),
-        ("chamber.gamma", "nor one of its parameters with a tolerance"),
-        ("supply_regulator_deadband", "neither an effect that this rig can have"),
-        ("base_flexibility", "holds it already"),
-        ("", "neither an effect"),
-        ("leak_muscle+leak_muscle", "it has a name twice"),
-        ("leak_muscle@nowhere", "nowhere"),
-    ],
+    rows_of(__file__, "a_name_that_is_none_is_refused"),
 )
 def test_a_name_that_is_none_is_refused(name: str, said: str) -> None:
     rig = RIG.with_effect("base_flexibility")

@@ -24,6 +24,7 @@ from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig, differences, replay
 from tests.diagnosis.test_overlap import of, run
+from tests.tables import text_of
 
 SETTINGS = DiagnosisSettings()
 NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
@@ -132,21 +133,7 @@ def test_channels_without_use_are_told_everywhere() -> None:
 
 
 WARM = 320.0
-NOZZLE = parse_rig("""
-schema = "pamrs.rig/1"
-name = "nozzle"
-[gas]
-[chamber]
-dead_volume = { value = 1.0, unit = "l" }
-alpha_in    = { value = 1.0, unit = "1" }
-alpha_out   = { value = 1.0, unit = "1" }
-alpha       = { value = 1.0, unit = "1" }
-[line]
-kind = "orifice"
-from = "chamber"
-to   = "ambient"
-discharge_area = { value = 0.15, unit = "mm2" }
-""")
+NOZZLE = parse_rig(text_of(__file__, "nozzle"))
 
 
 def warm_stand(seed: int, role: str = "fit", room: float = WARM) -> Recording:

@@ -18,6 +18,8 @@ from pamrs.diagnosis.result import schema
 from pamrs.effects import EFFECTS
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.held import held
+from tests.diagnosis.noisy import whole
 
 SETTINGS = DiagnosisSettings()
 
@@ -26,33 +28,8 @@ CHAMBERS = ROOT / "cases" / "zillen_chambers"
 DATA = ROOT / ".." / "shared" / "recordings" / "pneumatic_cylinders_zillen"
 
 
-def sealed_case(
-    conductance: float, *, laminar: float = 0.0, noise: float = 150.0, seed: int = 1
-) -> pamrs.Case:
-    """A hold of a known chamber, 120 s at 10 Hz, with sensor noise."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = (
-        rig.with_effect("leak_muscle", {"conductance": conductance, "laminar_share": laminar})
-        if conductance
-        else rig
-    )
-    run = pamrs.simulate(
-        truth, duration=120.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    rng = np.random.default_rng(seed)
-    pressure = run["muscle_pressure"] + rng.normal(0.0, noise, run.time.size)
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    recording = Recording(
-        "hold",
-        "fit",
-        run.time,
-        0.1,
-        {"muscle_pressure": pressure},
-        mask,
-        [],
-        {"muscle_pressure": "Pa"},
-    )
-    return pamrs.Case("hold", rig, [recording], ROOT)
+def sealed_case(conductance: float, **leak: float) -> pamrs.Case:
+    return held(conductance, 120.0, **leak)
 
 
 def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
@@ -65,7 +42,7 @@ def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
 
 @pytest.mark.parametrize("laminar", [0.0, 1.0])
 def test_a_leak_is_named_with_its_size(laminar: float) -> None:
-    found = pamrs.diagnose(sealed_case(3e-11, laminar=laminar))
+    found = pamrs.diagnose(sealed_case(3e-11, laminar_share=laminar))
     assert found.verdict == "effects"
     assert found.effects[0]["id"] == "leak_muscle"
     parameters = found.effects[0]["parameters"]
@@ -161,8 +138,7 @@ def shoulder_recording(n: int = 2000) -> Recording:
         "joint_angle": 3e-4,
     }
     channels = {name: run[name] + rng.normal(0.0, 1.0, n) * level for name, level in noise.items()}
-    mask = {name: np.ones(n, dtype=bool) for name in channels}
-    return Recording("run", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, "SI"))
+    return whole("run", "fit", 0.005, channels)
 
 
 def test_a_hole_in_a_drive_costs_only_itself() -> None:

@@ -19,6 +19,7 @@ from pamrs.diagnosis.prepare import Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import whole
 
 Array = NDArray[np.float64]
 RIG = pamrs.rigs.shoulder()
@@ -40,9 +41,7 @@ def recorded(seed: int) -> tuple[Recording, Array]:
     run = pamrs.simulate(RIG, volts, sample_time=DT)
     rng = np.random.default_rng(seed)
     channels = {n: run[n] + rng.normal(0.0, s, ROWS) for n, s in NOISE.items()}
-    mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
-    units = dict.fromkeys(channels, "SI")
-    return Recording(f"r{seed}", "fit", time, DT, channels, mask, [], units), run["joint_angle"]
+    return whole(f"r{seed}", "fit", DT, channels), run["joint_angle"]
 
 
 def judged(off: list[Array], stated: dict[str, dict[str, float]]) -> Excess:

@@ -15,26 +15,10 @@ from pamrs.diagnosis.prepare import prepare
 from pamrs.recordings import Recording, load_case
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy
+from tests.tables import text_of
 
 FAULTS = Path(__file__).parents[1] / "faults"
-REGULATED = """
-schema = "pamrs.rig/1"
-name = "regulated"
-[gas]
-[supply]
-kind             = "regulator"
-initial_pressure = { value = 0.5, unit = "bar" }
-time_constant    = { value = 0.03, unit = "s", tol = 0.01 }
-[line]
-kind     = "tube"
-length   = { value = 1.0, unit = "m", tol = 0.02 }
-diameter = { value = 6.0, unit = "mm", tol = 0.05 }
-[chamber]
-dead_volume = { value = 0.1, unit = "l", tol = 0.002 }
-alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
-alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
-alpha       = { value = 1.2, unit = "1" }
-"""
+REGULATED = text_of(__file__, "regulated")
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
 SLEW, DELAY = "supply_regulator_slew", "supply_regulator_delay"
 

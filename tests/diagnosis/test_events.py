@@ -62,7 +62,7 @@ def recordings(
 )
 def test_an_event_is_named_with_its_times(effect: str, make: dict[str, float]) -> None:
     found = pamrs.diagnose(
-        pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make), Path())
+        pamrs.Case("events", pamrs.rigs.shoulder(), recordings(effect, make, 9.0), Path())
     )
     assert found.verdict == "effects"
     assert found.effects[0]["id"] == effect

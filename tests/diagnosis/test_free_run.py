@@ -49,7 +49,7 @@ def test_the_true_model_runs_freely_to_the_noise_and_the_nominal_one_drifts() ->
     assert runs is not None
     (run,) = runs
     assert (run.recording, run.role, run.note) == ("a", "held_out", "")
-    assert run.seconds == pytest.approx(9.995)
+    assert run.seconds == pytest.approx(5.995)
     assert set(run.channels) == {"supply_pressure", "muscle_pressure", "joint_angle"}
     error = run.channels["muscle_pressure"]
     assert error.unit == "Pa"

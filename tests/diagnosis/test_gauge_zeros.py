@@ -134,7 +134,11 @@ def test_a_replay_begins_at_what_the_gauges_read() -> None:
     ("text", "zeros"),
     [
         (REGULATED, {"supply.pressure_zero": 1500.0}),
-        (FED, {"supply.pressure_zero": 1500.0, "line.pressure_zero": -1500.0}),
+        pytest.param(
+            FED,
+            {"supply.pressure_zero": 1500.0, "line.pressure_zero": -1500.0},
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["regulator", "tank_and_line"],
 )

@@ -12,30 +12,10 @@ from pamrs.errors import RigError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from tests.diagnosis.noisy import noisy
+from tests.tables import text_of
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
-TEXT = """
-schema = "pamrs.rig/1"
-name = "iso"
-[gas]
-[supply]
-volume           = { value = 20, unit = "l", tol = 0.1 }
-initial_pressure = { value = 6, unit = "bar" }
-[valve]
-flow                = "iso_6358"
-fill_conductance    = { value = 0.20, unit = "l/(s bar)", tol = 0.01 }
-fill_critical_ratio = { value = 0.30, unit = "1", tol = 0.05 }
-vent_conductance    = { value = 0.26, unit = "l/(s bar)", tol = 0.01 }
-vent_critical_ratio = { value = 0.35, unit = "1", tol = 0.05 }
-null_voltage        = { value = 5.0, unit = "V", tol = 0.005 }
-half_range          = { value = 5.0, unit = "V" }
-area_fraction       = { opening = [0.0, 1.0], fraction = [0.0, 1.0] }
-[chamber]
-dead_volume = { value = 0.5, unit = "l", tol = 0.005 }
-alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
-alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
-alpha       = { value = 1.2, unit = "1" }
-"""
+TEXT = text_of(__file__, "iso")
 
 
 def recorded(rig: pamrs.Rig, role: str, seed: int) -> Recording:

@@ -16,6 +16,7 @@ from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import left_out
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.held import hold as held_chamber
 
 SETTINGS = DiagnosisSettings()
 
@@ -24,18 +25,7 @@ CHANNEL = {"muscle_pressure": "Pa"}
 
 
 def hold(name: str, conductance: float, seconds: float = 60.0, seed: int = 0) -> Recording:
-    """A sealed hold at 10 Hz with 150 Pa of noise."""
-    truth = RIG.with_effect("leak_muscle", {"conductance": conductance})
-    run = pamrs.simulate(
-        truth, duration=seconds, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    pressure = run["muscle_pressure"] + np.random.default_rng(seed).normal(
-        0.0, 150.0, run.time.size
-    )
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    return Recording(
-        name, "fit", run.time, 0.1, {"muscle_pressure": pressure}, mask, [], dict(CHANNEL)
-    )
+    return held_chamber(conductance, seconds, name=name, seed=seed)
 
 
 def problem(*recordings: Recording) -> Problem:

@@ -22,6 +22,8 @@ from pamrs.diagnosis.search import _hypotheses
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.report import html
+from tests.diagnosis.held import held
+from tests.diagnosis.noisy import whole
 from tests.diagnosis.synthetic import diagnosis
 
 Array = NDArray[np.float64]
@@ -39,19 +41,11 @@ def lenient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def recording(channels: dict[str, Array], time: Array) -> Recording:
     step = float(time[1] - time[0])
-    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
-    return Recording("run", "fit", time, step, channels, mask, [], {})
+    return whole("run", "fit", step, channels)
 
 
 def leaking() -> pamrs.Case:
-    """A chamber with a leak, 120 s at 10 Hz."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": 3e-11})
-    run = pamrs.simulate(
-        truth, duration=120.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
-    return pamrs.Case("hold", rig, [recording({"muscle_pressure": pressure}, run.time)], Path())
+    return held(3e-11, 120.0)
 
 
 def shoulder() -> pamrs.Case:

@@ -15,6 +15,8 @@ from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
+from tests.diagnosis.noisy import whole
+from tests.tables import rows_of
 
 SETTINGS = DiagnosisSettings()
 
@@ -38,10 +40,7 @@ def recorded(
         name: run[name] + rng.normal(0.0, 1.0, n) * NOISE.get(name.partition(".")[0], 0.0)
         for name in names
     }
-    mask = {name: np.ones(n, dtype=bool) for name in names}
-    return Recording(
-        f"{role}_{seed}", role, run.time, 0.005, channels, mask, [], dict.fromkeys(names, "SI")
-    )
+    return whole(f"{role}_{seed}", role, 0.005, channels)
 
 
 def case(
@@ -95,42 +94,7 @@ def test_every_block_has_its_own_drives_and_parameters(rig: pamrs.Rig) -> None:
 
 @pytest.mark.parametrize(
     ("name", "channels", "expected"),
-    [
-        (
-            "shoulder",
-            ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle"),
-            ["supply", "chamber", "arm"],
-        ),
-        ("shoulder", ("muscle_pressure", "joint_angle"), ["arm"]),
-        ("shoulder", ("muscle_pressure", "valve_command", "joint_angle"), ["arm"]),
-        ("sealed_chamber", ("muscle_pressure",), ["chamber"]),
-        (
-            "tube",
-            ("muscle_pressure.left", "muscle_pressure.right"),
-            ["chamber.left", "chamber.right"],
-        ),
-        (
-            "regulated_joint",
-            ("supply_command", "supply_pressure", "muscle_pressure", "joint_angle"),
-            ["supply", "chamber", "arm"],
-        ),
-        (
-            "regulated_joint",
-            ("supply_pressure", "muscle_pressure", "joint_angle"),
-            ["chamber", "arm"],
-        ),
-        (
-            "two_joint_arm",
-            (
-                "muscle_pressure.elbow",
-                "muscle_pressure.wrist",
-                "joint_angle.elbow",
-                "joint_angle.wrist",
-                "valve_command.elbow",
-            ),
-            ["chamber.elbow", "arm.elbow", "arm.wrist"],
-        ),
-    ],
+    rows_of(__file__, "the_channels_decide_what_can_be_told_apart"),
 )
 def test_the_channels_decide_what_can_be_told_apart(
     name: str, channels: tuple[str, ...], expected: list[str]

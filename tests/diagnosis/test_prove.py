@@ -5,6 +5,7 @@ run.json says.
 import hashlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -268,6 +269,7 @@ def test_two_real_cases_from_the_command_line(tmp_path, capsys):
     ]
     assert verdicts == ["effects", "none"]
     (tmp_path / "trial" / "two" / "hold.csv").unlink()
+    shutil.rmtree(tmp_path / "trial" / "one")
     assert (
         cli.main(["prove", str(tmp_path / "trial"), "--results", str(tmp_path / "out"), "--fresh"])
         == 3

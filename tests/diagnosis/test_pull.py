@@ -82,7 +82,11 @@ def test_a_load_cell_that_is_not_zeroed_is_no_missing_physics() -> None:
 @pytest.mark.parametrize(
     ("effect", "values"),
     [
-        ("muscle_hysteresis", {"friction_constant": 6.0, "friction_pressure": 6e-5}),
+        pytest.param(
+            "muscle_hysteresis",
+            {"friction_constant": 6.0, "friction_pressure": 6e-5},
+            marks=pytest.mark.slow,
+        ),
         ("activation_pressure", {"threshold": 2e4}),
     ],
 )

@@ -13,29 +13,10 @@ from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy
+from tests.tables import text_of
 
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0}
-TEXT = """
-schema = "pamrs.rig/1"
-name = "regulated"
-[gas]
-[supply]
-kind             = "regulator"
-initial_pressure = { value = 0.5, unit = "bar" }
-time_constant    = { value = 0.08, unit = "s", tol = 0.01 }
-dead_time        = { value = 0.005, unit = "s", tol = 0.002 }
-rise_limit       = { value = 20, unit = "bar/s", tol = 1 }
-fall_limit       = { value = 30, unit = "bar/s", tol = 1.5 }
-[line]
-kind     = "tube"
-length   = { value = 2.0, unit = "m", tol = 0.02 }
-diameter = { value = 4.0, unit = "mm", tol = 0.05 }
-[chamber]
-dead_volume = { value = 0.1, unit = "l", tol = 0.002 }
-alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
-alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
-alpha       = { value = 1.2, unit = "1" }
-"""
+TEXT = text_of(__file__, "regulated_limits")
 
 
 def recorded(rig: Rig, role: str, seed: int) -> Recording:

@@ -16,36 +16,12 @@ from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
 from tests.diagnosis.noisy import noisy
+from tests.tables import text_of
 
 SETTINGS = DiagnosisSettings()
 BOTTLE, OUTLET = "supply_pressure.bottle", "supply_pressure.regulator"
 NOISE = {BOTTLE: 400.0, OUTLET: 400.0, "muscle_pressure": 400.0}
-TEXT = """
-schema = "pamrs.rig/1"
-name = "bottled"
-[gas]
-[supply.bottle]
-kind             = "tank"
-volume           = { value = 5, unit = "l", tol = 0.1 }
-initial_pressure = { value = 9, unit = "bar" }
-[supply.regulator]
-kind             = "regulator"
-inlet            = "bottle"
-initial_pressure = { value = 4, unit = "bar" }
-time_constant    = { value = 0.08, unit = "s", tol = 0.01 }
-[valve]
-discharge_area_max = { value = 1.0, unit = "mm2", tol = 0.02 }
-null_voltage       = { value = 5, unit = "V", tol = 0.01 }
-half_range         = { value = 5, unit = "V" }
-[valve.area_fraction]
-opening  = [0.0, 0.05, 1.0]
-fraction = [0.0, 0.0, 1.0]
-[chamber]
-dead_volume = { value = 0.2, unit = "l", tol = 0.004 }
-alpha_in    = { value = 1.3, unit = "1", tol = 0.02 }
-alpha_out   = { value = 1.2, unit = "1", tol = 0.02 }
-alpha       = { value = 1.2, unit = "1" }
-"""
+TEXT = text_of(__file__, "bottled")
 
 LINED = (
     TEXT.partition("[valve]")[0]

@@ -9,38 +9,19 @@ import dataclasses
 import json
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.effects import EFFECTS
-from pamrs.recordings import Recording
+from tests.diagnosis.held import held
 
 ROOT = Path(__file__).parents[2]
 DIAGNOSIS = ROOT / "python/pamrs/diagnosis"
 
 
 def sealed_case(conductance: float = 3e-11) -> pamrs.Case:
-    """A hold of a known chamber that leaks, 60 s at 10 Hz."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": conductance})
-    run = pamrs.simulate(
-        truth, duration=60.0, sample_time=0.1, step=0.01, initial={"muscle_pressure": 7e5}
-    )
-    pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    recording = Recording(
-        "hold",
-        "fit",
-        run.time,
-        0.1,
-        {"muscle_pressure": pressure},
-        mask,
-        [],
-        {"muscle_pressure": "Pa"},
-    )
-    return pamrs.Case("hold", rig, [recording], Path())
+    return held(conductance, 60.0)
 
 
 def numbers(tree: ast.Module) -> dict[str, ast.stmt]:
@@ -122,7 +103,8 @@ def test_settings_are_few_and_each_says_what_it_is_and_where_it_comes_from() -> 
 
 
 def test_every_setting_is_read() -> None:
-    text = "".join(path.read_text("utf-8") for path in DIAGNOSIS.rglob("*.py"))
+    folders = (DIAGNOSIS, DIAGNOSIS.parent / "experiments")
+    text = "".join(path.read_text("utf-8") for f in folders for path in f.rglob("*.py"))
     unread = [f.name for f in dataclasses.fields(DiagnosisSettings) if f".{f.name}" not in text]
     assert not unread
 

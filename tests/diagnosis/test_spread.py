@@ -100,7 +100,7 @@ def test_the_factor_for_equations_widens_what_is_stated_and_changes_no_value() -
     rig = pamrs.rigs.shoulder()
     given = again.case(rig.with_effect("base_flexibility", {"compliance": 5e-4}), rig)
     usual = pamrs.DiagnosisSettings()
-    once = replace(usual, verdict=replace(usual, spread_factor=1.0))
+    once = replace(usual, spread_factor=1.0)
     narrow, wide = (pamrs.diagnose(given, settings=s) for s in (once, usual))
     assert wide.effects[0].id == "base_flexibility"
     for name, own in wide.effects[0].parameters.items():

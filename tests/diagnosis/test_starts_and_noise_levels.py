@@ -22,8 +22,8 @@ from pamrs.diagnosis.prepare import (
     noise_level,
     prepare,
 )
-from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.noisy import whole
 
 SETTINGS = DiagnosisSettings()
 
@@ -49,11 +49,8 @@ def recorded(seed: int, angle: np.ndarray | None = None) -> Prepared:
         + rng.normal(0.0, s, ROWS)
         for n, s in NOISE.items()
     }
-    mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
     return prepare(
-        Recording(
-            f"slow{seed}", "fit", time, DT, channels, mask, [], dict.fromkeys(channels, "SI")
-        ),
+        whole(f"slow{seed}", "fit", DT, channels),
         RIG,
         SETTINGS,
     )
@@ -182,18 +179,8 @@ def test_every_joint_of_an_arm_starts_where_it_was() -> None:
         n: v + rng.normal(0.0, 4e-4 if n.startswith("joint") else 100.0, ROWS)
         for n, v in channels.items()
     }
-    mask = {n: np.ones(ROWS, dtype=bool) for n in channels}
     prepared = prepare(
-        Recording(
-            "rest",
-            "fit",
-            DT * np.arange(ROWS),
-            DT,
-            channels,
-            mask,
-            [],
-            dict.fromkeys(channels, "SI"),
-        ),
+        whole("rest", "fit", DT, channels),
         rig,
         SETTINGS,
     )

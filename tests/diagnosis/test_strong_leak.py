@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 import pamrs
-from pamrs.recordings import Recording
+from tests.diagnosis.noisy import whole
 
 
 def emptied(exponent: float) -> pamrs.Case:
@@ -21,8 +21,7 @@ def emptied(exponent: float) -> pamrs.Case:
     )
     noise = np.random.default_rng(3).normal(0.0, 100.0, run.time.size)
     channels = {"muscle_pressure": run["muscle_pressure"] + noise}
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    one = Recording("hold", "fit", run.time, 0.1, channels, mask, [], {"muscle_pressure": "Pa"})
+    one = whole("hold", "fit", 0.1, channels)
     return pamrs.Case("emptied", rig, [one], Path())
 
 

@@ -25,12 +25,14 @@ NAMES = ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
 NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4}
 
 
-def recorded(rig: pamrs.Rig, name: str, role: str, *, seed: int, force: float = 0.0) -> Recording:
-    """Twelve seconds of a shoulder at 200 Hz; with an angle that lies by a wave of so many rad,
+def recorded(
+    rig: pamrs.Rig, name: str, role: str, *, seed: int, force: float = 0.0, seconds: float = 8.0
+) -> Recording:
+    """Some seconds of a shoulder at 200 Hz; with an angle that lies by a wave of so many rad,
     which no effect makes.
     """
     rng = np.random.default_rng(seed)
-    time = np.arange(0.0, 12.0, 0.005)
+    time = np.arange(0.0, seconds, 0.005)
     command = (
         5.0 + 0.5 * np.sin(2 * np.pi * 0.2 * time + seed) + 0.25 * np.sin(2 * np.pi * 0.7 * time)
     )
@@ -125,7 +127,7 @@ def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
 def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_parameters({"arm.payload": 0.7 * 9.07})
-    prepared = [prepare(recorded(true, "r", "fit", seed=1), rig, SETTINGS)]
+    prepared = [prepare(recorded(true, "r", "fit", seed=1, seconds=12.0), rig, SETTINGS)]
     (arm,) = (b for b in available_blocks(rig, NAMES) if b.name == "arm")
     problem = Problem([arm], prepared, core_rig(rig), SETTINGS)
     baseline = fit(problem, rig, (), {}, {"arm": 1.0}, evaluations=20)

@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from demo.run import judgement
+from tests.tables import rows_of
 
 KEY = {"verdict": "effects", "effects": ["leak_muscle"]}
 
@@ -19,24 +20,7 @@ def found(*names: str, chance: float = 0.9, sets: tuple[list[str], ...] = ()) ->
 
 @pytest.mark.parametrize(
     ("result", "said"),
-    [
-        (found("leak_muscle"), "The verdict is right."),
-        (
-            found("leak_muscle", chance=0.4, sets=(["leak_muscle"], ["unlisted"], ["valve_area"])),
-            "The verdict is right, but not settled: an effect outside the catalogue and valve_area "
-            "also stand.",
-        ),
-        (
-            found("leak_muscle", chance=0.41),
-            "The verdict is right, but not settled: its probability is 0.41.",
-        ),
-        (found("heat_transfer"), "The first answer is NOT the truth this time."),
-        (
-            found(sets=(["unlisted"], ["leak_muscle"])),
-            "The first answer is NOT the truth this time, but the diagnosis leaves it open, and "
-            "the truth is among what stands.",
-        ),
-    ],
+    rows_of(__file__, "an_answer_that_is_not_settled_is_not_called_simply_right"),
 )
 def test_an_answer_that_is_not_settled_is_not_called_simply_right(
     result: dict[str, Any], said: str

@@ -12,6 +12,7 @@ import pytest
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit import ForceMap, load_force_map, load_measured_muscle
 from tests.recordings.written import write_workbook
+from tests.tables import rows_of
 
 CASE = Path(__file__).parents[2] / "cases" / "festo_dmsp"
 TABLE = (
@@ -389,16 +390,7 @@ def test_a_cell_that_is_no_number_is_named(tmp_path):
 @pytest.mark.parametrize("name", ["map.csv", "map.txt", "map.tsv"])
 @pytest.mark.parametrize(
     ("delimiter", "decimal"),
-    [
-        (";", ","),
-        (";", "."),
-        ("\t", ","),
-        ("\t", "."),
-        (",", "."),
-        ("|", ","),
-        (" ", ","),
-        (" ", "."),
-    ],
+    rows_of(__file__, "delimiter_and_decimal_mark_are_found"),
 )
 def test_delimiter_and_decimal_mark_are_found(tmp_path, name, delimiter, decimal):
     text = (
@@ -430,28 +422,7 @@ def test_descriptions_find_delimiter_and_decimal_mark(described):
 
 @pytest.mark.parametrize(
     ("text", "match"),
-    [
-        (
-            "length [mm],pressure [bar],force [N]\n300,5,1,0,12,3\n290,5,1,0,8,5\n",
-            "3 cells .*: row 2 has 6.*both part.*delimiter and decimal",
-        ),
-        (
-            "bench 7\nlength [mm];pressure [bar];force [N]\n300;1;12\n",
-            "'bench 7'.*must hold the headings; give delimiter and decimal",
-        ),
-        (
-            "length_mm;pressure_bar;force_N\n300,5;1.5;12\n290;1;8\n",
-            "'300,5' and '1.5': which mark.*decimal",
-        ),
-        (
-            "length_mm;pressure_Pa;force_N\n300;100,000;12\n290;100,000;8\n",
-            "decimals or thousands.*decimal = ','",
-        ),
-        (
-            "length_mm;pressure_Pa;force_N\n300;1.000,5;12\n290;1.000,5;8\n",
-            "'1.000,5' has a mark between thousands",
-        ),
-    ],
+    rows_of(__file__, "tables_that_cannot_be_told_apart_ask_for_delimiter_and_decimal"),
 )
 def test_tables_that_cannot_be_told_apart_ask_for_delimiter_and_decimal(tmp_path, text, match):
     with pytest.raises(RecordingError, match=match):
@@ -506,24 +477,7 @@ def test_headings_without_units_are_mapped_by_hand(tmp_path):
 
 @pytest.mark.parametrize(
     ("heading", "rest", "words"),
-    [
-        (
-            "length [mm]",
-            3.0,
-            "Either rest_length is 10 times too large, or the length column is in cm, read as mm",
-        ),
-        (
-            "length [cm]",
-            REST,
-            "Either rest_length is 10 times too small, or the length column is in mm, read as cm",
-        ),
-        ("length [in]", REST, "25.4 times too small, or the length column is in mm, read as in"),
-        (
-            "length [mm]",
-            4.5,
-            "They differ by a factor of 15: check rest_length and the length column",
-        ),
-    ],
+    rows_of(__file__, "wrong_lengths_name_the_rest_length_too"),
 )
 def test_wrong_lengths_name_the_rest_length_too(tmp_path, heading, rest, words):
     path = write(tmp_path, csv_text(f"{heading},pressure [bar],force [N]", (1e3, 1e-5, 1.0)))

@@ -8,6 +8,7 @@ import pytest
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_friction, fit_muscle, load_force_map
 from tests.fit.cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle
+from tests.tables import rows_of
 
 
 @pytest.mark.parametrize(
@@ -283,29 +284,7 @@ def test_hysteresis_of_a_muscle_without_friction_is_named():
 
 @pytest.mark.parametrize(
     ("settings", "message"),
-    [
-        ({"model": "bouc_wen"}, "model = 'bouc_wen'"),
-        ({"order": 0}, "order = 0"),
-        ({"order": 2.5}, "order = 2.5"),
-        ({"model": "gaylord", "order": 2}, "gaylord has no stress polynomial"),
-        ({"moduli": "cubic"}, "moduli = 'cubic'"),
-        ({"free": ["radius"]}, "free: 'radius'"),
-        ({"free": ["k0"]}, "'k0' has no effect on the model kothera with cylinder geometry"),
-        ({"model": "gaylord", "free": ["wall_thickness"]}, "'wall_thickness' has no effect"),
-        ({"free": ["braid_angle", "braid_angle"]}, "names a parameter twice"),
-        (
-            {"free": ["braid_angle"], "tolerance": {"braid_angle": -1.0}},
-            "tolerance: braid_angle = -1.0",
-        ),
-        ({"tolerance": {"angle": 1.0}}, "tolerance: 'angle'"),
-        ({"levels": [0, 17]}, r"levels = \[0, 17\].*from 0 to 5"),
-        ({"levels": [1.4e5]}, "no measurement at 140 kPa"),
-        ({"levels": []}, "levels"),
-        ({"weights": "points"}, "weights = 'points'"),
-        ({"errors": "bootstrap"}, "errors = 'bootstrap'"),
-        ({"direction": "up"}, "direction = 'up'"),
-        ({"noise": 0.0}, "noise = 0.0"),
-    ],
+    rows_of(__file__, "arguments_that_are_not_allowed_are_named"),
 )
 def test_arguments_that_are_not_allowed_are_named(settings, message):
     with pytest.raises(ParameterError, match=message):

@@ -6,6 +6,7 @@ import pytest
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, compare_models, fit_muscle
 from tests.fit.cases import TOLERANCE, measure, muscle, truth
+from tests.tables import rows_of
 
 WIDE = {"modulus_slope": 10.0, "modulus_offset": 1e7}
 
@@ -134,18 +135,7 @@ def test_models_are_compared_with_the_priors_that_they_have():
 
 @pytest.mark.parametrize(
     ("settings", "message"),
-    [
-        ({"tolerance": WIDE}, r"tolerance of modulus_slope, modulus_offset needs noise"),
-        (
-            {"tolerance": {"c10": 1e6}, "noise": 1.0},
-            r"tolerance: 'c10' is not allowed: the model kothera has no such",
-        ),
-        (
-            {"tolerance": {"modulus_slope": -1.0}, "noise": 1.0},
-            r"modulus_slope = -1\.0 is not allowed: a positive number",
-        ),
-        ({"tolerance": {"colour": 1.0}}, r"tolerance: 'colour' is not allowed: of rest_length"),
-    ],
+    rows_of(__file__, "what_makes_no_prior_is_named"),
 )
 def test_what_makes_no_prior_is_named(settings, message):
     with pytest.raises(ParameterError, match=message):

@@ -13,6 +13,7 @@ from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
 from pamrs.rig import Muscle
+from tests.tables import rows_of
 
 REST = 0.3
 LEVELS = [1e5, 2e5, 3e5, 4e5, 5e5, 6e5]
@@ -500,24 +501,7 @@ def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "parts"),
-    [
-        ([], ["geometry of the muscle is missing", "--braid-angle", "--muscle"]),
-        (SIZES[2:], ["give --rest-length (like"]),
-        ([*SIZES, "--model", "hill"], ["model = 'hill' is not allowed"]),
-        ([*SIZES, "--order", "40"], ["order = 40"]),
-        ([*SIZES, "--levels", "350kPa"], ["no measurement at 350 kPa"]),
-        ([*SIZES, "--levels", "350"], ["--levels = '350' is not allowed", "'bar'"]),
-        ([*SIZES, "--levels", "350 mm"], ["--levels", "wrong dimension"]),
-        ([*SIZES, "--free", "colour"], ["'colour' is not allowed"]),
-        ([*SIZES, "--where", "muscle"], ["COLUMN=VALUE"]),
-        ([*SIZES, "--where", "muscle=A"], ["where names the column 'muscle'"]),
-        (["--rest-length", "30 bar", *SIZES[2:]], ["--rest-length = '30 bar'", "wrong dimension"]),
-        (["--rest-length", "3 mm", *SIZES[2:]], ["wrong unit"]),
-        (["--muscle", "no_such_muscle"], ["neither a file nor in the library", "elbow_0625in"]),
-        ([*SIZES, "--per-level", "--rig", "x.toml"], ["--per-level"]),
-        ([*SIZES, "--report", "no_such_folder/x.html"], ["folder no_such_folder does not exist"]),
-        ([*SIZES, "--order", "2", "--levels", "100kPa"], ["one pressure level only"]),
-    ],
+    rows_of(__file__, "wrong_input_is_one_line"),
 )
 def test_wrong_input_is_one_line(capsys, table, tmp_path, words, parts):
     code, out, err = run(capsys, table, *words)

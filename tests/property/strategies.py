@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from tests.reference import GeometryReference, MuscleReference
+from tests.tables import rows_of
 
 MODELS = (
     "gaylord",
@@ -101,24 +102,7 @@ def contractions(model: MuscleReference, n: int = 5) -> np.ndarray:
 
 
 #: Spread of the rig parameters: name -> (lower, upper) factor on the nominal value.
-FACTORS = {
-    "supply.volume": (0.7, 1.4),
-    "valve.discharge_area_max": (0.6, 1.5),
-    "chamber.dead_volume": (0.6, 2.0),
-    "chamber.alpha_in": (0.8, 1.0),
-    "chamber.alpha_out": (1.0, 1.3),
-    "chamber.alpha": (0.85, 1.15),
-    "muscle.modulus_scale": (0.8, 1.2),
-    "muscle.wall_thickness": (0.8, 1.1),
-    "muscle.rest_length": (0.97, 1.05),
-    "joint.upper_offset": (0.95, 1.05),
-    "joint.lower_axial": (0.95, 1.05),
-    "arm.inertia": (0.7, 1.5),
-    "arm.first_moment": (0.7, 1.3),
-    "arm.payload": (0.6, 1.8),
-    "arm.viscous": (0.5, 2.0),
-    "arm.coulomb": (0.0, 1.5),
-}
+FACTORS = rows_of(__file__, "factors")
 
 
 @st.composite

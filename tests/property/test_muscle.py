@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from tests.property.strategies import both, contractions, muscle_arguments
+from tests.tables import rows_of
 
 FEW = settings(max_examples=25, deadline=None)
 
@@ -142,22 +143,7 @@ def shoulder_muscle(**changes: Any) -> pamrs.Muscle:
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [
-        ("rest_length", math.nan),
-        ("rest_length", -0.1),
-        ("rest_diameter", 0.0),
-        ("rest_diameter", math.inf),
-        ("braid_angle", math.nan),
-        ("braid_angle", 0.0),
-        ("braid_angle", math.radians(95.0)),
-        ("wall_thickness", 0.02),
-        ("wall_thickness", -0.001),
-        ("modulus_slope", [math.nan]),
-        ("modulus_offset", [math.inf]),
-        ("modulus_scale", math.nan),
-        ("count", 0),
-        ("geometry", "sphere"),
-    ],
+    rows_of(__file__, "impossible_muscle_is_refused_by_name"),
 )
 def test_impossible_muscle_is_refused_by_name(name: str, value: Any) -> None:
     with pytest.raises(ValueError, match=name) as caught:

@@ -23,6 +23,7 @@ from tests.property.strategies import (
     reference_of,
     stroke,
 )
+from tests.tables import rows_of
 
 FEW = settings(max_examples=10, deadline=None, derandomize=True)
 ANY_MODEL = st.sampled_from(MODELS).flatmap(model_arguments)
@@ -430,34 +431,7 @@ def made(**changes: Any) -> pamrs.Muscle:
 
 @pytest.mark.parametrize(
     ("model", "name", "value"),
-    [
-        ("magic", "model", "magic"),
-        ("robinson", "geometry", "sphere"),
-        ("robinson", "modulus_slope", [math.nan, 0.0]),
-        ("robinson", "modulus_offset", [1e6, math.inf]),
-        ("mooney_rivlin", "c10", math.nan),
-        ("mooney_rivlin", "c01", math.inf),
-        ("elbow_linear", "bladder_modulus", math.nan),
-        ("elbow_linear", "extension_factors", (0.3, 0.8)),
-        ("elbow_linear", "extension_factors", (0.3, math.nan, 0.8)),
-        ("gaylord", "friction_coefficient", math.nan),
-        ("gaylord", "friction_coefficient", 1.5),
-        ("gaylord", "friction_pressure_slope", math.inf),
-        ("gaylord", "friction_floor", -0.01),
-        ("gaylord", "friction_presliding", -1e-3),
-        ("gaylord", "friction_presliding", math.nan),
-        ("gaylord", "wall_thickness", 0.013),
-        ("gaylord", "modulus_offset", [1e6]),
-        ("gaylord", "c10", 1e5),
-        ("chou_hannaford", "modulus_slope", [1.0]),
-        ("mooney_rivlin", "modulus_offset", [1e6]),
-        ("mooney_rivlin", "bladder_modulus", 1e6),
-        ("robinson", "c01", 1e5),
-        ("kothera", "bladder_modulus", 1e6),
-        ("ferraresi", "c10", 1e5),
-        ("elbow_linear", "modulus_offset", [1e6]),
-        ("robinson", "extension_factors", (0.5, 0.5, 0.5)),
-    ],
+    rows_of(__file__, "impossible_muscle_is_refused_by_name"),
 )
 def test_impossible_muscle_is_refused_by_name(model: str, name: str, value: Any) -> None:
     with pytest.raises(pamrs.ParameterError, match=name):

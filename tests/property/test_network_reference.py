@@ -19,6 +19,7 @@ from tests.reference.gas import critical_ratio, flow_function
 from tests.reference.network import Network, Tube, simulate, transmission
 from tests.reference.planar import Link, PlanarArm
 from tests.reference.plant import Gas
+from tests.tables import rows_of
 
 AMBIENT, TEMPERATURE, GAS_CONSTANT, GRAVITY = 101325.0, 293.15, 287.05, 9.80665
 RT = GAS_CONSTANT * TEMPERATURE
@@ -27,94 +28,45 @@ GAS = Gas()
 BAR = 1e5
 
 
+def made(kind: str, **changes: Any) -> dict[str, Any]:
+    """A block, or a rig, with what it has where nothing else is said."""
+    return {**rows_of(__file__, kind), **changes}
+
+
 def chamber(name: str = "", **changes: Any) -> dict[str, Any]:
-    base = {
-        "name": name,
-        "dead_volume": 1e-4,
-        "initial_pressure": 0.0,
-        "alpha_in": 1.4,
-        "alpha_out": 1.0,
-        "alpha": 1.2,
-    }
-    return {**base, **changes}
+    return made("chamber", name=name, **changes)
 
 
 def tank(name: str = "", **changes: Any) -> dict[str, Any]:
-    return {"name": name, "kind": "tank", "volume": 2e-3, "initial_pressure": 7e5, **changes}
+    return made("tank", name=name, **changes)
+
+
+def regulator(name: str = "", **changes: Any) -> dict[str, Any]:
+    return made("regulator", name=name, **changes)
 
 
 def valve(name: str, source: str, target: str, **changes: Any) -> dict[str, Any]:
-    shape = {"opening": [0.0, 0.25, 0.5, 0.75, 1.0], "fraction": [0.0, 0.2, 0.5, 0.8, 1.0]}
-    base = {
-        "name": name,
-        "from": source,
-        "to": target,
-        "discharge_area_max": 1e-6,
-        "null_voltage": 5.0,
-        "half_range": 5.0,
-    }
-    return {**base, **shape, **changes}
+    return made("valve", **{"name": name, "from": source, "to": target, **changes})
 
 
 def orifice(name: str, source: str, target: str, area: float, **changes: Any) -> dict[str, Any]:
-    base = {
-        "name": name,
-        "kind": "orifice",
-        "from": source,
-        "to": target,
-        "discharge_area": area,
-        "inlet_volume": 0.0,
-    }
-    return {**base, **changes}
+    ends = {"name": name, "from": source, "to": target, "discharge_area": area}
+    return made("orifice", **{**ends, **changes})
 
 
 def tube(
     name: str, source: str, target: str, length: float = 1.0, diameter: float = 4e-3, **changes: Any
 ) -> dict[str, Any]:
-    base = {
-        "name": name,
-        "kind": "tube",
-        "from": source,
-        "to": target,
-        "length": length,
-        "diameter": diameter,
-    }
-    return {**base, "inlet_volume": 0.0, **changes}
+    ends = {"name": name, "from": source, "to": target, "length": length, "diameter": diameter}
+    return made("tube", **{**ends, **changes})
 
 
 def muscle(
     name: str, joint: str, pulls: dict[str, Any] | None, into: str | None = None, **changes: Any
 ) -> dict[str, Any]:
     """A cylinder of (2.16): its table is made at once."""
-    elastic = {
-        "modulus_slope": [2.0, -0.3],
-        "modulus_offset": [8e5, -1e5],
-        "modulus_scale": 1.0,
-        "count": 2,
-    }
-    shape = {
-        "rest_length": 0.2,
-        "rest_diameter": 0.02,
-        "braid_angle": 1.25,
-        "wall_thickness": 1.5e-3,
-    }
-    ends = {"k0": 1.64, "contraction_slope": 2.405, "extension_slope": 6.105, "neck_floor": 0.8}
-    friction = {
-        "friction_coefficient": 0.0,
-        "friction_pressure_slope": 0.0,
-        "friction_floor": 0.0,
-        "friction_presliding": 1e-3,
-    }
-    body = {
-        "model": "kothera",
-        "geometry": "cylinder",
-        **elastic,
-        **shape,
-        **ends,
-        **friction,
-        **changes,
-    }
     into = into or (f"chamber.{name}" if name else "chamber")
+    body = made("muscle", **changes)
     return {"name": name, "chamber": into, "joint": joint, "transmission": pulls, "muscle": body}
 
 
@@ -129,8 +81,8 @@ def joint(
     high: float = 1.0,
     **changes: Any,
 ) -> dict[str, Any]:
-    stops = {"min_angle": low, "max_angle": high, "stop_stiffness": 2e4, "stop_damping": 60.0}
-    return {"name": name, "transmission": pulls, "rest_angle": 0.0, **stops, **changes}
+    own = {"name": name, "transmission": pulls, "min_angle": low, "max_angle": high}
+    return made("joint", **{**own, **changes})
 
 
 def link(
@@ -142,54 +94,17 @@ def link(
     payload: float = 0.0,
     **changes: Any,
 ) -> dict[str, Any]:
-    base = {
-        "name": name,
-        "joint": f"joint.{name}",
-        "length": length,
-        "mass": mass,
-        "centre": centre,
-        "inertia": inertia,
-    }
-    return {
-        **base,
-        "payload": payload,
-        "viscous": 0.0,
-        "coulomb": 0.0,
-        "coulomb_speed": 0.02,
-        **changes,
-    }
+    own = {"name": name, "joint": f"joint.{name}", "length": length, "mass": mass}
+    own |= {"centre": centre, "inertia": inertia, "payload": payload}
+    return made("link", **{**own, **changes})
 
 
 def rig(**blocks: Any) -> dict[str, Any]:
-    gas = {
-        "ambient_pressure": AMBIENT,
-        "temperature": TEMPERATURE,
-        "gas_constant": GAS_CONSTANT,
-        "heat_capacity_ratio": 1.4,
-    }
-    empty = dict.fromkeys(
-        ("supplies", "valves", "lines", "chambers", "muscles", "joints", "sensors", "effects"), []
-    )
-    return copy.deepcopy({"name": "rig", "gas": gas, **empty, "arm": None, "load": None, **blocks})
+    return copy.deepcopy(made("rig", **{"arm": None, "load": None, **blocks}))
 
 
 def one_link(**changes: Any) -> dict[str, Any]:
-    base = {
-        "kind": "one_link",
-        "inertia": 0.05,
-        "first_moment": 0.1,
-        "length": 0.3,
-        "payload": 1.0,
-        "viscous": 0.4,
-    }
-    return {
-        **base,
-        "coulomb": 0.0,
-        "coulomb_speed": 0.02,
-        "gravity": GRAVITY,
-        "links": [],
-        **changes,
-    }
+    return made("one_link", **changes)
 
 
 def antagonists(**changes: Any) -> dict[str, Any]:
@@ -439,13 +354,7 @@ def test_an_isothermal_muscle_obeys_the_gas_law() -> None:
 
 
 def test_a_regulator_follows_its_setting_with_one_time_constant() -> None:
-    outlet = {
-        "name": "",
-        "kind": "regulator",
-        "initial_pressure": 2e5,
-        "time_constant": 0.04,
-        "droop": 0.0,
-    }
+    outlet = regulator(initial_pressure=2e5, time_constant=0.04)
     setting = np.where(np.arange(31) < 15, 6e5, 1e5)
     run = simulate(rig(supplies=[outlet], chambers=[chamber()]), {"supply_command": setting}, 0.01)
     want = [2e5]
@@ -458,13 +367,7 @@ def test_a_regulator_follows_its_setting_with_one_time_constant() -> None:
 
 def test_a_regulator_droops_with_the_flow() -> None:
     """Into the open: p = p_set - droop mdot(p), a linear equation while the nozzle is choked."""
-    outlet = {
-        "name": "a",
-        "kind": "regulator",
-        "initial_pressure": 6e5,
-        "time_constant": 0.02,
-        "droop": 5e7,
-    }
+    outlet = regulator("a", initial_pressure=6e5, time_constant=0.02, droop=5e7)
     run = simulate(
         rig(
             supplies=[outlet],
@@ -484,13 +387,7 @@ def test_a_regulator_droops_with_the_flow() -> None:
 
 
 def test_a_regulator_takes_air_back() -> None:
-    outlet = {
-        "name": "",
-        "kind": "regulator",
-        "initial_pressure": 1e5,
-        "time_constant": 0.02,
-        "droop": 1e7,
-    }
+    outlet = regulator(initial_pressure=1e5, time_constant=0.02, droop=1e7)
     full = chamber(initial_pressure=5e5)
     run = simulate(
         rig(supplies=[outlet], lines=[orifice("", "supply", "chamber", 1e-6)], chambers=[full]),

@@ -15,6 +15,7 @@ import pamrs
 from tests.property.strategies import commands, rig_overrides
 from tests.reference import Plant, shoulder, with_overrides
 from tests.runs import STRUT
+from tests.tables import rows_of
 
 AMBIENT = 101325.0
 ROWS = 61
@@ -76,22 +77,7 @@ def test_matches_reference(
 
 @pytest.mark.parametrize(
     ("case", "command", "changes", "rows"),
-    [
-        ("falls on the lower stop", 5.0, {"muscle_pressure": 3e4, "joint_angle": 0.4}, 61),
-        (
-            "is thrown at the upper stop",
-            5.0,
-            {"muscle_pressure": 5e5, "joint_angle": 2.0, "joint_rate": 1.5},
-            61,
-        ),
-        ("vents almost to ambient", 4.0, {"muscle_pressure": 40.0, "joint_angle": 0.45}, 21),
-        (
-            "fills from a tank hardly above it",
-            6.0,
-            {"muscle_pressure": 5e5, "supply_pressure": 5.003e5},
-            21,
-        ),
-    ],
+    rows_of(__file__, "corners_match_reference"),
 )
 def test_corners_match_reference(
     case: str, command: float, changes: dict[str, float], rows: int

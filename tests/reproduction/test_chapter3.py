@@ -19,6 +19,7 @@ from pamrs.rig import Joint
 from reproduction import CHAPTERS, chapter3, chapter5, elbow
 from reproduction.page import Picture, Section, page
 from reproduction.statements import symbols
+from tests.tables import rows_of
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 AXIAL, OFFSET, TENDON = 1.56 * 0.0254, 0.42 * 0.0254, 3.04 * 0.0254
@@ -50,20 +51,7 @@ def rows():
 
 @pytest.mark.parametrize(
     ("published", "ours", "options", "verdict"),
-    [
-        (100.0, 104.9, {"tolerance": 5.0}, "agree"),
-        (100.0, 105.1, {"tolerance": 5.0}, "differs"),
-        (100.0, 94.9, {"tolerance": 5.0}, "differs"),
-        (0.0, 0.0, {}, "agree"),
-        (200.0, 200.1, {"relation": "above"}, "agree"),
-        (200.0, 200.0, {"relation": "above"}, "differs"),
-        (200.0, 200.0, {"relation": "below"}, "differs"),
-        (200.0, 199.0, {"relation": "below"}, "agree"),
-        (200.0, math.nan, {"tolerance": 5.0}, "differs"),
-        (200.0, math.nan, {"relation": "above"}, "differs"),
-        (200.0, 200.0, {"tolerance": 5.0, "cannot_tell": "no reason"}, "cannot tell"),
-        (math.nan, math.nan, {"relation": "below", "cannot_tell": "no number"}, "cannot tell"),
-    ],
+    rows_of(__file__, "verdict"),
 )
 def test_verdict(published, ours, options, verdict):
     row = judge("group", "fact", "3.2", published, ours, "deg", **options)

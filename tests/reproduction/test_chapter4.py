@@ -19,6 +19,7 @@ from reproduction.chapter4_statements import SERIES, statements
 from reproduction.elbow import PSI
 from reproduction.lift import GAINS, PAYLOADS, VARIANTS, Lifts
 from reproduction.two_branches import two_branches
+from tests.tables import rows_of
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 TIME = np.arange(2501) * 0.01
@@ -66,26 +67,7 @@ def test_overshoot_swing_and_delay_are_read_off_the_angle():
 
 @pytest.mark.parametrize(
     ("name", "good", "bad", "fact"),
-    [
-        ("fuzzy", {"late": 0.7}, {"late": 1.2}, "fuzzy: lag, mean of 11, 23, 34 kg"),
-        ("fuzzy", {"late": 0.7}, {"late": 0.7, "above": 5.0}, "fuzzy: largest overshoot"),
-        ("FF+PID", {}, {"above": 5.0}, "FF+PID: largest overshoot of the hold"),
-        ("FF+fuzzy", {}, {"swing": 5.0}, "FF+fuzzy: swing in the last 2 s of the hold"),
-        ("PID", {"rest": -5.0}, {}, "PID, 34 kg: overshoot below the rest position"),
-        (
-            "FF+fuzzy, kM 0.5",
-            {"rest": 3.0},
-            {"rest": 0.1},
-            "FF+fuzzy, kM 0.5, 45 kg: error 5 s after the return",
-        ),
-        (
-            "FF+PID, PID's gains",
-            {"late": 0.1},
-            {"late": 0.6},
-            "11 kg: error with feedforward, worst stage over PID alone",
-        ),
-        ("FF+PID, PID's gains", {}, {"swing": 4.0}, "11 kg: omega, FF+PID over PID"),
-    ],
+    rows_of(__file__, "a_statement_changes_sides_with_what_it_says"),
 )
 def test_a_statement_changes_sides_with_what_it_says(name, good, bad, fact):
     plain = {"PID": made(late=0.3, swing=1.0)} if "omega" in fact else {}
@@ -250,6 +232,7 @@ def test_the_predicted_pressure_holds_the_arm():
     assert np.all(wanted[1] > wanted[0])
 
 
+@pytest.mark.slow
 def test_lines_of_gains_are_loops_with_the_gains_of_each_payload():
     best = [(0.5, 1.5), (1.4, 2.5)]
     line = lift.derivative_line([0.0, 0.1], best)

@@ -22,6 +22,7 @@ from pamrs.rig.schema import BLOCKS, PORTS
 from pamrs.rigs._keys import every_key
 from pamrs.simulation import core_rig
 from tests.rig.cases import refused, same, stand
+from tests.tables import rows_of
 
 
 def core(rig: Rig) -> dict[str, Any]:
@@ -640,6 +641,8 @@ def test_a_bench_without_a_muscle_is_the_packaged_one() -> None:
 def test_every_packaged_rig_is_a_function_without_arguments(name: str) -> None:
     assert same(getattr(rigs, name)(), rigs.named(name))
     assert getattr(rigs, name)().cautions == []
+    with pytest.raises(AttributeError, match="knee"):
+        rigs.knee()
 
 
 @pytest.mark.parametrize("name", ["tube", "long_tube", "sealed_chamber", "blow_down_tank"])
@@ -673,32 +676,7 @@ def pulsed(valve: str) -> Rig:
 
 @pytest.mark.parametrize(
     ("valve", "said"),
-    [
-        ("", []),
-        ('with_current = "vent"', ["valve never passes air", "vent_conductance = 0 m3/(s Pa)"]),
-        (
-            'with_current = "closed"\nwithout_current = "vent"',
-            ["valve never passes air", "without_current = 'vent'"],
-        ),
-        ('with_current = "closed"\nwithout_current = "fill"', []),
-        ('with_current = "either"', []),
-        (
-            "area_fraction = { opening = [0, 1], fraction = [0, 0] }",
-            ["valve never passes air", "fraction"],
-        ),
-        ('opening_delay = { value = 12.5, unit = "ms" }', ["opening_delay = 12.5 ms", "duty of 1"]),
-        ('closing_delay = { value = 20, unit = "ms" }', ["closing_delay = 20 ms", "duty of 0"]),
-        (
-            'opening_delay = { value = 11.5, unit = "ms" }',
-            ["= 13 ms", "open and close in a period"],
-        ),
-        ('opening_delay = { value = 20, unit = "ms" }\ncarrier_frequency = -', []),
-        (
-            'spool = "ideal"\nopening_delay = -\nclosing_delay = -\ncarrier_frequency = -\n'
-            'fill_conductance = { value = 0, unit = "l/(s bar)" }',
-            ["valve never passes air", "fill_conductance = 0", "vent_conductance = 0"],
-        ),
-    ],
+    rows_of(__file__, "valves_that_never_act_are_told"),
 )
 def test_valves_that_never_act_are_told(
     valve: str, said: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]

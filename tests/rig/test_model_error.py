@@ -9,6 +9,7 @@ import pytest
 import pamrs
 from pamrs.errors import RigError
 from pamrs.rig import parse_rig
+from tests.tables import rows_of
 
 TEXT = pamrs.rigs.shoulder().to_toml_text(comments=False)
 
@@ -41,16 +42,7 @@ def test_of_several_chambers_each_may_have_its_own() -> None:
 
 @pytest.mark.parametrize(
     ("line", "said"),
-    [
-        ('muscel = "1 %"', "did you mean 'muscle'"),
-        ('muscle = "0.1 deg"', "of a block a share"),
-        ('joint_angle = "0.1 bar"', "bar"),
-        ('muscle = "a bit"', "a text like '1 %'"),
-        ("muscle = 0.01", "a text like '1 %'"),
-        ('muscle = "120 %"', "0 to 1"),
-        ('joint_angle = "-1 deg"', "0 to"),
-        ('load = "1 %"', "the rig has no load"),
-    ],
+    rows_of(__file__, "what_cannot_be_read_is_said"),
 )
 def test_what_cannot_be_read_is_said(line: str, said: str) -> None:
     with pytest.raises(RigError, match="model_error") as error:

@@ -12,6 +12,7 @@ import pytest
 import pamrs
 from pamrs.rig import parse_rig
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, GEOMETRIES, MODELS
+from tests.tables import rows_of
 
 SHOULDER = pamrs.rigs.shoulder().to_toml_text(comments=False)
 ELASTIC: dict[str, dict[str, Any]] = {
@@ -89,24 +90,7 @@ def test_friction_is_read_with_its_units() -> None:
 
 @pytest.mark.parametrize(
     ("model", "extra", "words"),
-    [
-        (
-            "gaylord",
-            'c10 = { value = 1e5, unit = "Pa" }',
-            ["muscle.c10", "'gaylord'", "mooney_rivlin"],
-        ),
-        (
-            "robinson",
-            'bladder_modulus = { value = 1, unit = "MPa" }',
-            ["muscle.bladder_modulus", "elbow_linear"],
-        ),
-        (
-            "elbow_linear",
-            'extension_factors = { value = [1, 1], unit = "1" }',
-            ["extension_factors has 2", "three"],
-        ),
-        ("kothera", 'geometry = "sphere"', ["muscle.geometry = 'sphere'", "'elliptic_published'"]),
-    ],
+    rows_of(__file__, "what_a_model_does_not_have_is_refused"),
 )
 def test_what_a_model_does_not_have_is_refused(model: str, extra: str, words: list[str]) -> None:
     with pytest.raises(pamrs.RigError) as caught:

@@ -10,26 +10,9 @@ import pytest
 import pamrs
 from pamrs.fit import ForceMap, fit_muscle
 from pamrs.rig import parse_rig
+from tests.tables import rows_of, text_of
 
-MASS = """
-schema = "pamrs.rig/1"
-name = "hanging"
-[gas]
-[chamber]
-dead_volume = { value = 20, unit = "cm3" }
-[muscle]
-rest_length = { value = 276, unit = "mm" }
-rest_diameter = { value = 25.4, unit = "mm" }
-braid_angle = { value = 73.5, unit = "deg" }
-wall_thickness = { value = 3.175, unit = "mm" }
-modulus_slope = { value = [3.0, -0.35], unit = "1" }
-modulus_offset = { value = [1.15, -0.15], unit = "MPa" }
-[load]
-mass = { value = 40, unit = "kg" }
-viscous = { value = 600, unit = "N s/m" }
-min_length = { value = 180, unit = "mm" }
-max_length = { value = 280, unit = "mm" }
-"""
+MASS = text_of(__file__, "hanging")
 
 
 def muscle() -> pamrs.Muscle:
@@ -109,26 +92,7 @@ def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [
-        ({}, r"length is missing"),
-        ({"duration": 1.0}, r"length is missing"),
-        ({"length": [0.27, np.nan]}, r"length\[1\] = nan"),
-        ({"length": [0.27, 0.5]}, r"length\[1\] = 0\.5 is not allowed"),
-        ({"length": [0.27, 0.26], "pressure": [1e5]}, r"pressure has the shape \(1,\); \(2,\)"),
-        (
-            {"length": [0.27, 0.26], "duration": 1.0},
-            r"duration = 1\.0 is not allowed together with a signal that sets it",
-        ),
-        ({"length": [0.5, 0.26]}, r"length\[0\] = 0\.5"),
-        (
-            {"length": [0.27, 0.26], "initial": {"length": 0.25}},
-            r"initial length = 0\.25 does not go with length\[0\]",
-        ),
-        (
-            {"length": [0.27], "initial": {"joint_angle": 0.1}},
-            r"has 'joint_angle', but the rig .* no \[joint\]",
-        ),
-    ],
+    rows_of(__file__, "what_a_frame_cannot_do_is_named"),
 )
 def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: str) -> None:
     with pytest.raises(pamrs.PamrsError, match=message):

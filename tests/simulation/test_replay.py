@@ -15,6 +15,7 @@ from pamrs.errors import ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import differences, replay
+from tests.tables import rows_of
 
 
 def write(path: Path, run: pamrs.Simulation, *names: str) -> Path:
@@ -158,22 +159,7 @@ def test_steps_on_the_command_line(tmp_path: Path, capsys: pytest.CaptureFixture
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [
-        (
-            ["--hold", "valve_command = 6 V"],
-            "no signal 'valve_command'; there are: valve_command.elbow, valve_command.wrist",
-        ),
-        (
-            ["--hold", "valve_command.elbow = 6 bar", "--hold", "valve_command.wrist = 5 V"],
-            "--hold",
-        ),
-        (["--hold", "torque = 6 V"], "takes no signal 'torque'; there are"),
-        (["--hold", "valve_command"], "a signal like"),
-        (["--hold", "valve_command.elbow = 6 V, 7 V"], "needs its time"),
-        (["--hold", "valve_command.elbow = 6 V"], "missing for valve_command.wrist"),
-        (["--initial", "colour = 6 V"], "no state 'colour'"),
-        (["--duration", "-1 s"], "--duration"),
-    ],
+    rows_of(__file__, "wrong_steps_are_named"),
 )
 def test_wrong_steps_are_named(
     words: list[str], message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 import pamrs
 from pamrs.simulation import core_rig
 from tests.scripts import script
+from tests.tables import rows_of
 
 SAMPLE = 0.005
 ROWS = 101
@@ -222,27 +223,7 @@ def test_squared_error_takes_a_reference():
 
 @pytest.mark.parametrize(
     ("arguments", "words"),
-    [
-        ({"parameters": {"arm.payload": [1.0, -2.0]}}, r"arm\.payload\[1\] = -2 kg"),
-        # the bound of the rig file and of a sweep
-        ({"parameters": {"arm.payload": [2e5, 9.0]}}, r"payload\[0\] = 200000 kg .* 100000 kg"),
-        ({"parameters": {"arm.payload": [1.0, np.nan]}}, r"arm\.payload\[1\] = nan"),
-        ({"parameters": {"arm.weight": [1.0, 2.0]}}, r"arm\.weight.*arm\.payload"),
-        ({"parameters": {"arm.payload": [1.0, 2.0]}, "n": 3}, "arm.payload is for 2.*n for 3"),
-        ({"n": 2, "record": ["angle"]}, r"'angle' is not a channel.*joint_angle"),
-        ({"n": 2, "record": "joint_angle"}, "a sequence of names"),
-        ({"n": 2, "every": 0}, "every = 0"),
-        ({"n": 2, "reduce": {"x": ("median", "joint_angle")}}, "median.*squared_error"),
-        ({"n": 2, "reduce": {"x": "final"}}, r"reduce\['x'\]"),
-        ({"n": 2, "reduce": {"x": ("final", "joint_angle", 1.0)}}, "only squared_error"),
-        ({"n": 2, "valve_command": [[1.0, 2.0, 3.0]]}, "valve_command is for 1.*n for 2"),
-        ({"n": 2, "valve_command": [5.0, np.inf]}, r"valve_command\[1\] = inf"),
-        ({"n": 2, "initial": {"joint_angle": [0.3, 9.0]}}, r"row 1.*initial\.joint_angle.*9"),
-        ({}, "n is missing"),
-        ({"n": 2, "duration": 1.0}, "duration = 1.0"),
-        ({"n": 2, "threads": 0}, "threads = 0"),
-        ({"n": 10_000_000, "record": ["joint_angle"]}, "2 GB"),
-    ],
+    rows_of(__file__, "what_is_wrong_is_said"),
 )
 def test_what_is_wrong_is_said(arguments, words):
     given = {"valve_command": np.full(ROWS, 6.0), "sample_time": SAMPLE} | arguments

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import pamrs
+from tests.tables import rows_of
 
 START = {"muscle_pressure": 1e5, "joint_angle": 0.52}
 CHANNELS = ("muscle_pressure", "supply_pressure", "joint_angle", "joint_rate")
@@ -110,23 +111,7 @@ def test_leak_empties_a_sealed_chamber() -> None:
 
 @pytest.mark.parametrize(
     ("name", "changes"),
-    [
-        ("valve_command", {"command": [5.0, math.nan, 5.0]}),
-        ("valve_command", {"command": [5.0, math.inf]}),
-        ("valve_command", {"command": []}),
-        ("valve_command", {"command": [[5.0, 5.0], [5.0, 5.0]]}),
-        ("sample_time", {"sample_time": 0.0}),
-        ("sample_time", {"sample_time": math.nan}),
-        ("sample_time", {"sample_time": -0.005}),
-        ("step", {"step": 0.0}),
-        ("step", {"step": math.nan}),
-        ("muscle_pressure", {"initial": {"muscle_pressure": math.nan}}),
-        ("muscle_pressure", {"initial": {"muscle_pressure": -2e5}}),
-        ("supply_pressure", {"initial": {"supply_pressure": -2e5}}),
-        ("joint_angle", {"initial": {"joint_angle": math.inf}}),
-        ("joint_rate", {"initial": {"joint_rate": math.nan}}),
-        ("elbow_angle", {"initial": {"elbow_angle": 0.1}}),
-    ],
+    rows_of(__file__, "bad_argument_is_refused_by_name"),
 )
 def test_bad_argument_is_refused_by_name(name: str, changes: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=name) as caught:

@@ -15,6 +15,7 @@ from pamrs.control.linear import linearise
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
+from tests.tables import text_of
 
 DOCS = Path(__file__).parents[2] / "docs" / "rigs.md"
 
@@ -28,28 +29,7 @@ def documented(title: str) -> str:
 
 
 PAIR = documented("Pulsed valves")
-SPRUNG = """
-schema = "pamrs.rig/1"
-name = "sprung"
-[gas]
-[supply]
-kind             = "constant"
-initial_pressure = { value = 6, unit = "bar" }
-[valve]
-discharge_area_max = { value = 1.5, unit = "mm2", tol = 0.1 }
-null_voltage       = { value = 5, unit = "V", tol = 0.02 }
-half_range         = { value = 5, unit = "V" }
-area_fraction      = { opening = [0, 1], fraction = [0, 1] }
-spool              = "second_order"
-natural_frequency  = { value = 40, unit = "Hz", tol = 5 }
-damping_ratio      = { value = 0.4, unit = "1", tol = 0.1 }
-[chamber]
-dead_volume      = { value = 0.05, unit = "l", tol = 0.002 }
-initial_pressure = { value = 2, unit = "bar" }
-alpha_in         = { value = 1.3, unit = "1" }
-alpha_out        = { value = 1.1, unit = "1" }
-alpha            = { value = 1.2, unit = "1" }
-"""
+SPRUNG = text_of(__file__, "sprung")
 
 
 def waves(rows: int, sample_time: float) -> dict[str, np.ndarray]:

@@ -11,6 +11,7 @@ import pytest
 import pamrs
 from pamrs import sweeps
 from tests.sweeps.helpers import same, small
+from tests.tables import rows_of
 
 RIG = pamrs.rigs.shoulder()
 
@@ -81,22 +82,7 @@ def test_a_sweep_over_samples_is_cut_and_resumed_like_any(tmp_path):
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
-    [
-        ({"n": 0}, "n = 0 is not allowed: a whole number from 1 to"),
-        ({"seed": -1}, "seed = -1"),
-        ({"sequence": "random"}, "sequence = 'random' is not allowed"),
-        ({"within": "bounds"}, "within = 'bounds' is not allowed"),
-        ({"within": {"arm.payload": (9.0, 5.0)}}, r"within\['arm.payload'\] = \(9, 5\)"),
-        ({"within": {"arm.payload": (-1.0, 5.0)}}, "the lower end first, from 0 to"),
-        ({"within": {"arm.payload": 5.0}}, r"within\['arm.payload'\] = 5.0 is not allowed"),
-        ({"within": {"arm.mass": (1.0, 2.0)}}, "'arm.mass' is no parameter"),
-        ({"parameters": ["arm.length"]}, "arm.length has no tolerance in the rig"),
-        ({"parameters": ["initial.joint_angle"]}, "initial.joint_angle has no tolerance"),
-        (
-            {"parameters": ["arm.viscous"], "within": {"arm.payload": (1.0, 2.0)}},
-            "within has 'arm.payload', which is not one of parameters",
-        ),
-    ],
+    rows_of(__file__, "samples_that_cannot_be_say_why"),
 )
 def test_samples_that_cannot_be_say_why(arguments, message):
     with pytest.raises(pamrs.ParameterError, match=message):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +15,8 @@ from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.search import refitted
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
+from tests.diagnosis.held import held
+from tests.diagnosis.noisy import whole
 from tests.work.snapshot import compare
 
 TOLERANCE = 0.1
@@ -73,30 +74,11 @@ def recorded(rig: pamrs.Rig, seed: int) -> Recording:
         name: run[name] + sigma * rng.standard_normal(time.size) for name, sigma in NOISE.items()
     }
     channels["valve_command"] = command
-    mask = {name: np.ones(time.size, dtype=bool) for name in channels}
-    return Recording(
-        f"r{seed}", "fit", time, 0.005, channels, mask, [], dict.fromkeys(channels, "")
-    )
+    return whole(f"r{seed}", "fit", 0.005, channels)
 
 
 def hold(conductance: float) -> pamrs.Case:
-    """A sealed chamber held for 60 s."""
-    rig = pamrs.rigs.sealed_chamber()
-    truth = rig.with_effect("leak_muscle", {"conductance": conductance}) if conductance else rig
-    run = pamrs.simulate(truth, duration=60.0, sample_time=0.1, initial={"muscle_pressure": 7e5})
-    pressure = run["muscle_pressure"] + np.random.default_rng(1).normal(0.0, 150.0, run.time.size)
-    mask = {"muscle_pressure": np.ones(run.time.size, dtype=bool)}
-    recording = Recording(
-        "hold",
-        "fit",
-        run.time,
-        0.1,
-        {"muscle_pressure": pressure},
-        mask,
-        [],
-        {"muscle_pressure": "Pa"},
-    )
-    return pamrs.Case("hold", rig, [recording], Path())
+    return held(conductance, 60.0, step=None)
 
 
 def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.MonkeyPatch) -> None:
