@@ -1,32 +1,189 @@
-"""Channels by name: what is measured or simulated, and its SI unit."""
+"""Channels: what is measured or simulated, one row for each.
+
+A channel of recordings is a row of `CHANNELS`: its unit, the range of the possible, the block of a
+rig that it is measured at, the words by which logs call it. Readers, proposals, checks and the
+diagnosis ask the table.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final
 
-__all__ = ["UNITS", "channel_of", "dotted", "laboratory_unit", "rate_of", "recorded_as", "unit_of"]
+__all__ = [
+    "CHANNELS",
+    "COMMANDED",
+    "MEASURED",
+    "UNITS",
+    "Channel",
+    "channel_of",
+    "dotted",
+    "laboratory_unit",
+    "rate_of",
+    "recorded_as",
+    "unit_of",
+    "with_trait",
+]
 
-#: SI unit of each channel, recorded or simulated; pressures gauge, but for the ambient one. Where a
-#: rig has several blocks of a kind, the name of the block stands behind a dot:
-#: ``muscle_pressure.flexor``; behind that the number of a tube's segment:
-#: ``segment_flow.flexor.1``.
+#: Words that say that a series was commanded, and that it was measured.
+COMMANDED: Final = (
+    "set soll sollwert setpoint sp ref reference des desired cmd command commanded target demand "
+    "vorgabe"
+)
+MEASURED: Final = "act actual ist istwert meas measured mess messwert fb feedback sensor gauge"
+_PRESSURE: Final = "pressure druck p press air luft"
+_OUTSIDE: Final = "ambient umgebung room raum"
+
+
+@dataclass(frozen=True)
+class Channel:
+    """A channel of recordings.
+
+    Attributes
+    ----------
+    name : str
+        Where a rig has several blocks of a kind, the name of the block stands behind a dot:
+        ``muscle_pressure.flexor``.
+    unit : str
+        SI unit; pressures gauge, but for the ambient one.
+    lower, upper : float
+        Range of the possible, SI.
+    block : str
+        Kind of the blocks of a rig that have it; empty for what is measured beside the rig.
+    words, hints : str
+        Words by which logs call it: one of `words` is enough, `hints` are shared with others.
+    sensor : str
+        What is measured there.
+    traits : str
+        Words: ``command`` (drives the rig or says where it should go, and holds from sample to
+        sample), ``driven`` (a command that a rig takes from recordings), ``pressure`` (a gauge in
+        the air of the rig), ``needed`` (nearly every diagnosis takes it), ``extra`` (few stands
+        have it), ``clips`` (its sensor ends at a rail), ``steady`` (may stay at one value),
+        ``unjudged`` (no fault of a sensor is sought), ``rests`` (stops and dry friction hold it
+        still), ``moves`` (an encoder may read it), ``slow`` (need not last as long as the others),
+        ``surroundings`` (what the rig stands in; a diagnosis sets the rig by it), ``named`` (never
+        found by a weak word or by its unit alone), ``strong`` (never found by a weak word alone),
+        ``played`` (of files that are played; no log has it).
+    units : tuple of str
+        SI units of what it may be, where that is not `unit` alone.
+    only : tuple of str, optional
+        Key of the block and its value, where not every block of the kind has it.
+    """
+
+    name: str
+    unit: str
+    lower: float = -math.inf
+    upper: float = math.inf
+    block: str = ""
+    words: str = ""
+    hints: str = ""
+    sensor: str = ""
+    traits: str = ""
+    units: tuple[str, ...] = ()
+    only: tuple[str, str] | None = None
+
+    @property
+    def strong(self) -> frozenset[str]:
+        """Each of `words`."""
+        return frozenset(self.words.split())
+
+    @property
+    def weak(self) -> frozenset[str]:
+        """Each of `hints`."""
+        return frozenset(self.hints.split())
+
+    @property
+    def possible(self) -> tuple[str, ...]:
+        """SI units of what it may be."""
+        return self.units or (self.unit,)
+
+    def has(self, trait: str) -> bool:
+        """Whether a trait is one of its own."""
+        return trait in self.traits.split()
+
+
+#: The channels of recordings by name.
+CHANNELS: Final[dict[str, Channel]] = {
+    row.name: row
+    for row in (
+        Channel("time", "s"),
+        Channel(
+            "valve_command", "V", -1000.0, 1000.0, "valve",
+            "valve ventil servo spool uvalve", f"u ao voltage volt input {COMMANDED}",
+            "voltage of the valve", "command driven needed",
+        ),
+        Channel(
+            "supply_command", "Pa", -1.3e5, 1e8, "supply",
+            "setpoint regulator regler psoll pset", f"supply {COMMANDED}",
+            "set pressure of the regulator", "command driven needed",
+            only=("kind", "regulator"),
+        ),
+        Channel("pressure_command", "Pa", -1.3e5, 1e8, traits="command played"),
+        Channel(
+            "supply_pressure", "Pa", -1.3e5, 1e8, "supply",
+            "supply tank reservoir source versorgung psup ps psupply ptank vorrat speise kessel "
+            "behälter behaelter regulator regler", _PRESSURE,
+            "pressure in the tank or behind the regulator", "pressure clips strong steady",
+        ),
+        Channel(
+            "line_pressure", "Pa", -1.3e5, 1e8, "line",
+            "line hose tube leitung schlauch pline", _PRESSURE,
+            "pressure between valve and hose", "pressure clips strong extra",
+        ),
+        Channel(
+            "muscle_pressure", "Pa", -1.3e5, 1e8, "chamber",
+            "muscle pam mckibben muskel chamber kammer pm p1 pmuscle",
+            f"{_PRESSURE} actuator bladder tank",
+            "pressure in the muscle or its chamber", "pressure clips needed",
+        ),
+        Channel(
+            "joint_angle", "rad", -100.0, 100.0, "joint",
+            "angle winkel theta phi encoder enc", "joint position pos q elbow knee",
+            "angle of the joint", "needed rests moves",
+        ),
+        Channel(
+            "length", "m", -100.0, 100.0, "load",
+            "length laenge länge stroke displacement weg lvdt disp", "x position pos laser",
+            "length of the muscle", "needed rests moves",
+        ),
+        Channel(
+            "force", "N", -1e7, 1e7, "load", "force kraft loadcell", "load cell f fz",
+            "pull of the muscles, by a load cell", "needed clips extra",
+        ),
+        Channel(
+            "joint_torque", "N m", -1e7, 1e7, "joint", "torque moment drehmoment", "m mz joint",
+            "torque of the muscles at the joint, by a torque sensor", "clips extra",
+        ),
+        Channel(
+            "temperature", "K", 50.0, 2000.0, "chamber",
+            "temperature temp temperatur thermo tc tgas tair ttank tchamber",
+            "gas chamber kammer tank tgas tair ttank tchamber",
+            "temperature of the gas in the muscle or its chamber", "slow named extra",
+            only=("gas", "energy_balance"),
+        ),
+        Channel(
+            "ambient_temperature", "K", 50.0, 2000.0, "",
+            f"{_OUTSIDE} umgebungstemperatur raumtemperatur tamb troom",
+            "temperature temp temperatur thermo tc umgebungstemperatur raumtemperatur tamb troom",
+            traits="slow named surroundings unjudged",
+        ),
+        Channel(
+            "ambient_pressure", "Pa", 2e4, 1.2e5, "",
+            f"{_OUTSIDE} atmospheric atmosphere barometric barometer baro luftdruck pamb patm",
+            f"{_PRESSURE} barometer baro luftdruck pamb patm", traits="slow named surroundings",
+        ),
+        Channel(
+            "reference", "rad", -1e9, 1e9, "",
+            "reference ref desired target sollwert", "soll wanted", traits="command",
+            units=("rad", "Pa"),
+        ),
+    )
+}  # fmt: skip
+#: SI unit of each channel, recorded or simulated; pressures gauge, but for the ambient one. Behind
+#: the name of the block stands the number of a tube's segment: ``segment_flow.flexor.1``.
 UNITS: Final[dict[str, str]] = {
-    "time": "s",
-    "valve_command": "V",
-    "supply_command": "Pa",
-    "pressure_command": "Pa",
-    "supply_pressure": "Pa",
-    "line_pressure": "Pa",
-    "muscle_pressure": "Pa",
-    "joint_angle": "rad",
-    "length": "m",
-    "force": "N",
-    "joint_torque": "N m",
-    "temperature": "K",
-    "ambient_temperature": "K",
-    "ambient_pressure": "Pa",
-    "reference": "rad",
+    **{name: row.unit for name, row in CHANNELS.items()},
     "joint_rate": "rad/s",
     "length_rate": "m/s",
     "contraction_ratio": "1",
@@ -52,6 +209,11 @@ UNITS: Final[dict[str, str]] = {
 def channel_of(name: str) -> str:
     """The channel of a name: ``muscle_pressure`` of ``muscle_pressure.flexor``."""
     return name.partition(".")[0]
+
+
+def with_trait(trait: str) -> tuple[str, ...]:
+    """The channels of recordings with a trait, in the order of the table."""
+    return tuple(name for name, row in CHANNELS.items() if row.has(trait))
 
 
 def dotted(channel: str, name: str) -> str:

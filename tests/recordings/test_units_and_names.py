@@ -212,7 +212,8 @@ def test_the_recorded_ambient_pressure_is_subtracted(tmp_path: Path) -> None:
         "angle [deg]": ANGLE,
     }
     proposal = propose([log(tmp_path, columns)], SHOULDER)
-    assert any("barometer, 0.93 bar" in text for text in proposal.logs[0].remarks)
+    told = [text for text in proposal.logs[0].remarks if "the recorded ambient pressure" in text]
+    assert any("0.93 bar (13.49 psi), is subtracted" in text for text in told)
     found, only = pressure(tmp_path, proposal)
     np.testing.assert_allclose(found, GAUGE, atol=2.0)
     assert (
@@ -243,7 +244,7 @@ def test_headings_that_say_it_all_say_that_they_are_absolute(tmp_path: Path) -> 
     )
     SHOULDER.to_toml(tmp_path / "rig.toml")
     (only,) = load_case(tmp_path).recordings
-    assert "the ambient pressure that the rig file says" in only.notes["muscle_pressure"]
+    assert "the ambient pressure of the rig file" in only.notes["muscle_pressure"]
     file = log(tmp_path, {"muscle_pressure [Pa(a)]": GAUGE, "ambient_pressure [hPa]": 0.0 * TIME})
     with pytest.raises(RecordingError, match="column 'ambient_pressure': 0 Pa and"):
         load_recording(file, delimiter=";")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs._files import resolved
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
     check_writable,
     exact,
@@ -199,7 +199,7 @@ def _plan(
     noise: dict[str, float] = {}
     if pressure_noise is not None:
         noise |= dict.fromkeys(
-            ("supply_pressure", "line_pressure", "muscle_pressure"),
+            with_trait("pressure"),
             exact("pressure_noise", pressure_noise, "pressure"),
         )
     if angle_noise is not None:

@@ -10,12 +10,13 @@ of every format, :mod:`pamrs.recordings.calibration` what their numbers stand fo
 
 from __future__ import annotations
 
+from pamrs.channels import CHANNELS
 from pamrs.recordings._case import Case, load_case, model_and_case
+from pamrs.recordings._doubts import Suspicion, suspicions
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._proposal import LogProposal, Proposal, propose
-from pamrs.recordings._recording import CHANNELS, Issue, OwnValue, Recording
-from pamrs.recordings._suspicion import Suspicion, suspicions
+from pamrs.recordings._recording import Issue, OwnValue, Recording
 
 __all__ = [
     "CHANNELS",

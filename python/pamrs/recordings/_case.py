@@ -17,10 +17,10 @@ from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolv
 from pamrs.channels import channel_of
 from pamrs.effects import find_parameter
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
+from pamrs.recordings._doubts import ambient_of, limits_of
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._recording import Issue, OwnValue, Recording
-from pamrs.recordings._suspicion import ambient_of, limits_of
 from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si

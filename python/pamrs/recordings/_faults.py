@@ -13,6 +13,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import CHANNELS
+
 __all__ = ["Fault", "find_faults"]
 
 Array = NDArray[np.float64]
@@ -27,15 +29,6 @@ _RAIL_LEAP: Final = 5.0  # step into a dropout over the largest one elsewhere
 _RAIL_SAME: Final = 0.3  # difference before and after it, over that step
 _EDGES: Final = 1.5  # quanta that noise has to span, at least two, for stays to be judged by it
 _REST: Final = 12.0  # quanta that a channel at rest may span
-
-#: Set by the controller or the user: constant stretches are their nature.
-COMMANDS: Final = frozenset({"valve_command", "supply_command", "pressure_command", "reference"})
-#: Stops and dry friction hold these exactly still.
-MECHANICAL: Final = frozenset({"joint_angle", "length"})
-#: Transducers whose end of range is a fault.
-CLIPPING: Final = frozenset(
-    {"supply_pressure", "line_pressure", "muscle_pressure", "force", "joint_torque"}
-)
 
 
 class Fault(NamedTuple):
@@ -66,7 +59,8 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     list of Fault
         In the order of kinds: constant, outlier, saturated, frozen.
     """
-    if channel in COMMANDS or channel == "ambient_temperature" or len(values) < 3:
+    row = CHANNELS[channel]
+    if row.has("command") or row.has("unjudged") or len(values) < 3:
         return []
     good = np.flatnonzero(np.isfinite(values))
     data = values[good]
@@ -102,7 +96,7 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
 def _constant(channel: str, data: Array, good: NDArray[np.intp]) -> list[Fault]:
     if len(data) < _LEAST:
         return []
-    masked = channel in CLIPPING - {"supply_pressure"}
+    masked = CHANNELS[channel].has("clips") and not CHANNELS[channel].has("steady")
     text = "one and the same value throughout"
     return [Fault("constant", int(good[0]), int(good[-1]) + 1, text, masked)]
 
@@ -243,7 +237,11 @@ class _Stretches:
             if extreme and self._ordinary_extreme(value):
                 continue
             long = stop - start > self.limit
-            if extreme and self.channel in CLIPPING and (long or self._cut_off(start, stop)):
+            if (
+                extreme
+                and CHANNELS[self.channel].has("clips")
+                and (long or self._cut_off(start, stop))
+            ):
                 clipped[value] = True
             elif (long and self._believable(start, stop)) or self._leaps(start, stop):
                 found.append(("frozen", start, stop))
@@ -256,7 +254,7 @@ class _Stretches:
 
     def _ordinary_extreme(self, value: float) -> bool:
         """A joint against its stop; a vented pressure or an unloaded cell at zero."""
-        if self.channel in MECHANICAL:
+        if CHANNELS[self.channel].has("rests"):
             return True
         return value == self.low and abs(value) <= 0.02 * (self.high - self.low)
 
@@ -264,7 +262,7 @@ class _Stretches:
         """Whether an overlong run is the sensor's doing and not that of a joint held by
         friction.
         """
-        if self.channel not in MECHANICAL:
+        if not CHANNELS[self.channel].has("rests"):
             return True
         lively = self.rest_windows * _WINDOW >= 3 * (stop - start)
         return lively or self._jump(start, stop) > max(3.0 * self.quantum, 3.0 * self.typical)

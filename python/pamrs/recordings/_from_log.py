@@ -12,12 +12,12 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.channels import channel_of
+from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings._clock import Array
-from pamrs.recordings._gauge import made_gauge
+from pamrs.recordings._doubts import made_gauge
 from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
-from pamrs.recordings._recording import CHANNELS, Issue, Recording
+from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
 from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
@@ -234,7 +234,7 @@ def _sampled(log: Log, item: Source, clocks: Clocks, clock: Clock) -> Sampled:
             f"{item.channel!r}"
         )
     raw, said = series.values, ""
-    if channel_of(item.channel) in ("joint_angle", "length"):
+    if CHANNELS[channel_of(item.channel)].has("moves"):
         raw, said = counted_on(raw)
     made = sampled(item.channel, item.si(raw), clocks.of(series, clock), _si_unit(item), item.hold)
     return replace(made, remarks=(said, *made.remarks)) if said else made

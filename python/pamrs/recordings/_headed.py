@@ -13,16 +13,16 @@ from typing import Final
 
 import numpy as np
 
-from pamrs.channels import channel_of
-from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.channels import CHANNELS, channel_of
+from pamrs.errors import RecordingError, joined
 from pamrs.recordings._clock import Array
-from pamrs.recordings._gauge import made_gauge
-from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS, Issue, Recording
+from pamrs.recordings._doubts import made_gauge, unit_trouble
+from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings._several_clocks import recording_of, sampled
 from pamrs.recordings._stamps import Ticks, ticks
 from pamrs.recordings.logs import read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, thousands_of
-from pamrs.units import measured_from, parse_unit, to_si
+from pamrs.units import measured_from, parse_unit
 
 __all__ = ["load_recording"]
 
@@ -178,18 +178,17 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
                 f"unknown column {heading!r}; {hint} (columns = {{{heading!r} = ''}} leaves it out)"
             )
             continue
-        expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
         unit = match["unit"]
         if unit is None or not unit.strip():
             problems.append(
-                f"column {heading!r} has no unit: write '{name} [{expected[0]}]', with the unit "
-                "its values are in"
+                f"column {heading!r} has no unit: write '{name} [{CHANNELS[channel].unit}]', with "
+                "the unit its values are in"
             )
         elif name in wanted:
             problems.append(f"column {heading!r}: the channel {name!r} is there twice")
         else:
             alone, kind = measured_from(unit.strip())
-            trouble = _unit_trouble(alone, expected)
+            trouble = unit_trouble(channel, alone)
             if trouble:
                 problems.append(f"column {heading!r}: {trouble}")
             wanted[name] = (index, alone, kind == "absolute")
@@ -198,18 +197,6 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
     if problems:
         raise RecordingError(joined(source, problems))
     return wanted
-
-
-def _unit_trouble(unit: str, expected: Sequence[str]) -> str | None:
-    trouble = None
-    for si_unit in expected:
-        try:
-            to_si(1.0, unit.strip(), si_unit)
-        except ParameterError as error:
-            trouble = trouble or str(error)
-        else:
-            return None
-    return trouble
 
 
 def _si_columns(

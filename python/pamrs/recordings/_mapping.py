@@ -11,9 +11,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of
+from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import ParameterError, RecordingError, joined
-from pamrs.recordings._recording import CHANNELS, REFERENCE_UNITS
+from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings.calibration import KEYS, Calibration, is_finite, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
 
@@ -158,7 +158,8 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
         problems.append(f"{label}.assumed = {assumed!r} is not allowed: a text says why")
         return None
     unit, kind = measured_from(entry["unit"])
-    _check_unit(problems, label, channel, unit)
+    if trouble := unit_trouble(channel, unit):
+        problems.append(f"{label}.unit: {trouble}")
     absolute = kind == "absolute"
     if constant:
         value = entry["value"]
@@ -181,18 +182,6 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
         hold=hold is True,
         assumed=assumed,
     )
-
-
-def _check_unit(problems: list[str], label: str, channel: str, unit: str) -> None:
-    expected = REFERENCE_UNITS if channel == "reference" else (CHANNELS[channel].unit,)
-    troubles: list[str] = []
-    for si_unit in expected:
-        try:
-            to_si(1.0, unit, si_unit)
-        except ParameterError as error:
-            troubles.append(str(error))
-    if len(troubles) == len(expected):
-        problems.append(f"{label}.unit: {troubles[0]}")
 
 
 def read_clock(time: Any, source: str) -> Clock:

@@ -9,97 +9,45 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.channels import channel_of, dotted
-from pamrs.recordings._recording import CHANNELS
-from pamrs.recordings._suspicion import (
-    AMBIENT,
-    PRESSURE_UNITS,
-    PRESSURES,
-    ambient_of,
-    limits_of,
-    top_of,
+from pamrs.channels import (
+    CHANNELS,
+    COMMANDED,
+    MEASURED,
+    Channel,
+    channel_of,
+    dotted,
+    with_trait,
 )
+from pamrs.recordings._doubts import PRESSURES, ambient_of, assumed_unit, subtracted
 from pamrs.recordings.logs import Series, Written, understood_unit
 from pamrs.rig import Rig
-from pamrs.units import bar_and_psi, parse_unit, same_dimension
+from pamrs.units import parse_unit, same_dimension
 
 __all__ = ["Match", "Open", "channels_of", "matched", "words_of"]
 
-_SET: Final = (
-    "set soll sollwert setpoint sp ref reference des desired cmd command commanded target demand "
-    "vorgabe"
-)
-_READ: Final = "act actual ist istwert meas measured mess messwert fb feedback sensor gauge"
 #: What says that a series was commanded, and what, that it was measured.
-_COMMANDED: Final = frozenset(_SET.split())
-_MEASURED: Final = frozenset(_READ.split())
-_PRESSURE: Final = "pressure druck p press air luft"
-_OUTSIDE: Final = "ambient umgebung room raum"
-#: Words of names, strong ones and weak ones. A strong word alone is enough.
-_WORDS: Final[dict[str, tuple[frozenset[str], frozenset[str]]]] = {
-    channel: (frozenset(strong.split()), frozenset(weak.split()))
-    for channel, strong, weak in (
-        ("valve_command", "valve ventil servo spool uvalve", f"u ao voltage volt input {_SET}"),
-        ("supply_command", "setpoint regulator regler psoll pset", f"supply {_SET}"),
-        (
-            "supply_pressure",
-            "supply tank reservoir source versorgung psup ps psupply ptank vorrat speise kessel "
-            "behälter behaelter regulator regler",
-            _PRESSURE,
-        ),
-        ("line_pressure", "line hose tube leitung schlauch pline", _PRESSURE),
-        (
-            "muscle_pressure",
-            "muscle pam mckibben muskel chamber kammer pm p1 pmuscle",
-            f"{_PRESSURE} actuator bladder tank",
-        ),
-        ("joint_angle", "angle winkel theta phi encoder enc", "joint position pos q elbow knee"),
-        ("length", "length laenge länge stroke displacement weg lvdt disp", "x position pos laser"),
-        ("force", "force kraft loadcell", "load cell f fz"),
-        ("joint_torque", "torque moment drehmoment", "m mz joint"),
-        (
-            "temperature",
-            "temperature temp temperatur thermo tc tgas tair ttank tchamber",
-            "gas chamber kammer tank tgas tair ttank tchamber",
-        ),
-        (
-            "ambient_temperature",
-            f"{_OUTSIDE} umgebungstemperatur raumtemperatur tamb troom",
-            "temperature temp temperatur thermo tc umgebungstemperatur raumtemperatur tamb troom",
-        ),
-        (
-            "ambient_pressure",
-            f"{_OUTSIDE} atmospheric atmosphere barometric barometer baro luftdruck pamb patm",
-            f"{_PRESSURE} barometer baro luftdruck pamb patm",
-        ),
-        ("reference", "reference ref desired target sollwert", "soll wanted"),
-    )
-}
+_COMMANDED: Final = frozenset(COMMANDED.split())
+_MEASURED: Final = frozenset(MEASURED.split())
 #: Channels that a diagnosis sets the rig by, or that stand in a gas: no weak word, and no unit,
 #: names them alone.
-_ONLY_NAMED: Final = frozenset({"ambient_temperature", "ambient_pressure", "temperature"})
+_ONLY_NAMED: Final = frozenset(with_trait("named"))
 #: Pressures that a rig can do without: "pressure" alone is none of them.
-_ONLY_STRONG: Final = frozenset({"supply_pressure", "line_pressure"})
+_ONLY_STRONG: Final = frozenset(with_trait("strong"))
 #: What nearly every diagnosis takes: of two channels that are as likely, one of these.
-_NEEDED: Final = frozenset(
-    ("muscle_pressure", "valve_command", "supply_command", "joint_angle", "length", "force")
-)
-_COMMANDS: Final = frozenset({"valve_command", "supply_command", "pressure_command", "reference"})
+_NEEDED: Final = frozenset(with_trait("needed"))
+_COMMANDS: Final = frozenset(with_trait("command"))
 #: Words of what no valve and no regulator is commanded in.
 _QUANTITIES: Final = frozenset(
     word
     for channel in ("joint_angle", "length", "force", "joint_torque", "temperature")
-    for word in _WORDS[channel][0]
+    for word in CHANNELS[channel].strong
 )
-#: Channels of files that are played, which no log has.
-_PLAYED: Final = frozenset({"pressure_command"})
+_PLAYED: Final = with_trait("played")
 _NOT: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error", "variance", "covariance")
 )
 _STRONG: Final = 3.0  # what a strong word counts
-_VOLTS: Final = 30.0  # no valve is commanded with more
-_NEWTONS: Final = 5e4  # no muscle pulls more
 
 
 @dataclass(frozen=True, eq=False)
@@ -198,7 +146,7 @@ def _joined(word: str) -> tuple[str, ...]:
 
 _LONG: Final = frozenset(
     word
-    for words in (*(strong | weak for strong, weak in _WORDS.values()), _MEASURED)
+    for words in (*(row.strong | row.weak for row in CHANNELS.values()), _MEASURED)
     for word in words
     if len(word) > 2
 )
@@ -220,24 +168,20 @@ def channels_of(rig: Rig | None) -> list[str]:
     """
     if rig is None:
         return [name for name in CHANNELS if name != "time" and name not in _PLAYED]
-    kinds = (
-        ("valve", "valve_command"),
-        ("supply", "supply_pressure"),
-        ("chamber", "muscle_pressure"),
-        ("joint", "joint_angle"),
-        ("load", "length"),
-        ("load", "force"),
-        ("joint", "joint_torque"),
-    )
-    found = [dotted(channel, name) for block, channel in kinds for name in rig.tables(block)]
-    for name, table in rig.tables("supply").items():
-        if table["kind"] == "regulator":
-            found.append(dotted("supply_command", name))
-    # only an inlet that valves feed has a pressure of its own
-    found += [dotted("line_pressure", n) for n, t in rig.ports("line").items() if not t["from"]]
-    warm = [name for name, t in rig.tables("chamber").items() if t["gas"] == "energy_balance"]
-    outside = ["ambient_temperature", "ambient_pressure"]
-    return [*found, *(dotted("temperature", name) for name in warm), *outside]
+    return [
+        dotted(name, block)
+        for name, row in CHANNELS.items()
+        for block in ([""] if row.has("surroundings") else _blocks(row, rig))
+    ]
+
+
+def _blocks(row: Channel, rig: Rig) -> list[str]:
+    """Names of the blocks of a rig that have a channel."""
+    if row.name == "line_pressure":  # only an inlet that valves feed has a pressure of its own
+        return [name for name, table in rig.ports("line").items() if not table["from"]]
+    key, value = row.only or ("", "")
+    tables = rig.tables(row.block) if row.block else {}
+    return [name for name, table in tables.items() if not key or table[key] == value]
 
 
 def matched(
@@ -333,7 +277,7 @@ def _match(name: str, series: Series, rig: Rig | None, stated: str) -> Match | O
             "a unit, and scale and offset or from and to if it is none"
         )
         return Open(name, series.name, usual, (), text)
-    unit, why = _unit_for(name, series, rig, stated)
+    unit, why = assumed_unit(name, series.values, rig, stated)
     if _AIR & set(words_of(series.name)) and channel in PRESSURES:
         unit, why = "", "ATM in its name may be the unit, or say that it is the air outdoors"
     if not unit:
@@ -355,24 +299,17 @@ def _usual_unit(channel: str) -> str:
 
 
 def _measures(written: Written, channel: str) -> bool:
-    return any(same_dimension(written.unit, unit) for unit in _units(channel))
+    return any(same_dimension(written.unit, unit) for unit in CHANNELS[channel].possible)
 
 
 def _made_gauge(matches: list[Match], rig: Rig | None) -> tuple[list[Match], list[str]]:
     """Absolute pressures with what is subtracted from them, and words that say so."""
-    ambient, whose = AMBIENT, "the standard atmosphere"
-    if rig is not None:
-        ambient, whose = ambient_of(rig), "the ambient pressure of the rig file"
-    for match in matches:
-        if match.channel == "ambient_pressure" and np.isfinite(match.si()).any():
-            ambient, whose = float(np.nanmedian(match.si())), match.series.name
+    recorded = next((each.si() for each in matches if each.channel == "ambient_pressure"), None)
+    ambient, said = subtracted(recorded, None if rig is None else ambient_of(rig))
     found, remarks = [], []
     for match in matches:
         if match.absolute and match.channel != "ambient_pressure":
-            remarks.append(
-                f"{match.series.name} is an absolute pressure: {whose}, {bar_and_psi(ambient)}, is "
-                "subtracted"
-            )
+            remarks.append(f"{match.series.name} is an absolute pressure: {said}")
             match = replace(match, subtracted=ambient)
         found.append(match)
     return found, remarks
@@ -417,23 +354,26 @@ def _score(series: Series, name: str, several: bool) -> float:
 
 def _like_weather(values: np.ndarray[Any, np.dtype[np.float64]], written: Written) -> bool:
     """Whether pressures are those of air outdoors, and not measured from them."""
-    low, high = CHANNELS["ambient_pressure"][1:]
-    return low < float(np.median(values)) * parse_unit(written.unit).scale < high
+    row = CHANNELS["ambient_pressure"]
+    pressure = float(np.median(values)) * parse_unit(written.unit).scale
+    return row.lower < pressure < row.upper
 
 
 def _called(series: Series, channel: str, words: set[str]) -> float:
     """How well the name of a series fits a channel; 0 where it does not."""
     if _NOT & words:
         return 0.0
-    strong, weak = _WORDS[channel]
+    strong, weak = CHANNELS[channel].strong, CHANNELS[channel].weak
     role = _role(series)
     if role and (role in _COMMANDED) != (channel in _COMMANDS):
         return 0.0
     named = channel in "_".join(words_of(series.name))
     score = _STRONG * len(strong & words) + 1.0 * len(weak & words)
-    if channel in PRESSURES and _WORDS["ambient_pressure"][0] & words:
+    if channel in PRESSURES and CHANNELS["ambient_pressure"].strong & words:
         return 0.0
-    others = _QUANTITIES | (frozenset(_PRESSURE.split()) if channel == "valve_command" else set())
+    others = _QUANTITIES | (
+        CHANNELS["supply_pressure"].weak if channel == "valve_command" else set()
+    )
     if channel in ("valve_command", "supply_command") and others & words and not strong & words:
         return 0.0
     if channel in _ONLY_STRONG and not (strong & words or named):
@@ -443,7 +383,9 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
     if channel in _ONLY_NAMED:
         # where it is says more than what it is
         place, what = (weak, strong) if channel == "temperature" else (strong, weak)
-        elsewhere = _WORDS["ambient_temperature"][0] | _WORDS["supply_pressure"][0] - {"tank"}
+        elsewhere = CHANNELS["ambient_temperature"].strong | CHANNELS["supply_pressure"].strong - {
+            "tank"
+        }
         if channel == "temperature" and elsewhere & words:
             return 0.0
         written = understood_unit(series.unit)
@@ -452,10 +394,6 @@ def _called(series: Series, channel: str, words: set[str]) -> float:
             return 0.0
         score += 2.0 if strong & words else 0.0
     return score + (2.0 if named else 0.0)
-
-
-def _units(channel: str) -> tuple[str, ...]:
-    return ("rad", "Pa") if channel == "reference" else (CHANNELS[channel].unit,)
 
 
 def _lonely(
@@ -492,82 +430,4 @@ def _named_otherwise(series: Series, channel: str) -> bool:
         return True
     if channel in _COMMANDS and {"pressure", "druck"} & words and not role:
         return True
-    return any(strong & words for other, (strong, _) in _WORDS.items() if other != channel)
-
-
-def _unit_for(name: str, series: Series, rig: Rig | None, stated: str) -> tuple[str, str]:
-    """A unit for a series without one, by the range of its values.
-
-    Parameters
-    ----------
-    name : str
-        The channel that it likely is.
-    series : Series
-        Its numbers.
-    rig : Rig or None
-        What the rig says of pressures, angles and lengths.
-    stated : str
-        The unit of the other pressures of the log; empty where it says none.
-
-    Returns
-    -------
-    unit : str
-        Empty where the numbers fit none.
-    why : str
-    """
-    channel = channel_of(name)
-    good = series.values[np.isfinite(series.values)]
-    low, high = (float(good.min()), float(good.max())) if good.size else (0.0, 0.0)
-    numbers = f"its numbers are {low:.4g} to {high:.4g}"
-    if CHANNELS[channel].unit == "Pa":
-        return _pressure_unit(channel, top_of(series.values), rig, stated, numbers)
-    limits = limits_of(rig, name)
-    choices = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
-    if choices and limits:
-        slack = 0.25 * (limits[1] - limits[0])
-        for unit in choices:
-            scale = parse_unit(unit).scale
-            if limits[0] - slack <= low * scale and high * scale <= limits[1] + slack:
-                return unit, f"{numbers}, which in {unit} lies where the rig file allows it"
-    most = max(abs(low), abs(high))
-    if channel == "joint_angle":
-        return ("rad" if most <= 6.3 else "deg"), numbers
-    if channel == "length":
-        return ("m" if most <= 3.0 else "mm"), numbers
-    if channel in ("temperature", "ambient_temperature"):
-        return ("K" if low > 200.0 else "degC"), numbers
-    usual = CHANNELS[channel].unit.replace("N m", "Nm")
-    if most > (_VOLTS if usual == "V" else _NEWTONS):
-        return "", f"{numbers}, too large for {usual}"
-    return usual, f"{numbers}, and {usual} is what it is usually logged in"
-
-
-def _pressure_unit(
-    channel: str, top: float, rig: Rig | None, stated: str, numbers: str
-) -> tuple[str, str]:
-    """The unit in which the largest value is what the supply has or less; a muscle may hardly have
-    been filled, which is thought of in bar alone.
-    """
-    rated = (
-        [float(table["initial_pressure"]) for table in rig.tables("supply").values()] if rig else []
-    )
-    reference = max([*rated, 0.0]) or 8e5
-    least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
-    if channel == "ambient_pressure":
-        reference, least, most = AMBIENT, 0.5, 1.15
-
-    def fits(unit: str) -> bool:
-        share = top * parse_unit(unit).scale / reference
-        hardly = unit == "bar" and channel not in ("supply_pressure", "ambient_pressure")
-        return (least <= share or hardly) and share <= most
-
-    if stated and fits(stated):
-        return stated, f"{numbers}, and another pressure of the log is in {stated}"
-    fitting = [unit for unit in PRESSURE_UNITS if fits(unit)]
-    if not fitting:
-        return (
-            "",
-            f"{numbers}, which is no likely pressure here in any of {', '.join(PRESSURE_UNITS)}",
-        )
-    others = f"; {' or '.join(fitting[1:])} would fit, too" if fitting[1:] else ""
-    return fitting[0], numbers + others
+    return any(row.strong & words for other, row in CHANNELS.items() if other != channel)

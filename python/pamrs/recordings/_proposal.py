@@ -13,16 +13,16 @@ import numpy as np
 
 from pamrs._checks import positive
 from pamrs._files import resolved, shown
-from pamrs.channels import channel_of
+from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Array, usual_interval
+from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._from_log import Clocks
 from pamrs.recordings._mapping import Clock
 from pamrs.recordings._matching import Match, Open, channels_of, matched, words_of
 from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
 from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
-from pamrs.recordings._suspicion import suspicions
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
@@ -344,29 +344,12 @@ def _unit(match: Match) -> str:
     return "rad" if same_dimension(match.unit, "rad") else ""
 
 
-_SENSORS: Final = {
-    "valve_command": "voltage of the valve",
-    "supply_command": "set pressure of the regulator",
-    "supply_pressure": "pressure in the tank or behind the regulator",
-    "line_pressure": "pressure between valve and hose",
-    "muscle_pressure": "pressure in the muscle or its chamber",
-    "temperature": "temperature of the gas in the muscle or its chamber",
-    "joint_angle": "angle of the joint",
-    "length": "length of the muscle",
-    "force": "pull of the muscles, by a load cell",
-    "joint_torque": "torque of the muscles at the joint, by a torque sensor",
-}
-"""What is measured on each channel that a rig can have."""
-_EXTRA: Final = ("line_pressure", "temperature", "force", "joint_torque")
-"""Channels that few stands have, and that only tell one block from the next; but for a frame."""
-
-
 def _spoken(channel: str, rig: Rig) -> str:
     """A channel, what it measures, and whether a case can do without it."""
-    kind = channel_of(channel)
+    kind = CHANNELS[channel_of(channel)]
     frames = [t for t in rig.tables("load").values() if t.get("kind", "mass") == "frame"]
-    extra = kind in _EXTRA and not (kind == "force" and frames)
-    return f"{channel} ({_SENSORS[kind]}{'; not needed, tells blocks apart' * extra})"
+    extra = kind.has("extra") and not (kind.name == "force" and frames)
+    return f"{channel} ({kind.sensor}{'; not needed, tells blocks apart' * extra})"
 
 
 def _like_a_clock(series: Series) -> bool:

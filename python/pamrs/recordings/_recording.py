@@ -7,22 +7,21 @@ silently.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
-from pamrs.channels import UNITS, channel_of
+from pamrs.channels import CHANNELS, channel_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import Grid, lay_grid
+from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._faults import Fault, find_faults
-from pamrs.recordings._suspicion import suspicions
 from pamrs.rig import full_name, named_entries
 
 if TYPE_CHECKING:
@@ -31,8 +30,6 @@ if TYPE_CHECKING:
     from pamrs.rig import Rig
 
 __all__ = [
-    "CHANNELS",
-    "REFERENCE_UNITS",
     "Issue",
     "Recording",
     "assemble",
@@ -43,37 +40,6 @@ Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
-class _Channel(NamedTuple):
-    unit: str
-    lower: float
-    upper: float
-
-
-#: Canonical channels: SI unit and the range of the possible (SI; pressures gauge, but for the
-#: ambient one). Where a rig has several blocks of a kind, the name of the block stands behind a
-#: dot: ``muscle_pressure.flexor``.
-CHANNELS: Final[dict[str, _Channel]] = {
-    name: _Channel(UNITS[name], lower, upper)
-    for name, lower, upper in (
-        ("time", -math.inf, math.inf),
-        ("valve_command", -1000.0, 1000.0),
-        ("supply_command", -1.3e5, 1e8),
-        ("pressure_command", -1.3e5, 1e8),
-        ("supply_pressure", -1.3e5, 1e8),
-        ("line_pressure", -1.3e5, 1e8),
-        ("muscle_pressure", -1.3e5, 1e8),
-        ("joint_angle", -100.0, 100.0),
-        ("length", -100.0, 100.0),
-        ("force", -1e7, 1e7),
-        ("joint_torque", -1e7, 1e7),
-        ("temperature", 50.0, 2000.0),
-        ("ambient_temperature", 50.0, 2000.0),
-        ("ambient_pressure", 2e4, 1.2e5),
-        ("reference", -1e9, 1e9),
-    )
-}
-# a reference may be one of an angle or of a pressure
-REFERENCE_UNITS: Final = ("rad", "Pa")
 _FEW: Final = 20
 
 

@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, with_trait
 from pamrs.errors import RecordingError
 from pamrs.recordings._clock import (
     GAP,
@@ -21,7 +21,6 @@ from pamrs.recordings._clock import (
     gaps,
     usual_interval,
 )
-from pamrs.recordings._faults import COMMANDS
 from pamrs.recordings._recording import Issue, Recording, assemble, judged
 from pamrs.recordings._stamps import Rows, Ticks, filled_rows, spread, unwound
 
@@ -29,7 +28,8 @@ __all__ = ["SLOW", "UNTOLD", "Sampled", "on_one_clock", "recording_of", "sampled
 
 _UNEVEN: Final = 0.02  # steps of the grid that the middle of what is averaged may lie aside
 #: A diagnosis can do without them: they need not last as long as the others.
-SLOW: Final = frozenset({"temperature", "ambient_temperature", "ambient_pressure"})
+SLOW: Final = frozenset(with_trait("slow"))
+COMMANDS: Final = frozenset(with_trait("command"))
 #: What does not say how fine the grid is: commands, which hold, keep their sum on any grid.
 UNTOLD: Final = SLOW | COMMANDS
 _FINEST: Final = 1000  # samples of the grid for each one that was recorded, at most

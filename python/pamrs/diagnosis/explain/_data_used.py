@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from pamrs import _core
-from pamrs.channels import channel_of
+from pamrs.channels import CHANNELS, channel_of
 from pamrs.diagnosis.prepare import (
     AMBIENT,
     AMBIENT_PRESSURE,
@@ -22,17 +22,6 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
 __all__ = ["data_used"]
-
-_BELONGS = {
-    "supply_pressure": "supply",
-    "supply_command": "supply",
-    "line_pressure": "line",
-    "valve_command": "valve",
-    "joint_angle": "joint",
-    "length": "load",
-}
-"""Block of a rig that a channel is of."""
-
 
 _WITHOUT_ENERGY = (
     'the gas of {chamber} has no temperature of its own: write gas = "energy_balance" and '
@@ -116,10 +105,11 @@ def _why(name: str, rig: Rig, core: _core.Rig, unjudged: Sequence[Unjudged]) -> 
     if kind == "temperature" and name in core.channels and block not in thermometers_of(rig):
         why = _WITH_ANOTHER if block in warm_chambers(rig) else _WITHOUT_ENERGY
         return why.format(chamber=qualified("chamber", block))
-    table = _BELONGS.get(channel_of(name), "")
+    table = CHANNELS[channel_of(name)].block
     if name in core.channels or name in core.inputs:
         names = ", ".join(block.name for block in unjudged)
         return "no block that is judged needs it" + f"; not judged: {names}" * bool(names)
-    if table and (not rig.model.get(table) or block):
+    there = rig.tables(table) if table else {}
+    if table and (not rig.model.get(table) or (block and block not in there)):
         return f"the rig has no block [{table}{'.' + block if block else ''}]"
     return f"no block of the model has a {kind.replace('_', ' ')} to compare it with"

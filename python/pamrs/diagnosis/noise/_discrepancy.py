@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, with_trait
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
 
@@ -32,7 +32,7 @@ _FACTORS = ("muscle", "transmission", "joint")
 _SUMMANDS = ("arm", "link", "load")
 """Blocks whose share of error stands beside the muscles' pull."""
 _MOTION = ("joint_angle", "length")
-_COMMANDS = ("valve_command", "supply_command")
+_COMMANDS = with_trait("driven")
 
 
 def visited(block: Block, recordings: list[Prepared]) -> Ranges:

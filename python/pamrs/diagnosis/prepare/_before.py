@@ -7,7 +7,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, with_trait
 from pamrs.diagnosis.prepare._signals import Prepared
 
 __all__ = ["Before"]
@@ -18,7 +18,7 @@ _MOST_MOVED = 2e4
 
 Array = NDArray[np.float64]
 
-_PRESSURES: Final = ("muscle_pressure", "supply_pressure", "line_pressure")
+_PRESSURES: Final = with_trait("pressure")
 
 
 class Before(NamedTuple):

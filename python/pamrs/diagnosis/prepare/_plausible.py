@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs._stretches import stretches
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -87,7 +87,7 @@ _SENSE_RIGHT = 0.4
 
 Array = NDArray[np.float64]
 
-_PRESSURES = ("supply_pressure", "line_pressure", "muscle_pressure")
+_PRESSURES = with_trait("pressure")
 _DEGREES = 180.0 / math.pi  # of a radian
 _TOLD = 12
 """Findings that a message lists."""

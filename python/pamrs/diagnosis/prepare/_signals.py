@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import info_of
 from pamrs.errors import DiagnosisError
@@ -72,7 +72,7 @@ _TERMS = 4
 
 DRIVES = ("supply_pressure", "line_pressure", "muscle_pressure", "joint_angle", "length")
 """Channels at which a rig is cut; of a block with a name its name stands behind it."""
-COMMANDS = ("valve_command", "supply_command")
+COMMANDS = with_trait("driven")
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,25 +1,41 @@
-"""Units that the physics contradicts: what a log says, what it is likelier to mean, and why."""
+"""Doubts of units: those that no channel can have, that physics contradicts or that a log does not
+say, and pressures that are measured from another zero.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Final
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import CHANNELS, channel_of, dotted, with_trait
+from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.units import from_si, parse_unit
+from pamrs.units import bar_and_psi, from_si, parse_unit, to_si
 
-__all__ = ["AMBIENT", "Suspicion", "ambient_of", "limits_of", "suspicions", "top_of"]
+if TYPE_CHECKING:
+    from pamrs.recordings._recording import Recording
+
+__all__ = [
+    "PRESSURES",
+    "Suspicion",
+    "ambient_of",
+    "assumed_unit",
+    "limits_of",
+    "made_gauge",
+    "subtracted",
+    "suspicions",
+    "unit_trouble",
+]
 
 Array = NDArray[np.float64]
 
 AMBIENT: Final = 101325.0
-PRESSURES: Final = ("supply_pressure", "line_pressure", "muscle_pressure")
-PRESSURE_UNITS: Final = ("bar", "psi", "kPa", "MPa", "mbar", "Pa")
+PRESSURES: Final = with_trait("pressure")
+_UNITS: Final = ("bar", "psi", "kPa", "MPa", "mbar", "Pa")
 _TOP: Final = 0.995  # quantile that stands for the largest value, spikes left out
 _LOW: Final = 0.005
 _HIGHEST: Final = 25e5  # no pneumatic muscle or its supply goes higher, without a rig to ask [Pa]
@@ -29,6 +45,9 @@ _CONNECTED: Final = 0.2  # of what the rig file says, from which a supply's gaug
 _REST: Final = 0.02  # share of the samples that rest at the lowest level
 _STAYS: Final = 0.8  # of the samples near it that are there: a curve that passes has fewer
 _NEAR: Final = 0.06  # of the ambient pressure, beside which a level counts as ambient
+_AMBIENT_OFF: Final = 0.02  # of the stated ambient pressure; a gauge and weather do less
+_VOLTS: Final = 30.0  # no valve is commanded with more
+_NEWTONS: Final = 5e4  # no muscle pulls more
 _SLACK: Final = 0.25  # of an allowed range, which may be left at its ends
 
 
@@ -53,7 +72,7 @@ class Suspicion:
     text: str
 
 
-def top_of(values: Array) -> float:
+def _top_of(values: Array) -> float:
     """The largest value without spikes; 0 where there is none."""
     good = values[np.isfinite(values)]
     return float(np.quantile(good, _TOP)) if good.size else 0.0
@@ -136,6 +155,31 @@ def _other(values: Array | float, said: str, other: str) -> Array | float:
     return (values - one.offset) / one.scale * two.scale + two.offset
 
 
+def unit_trouble(channel: str, unit: str) -> str:
+    """Why a channel cannot be in a unit; empty where it can.
+
+    Parameters
+    ----------
+    channel : str
+        Its name, without that of a block.
+    unit : str
+        Any text.
+
+    Returns
+    -------
+    str
+    """
+    troubles = []
+    for si_unit in CHANNELS[channel].possible:
+        try:
+            to_si(1.0, unit, si_unit)
+        except ParameterError as error:
+            troubles.append(str(error))
+        else:
+            return ""
+    return troubles[0]
+
+
 # ---------------------------------------------------------------------- pressures
 
 
@@ -165,7 +209,7 @@ def _recorded_supply(
     for name, values in channels.items():
         if channel_of(name) != "supply_pressure":
             continue
-        tops.append(top_of(values))
+        tops.append(_top_of(values))
         unit = said.get(name, "")
         for wrong in _pressure(name, unit, channels, said, rig) if unit else ():
             tops[-1] = float(_other(tops[-1], unit, wrong.likely))
@@ -182,7 +226,7 @@ def _rated(name: str, channels: Mapping[str, Array], rig: Rig | None) -> tuple[f
         if table["kind"] != "regulator":
             rated.append((float(table["initial_pressure"]), "the supply of the rig file"))
         elif command is not None:
-            rated.append((top_of(command), "the largest command of the regulator"))
+            rated.append((_top_of(command), "the largest command of the regulator"))
     return max(rated) if rated and max(rated)[0] > 0.0 else None
 
 
@@ -194,7 +238,7 @@ def _pressure(
     rig: Rig | None,
 ) -> Iterator[Suspicion]:
     values = channels[name]
-    top = top_of(values)
+    top = _top_of(values)
     beside = _fed_by(name, channels, said, rig)
     supply = channel_of(name) == "supply_pressure"
     reference, what = beside or (_HIGHEST, "what pneumatic muscles take")
@@ -232,14 +276,14 @@ def _agrees(
         if other == name or not own or channel_of(other) not in (*PRESSURES, "supply_command"):
             continue
         same = abs(parse_unit(own).scale / parse_unit(unit).scale - 1.0) < 1e-9
-        if not same and top / _OVER < top_of(values) < top * _OVER:
+        if not same and top / _OVER < _top_of(values) < top * _OVER:
             return True
     return False
 
 
 def _fitting(top: float, unit: str, reference: float, least: float, most: float) -> str:
     """The unit of pressure with which the largest value fits; the first one, for there are few."""
-    for other in PRESSURE_UNITS:
+    for other in _UNITS:
         scale = parse_unit(other).scale
         if abs(scale / parse_unit(unit).scale - 1.0) < 1e-9:
             continue
@@ -254,7 +298,7 @@ def _absolute(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[
     if good.size < 20:
         return
     ambient = AMBIENT if rig is None else ambient_of(rig)
-    low, span = _bottom(good), top_of(good) - _bottom(good)
+    low, span = _bottom(good), _top_of(good) - _bottom(good)
     near = 0.02 * max(span, 0.0) + 500.0
     rests, about = (float(np.mean(good <= low + width * near)) for width in (1.0, 2.0))
     if rests < max(_REST, _STAYS * about) or span < 0.2 * ambient:
@@ -310,7 +354,7 @@ def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Sus
     given = limits_of(rig, name)
     low, high = given or ((-2.0 * np.pi, 2.0 * np.pi) if angle else (1e-3, 10.0))
     slack = _SLACK * (high - low) if given else 0.0
-    bottom, top = _bottom(values), top_of(values)
+    bottom, top = _bottom(values), _top_of(values)
 
     def fits(first: float, last: float) -> bool:
         return low - slack <= first and last <= high + slack
@@ -335,3 +379,146 @@ def _range(name: str, unit: str, values: Array, rig: Rig | None) -> Iterator[Sus
                 f"read as {other} it goes from {then}",
             )
             return
+
+
+# ------------------------------------------------------------- without a unit, absolute
+
+
+def assumed_unit(name: str, values: Array, rig: Rig | None, stated: str) -> tuple[str, str]:
+    """A unit for a channel without one, by the range of its values.
+
+    Parameters
+    ----------
+    name : str
+        The channel that it likely is.
+    values : (n,) array
+        Its numbers.
+    rig : Rig or None
+        What the rig says of pressures, angles and lengths.
+    stated : str
+        The unit of the other pressures of the log; empty where it says none.
+
+    Returns
+    -------
+    unit : str
+        Empty where the numbers fit none.
+    why : str
+    """
+    channel = channel_of(name)
+    good = values[np.isfinite(values)]
+    low, high = (float(good.min()), float(good.max())) if good.size else (0.0, 0.0)
+    numbers = f"its numbers are {low:.4g} to {high:.4g}"
+    if CHANNELS[channel].unit == "Pa":
+        return _pressure_unit(channel, _top_of(values), rig, stated, numbers)
+    limits = limits_of(rig, name)
+    choices = {"joint_angle": ("rad", "deg"), "length": ("m", "mm")}.get(channel)
+    if choices and limits:
+        slack = 0.25 * (limits[1] - limits[0])
+        for unit in choices:
+            scale = parse_unit(unit).scale
+            if limits[0] - slack <= low * scale and high * scale <= limits[1] + slack:
+                return unit, f"{numbers}, which in {unit} lies where the rig file allows it"
+    most = max(abs(low), abs(high))
+    if channel == "joint_angle":
+        return ("rad" if most <= 6.3 else "deg"), numbers
+    if channel == "length":
+        return ("m" if most <= 3.0 else "mm"), numbers
+    if channel in ("temperature", "ambient_temperature"):
+        return ("K" if low > 200.0 else "degC"), numbers
+    usual = CHANNELS[channel].unit.replace("N m", "Nm")
+    if most > (_VOLTS if usual == "V" else _NEWTONS):
+        return "", f"{numbers}, too large for {usual}"
+    return usual, f"{numbers}, and {usual} is what it is usually logged in"
+
+
+def _pressure_unit(
+    channel: str, top: float, rig: Rig | None, stated: str, numbers: str
+) -> tuple[str, str]:
+    """The unit in which the largest value is what the supply has or less; a muscle may hardly have
+    been filled, which is thought of in bar alone.
+    """
+    rated = (
+        [float(table["initial_pressure"]) for table in rig.tables("supply").values()] if rig else []
+    )
+    reference = max([*rated, 0.0]) or 8e5
+    least, most = (0.6, 1.5) if channel == "supply_pressure" else (0.03, 1.1)
+    if channel == "ambient_pressure":
+        reference, least, most = AMBIENT, 0.5, 1.15
+
+    def fits(unit: str) -> bool:
+        share = top * parse_unit(unit).scale / reference
+        hardly = unit == "bar" and channel not in ("supply_pressure", "ambient_pressure")
+        return (least <= share or hardly) and share <= most
+
+    if stated and fits(stated):
+        return stated, f"{numbers}, and another pressure of the log is in {stated}"
+    fitting = [unit for unit in _UNITS if fits(unit)]
+    if not fitting:
+        return (
+            "",
+            f"{numbers}, which is no likely pressure here in any of {', '.join(_UNITS)}",
+        )
+    others = f"; {' or '.join(fitting[1:])} would fit, too" if fitting[1:] else ""
+    return fitting[0], numbers + others
+
+
+def subtracted(recorded: Array | None, stated: float | None) -> tuple[float, str]:
+    """What makes gauge pressures of absolute ones.
+
+    Parameters
+    ----------
+    recorded : (n,) array or None
+        Recorded ambient pressure [Pa].
+    stated : float or None
+        That of the rig file [Pa].
+
+    Returns
+    -------
+    pressure : float
+        The median of the recorded one, else the stated one, else the standard atmosphere [Pa].
+    said : str
+        Words that say so.
+    """
+    ambient, whose = AMBIENT, "the standard atmosphere, since nothing says another,"
+    if stated is not None:
+        ambient, whose = stated, "the ambient pressure of the rig file,"
+    if recorded is not None and np.isfinite(recorded).any():
+        ambient, whose = float(np.nanmedian(recorded)), "the recorded ambient pressure,"
+        if stated is not None and abs(ambient - stated) > _AMBIENT_OFF * stated:
+            whose += f" where the rig file says {bar_and_psi(stated)},"
+    return ambient, f"{whose} {bar_and_psi(ambient)}, is subtracted"
+
+
+def made_gauge(
+    recording: Recording, absolute: Sequence[str], stated: float | None = None
+) -> Recording:
+    """A recording whose absolute pressures became gauge pressures.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was read.
+    absolute : sequence of str
+        Channels that were recorded as absolute pressures; the ambient pressure stays one.
+    stated : float, optional
+        Ambient pressure where none was recorded [Pa]; by default that of the standard atmosphere.
+
+    Returns
+    -------
+    Recording
+        With the median of the recorded ambient pressure, or else the stated one, subtracted, and
+        a note for each channel that says so.
+    """
+    names = [name for name in absolute if channel_of(name) != "ambient_pressure"]
+    if not names:
+        return recording
+    ambient, said = subtracted(recording.channels.get("ambient_pressure"), stated)
+    note = f"was recorded as an absolute pressure: {said}"
+    channels = {
+        name: values - ambient if name in names else values
+        for name, values in recording.channels.items()
+    }
+    notes = recording.notes | {
+        name: "; ".join([*filter(None, [recording.notes.get(name)]), note]) for name in names
+    }
+    return replace(recording, channels=channels, notes=notes)
