@@ -13,8 +13,8 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, Group, judge
 from pamrs.diagnosis.explain import _words as words
-from pamrs.diagnosis.explain._assemble import _merged, _settled
 from pamrs.diagnosis.fit import Problem, fit, residuals
+from pamrs.diagnosis.model._conclude import _merged, _settled
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import stand_of
 from pamrs.errors import DiagnosisError

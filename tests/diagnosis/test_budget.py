@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.explain._budget import _Shares, _Stage
+from pamrs.diagnosis.model._budget import _Shares, _Stage
 from pamrs.diagnosis.noise import Excess
 
 SETTINGS = DiagnosisSettings()

@@ -14,8 +14,8 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis.evidence import Attempts, Candidate, significant
-from pamrs.diagnosis.explain._owners import owners_of_effects
 from pamrs.diagnosis.fit import Problem, fit, form_in, starts_of
+from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.screen import screen
 from pamrs.diagnosis.search._sets import _STRONG_RATIO, far_above_noise, in_best_forms

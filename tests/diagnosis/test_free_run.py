@@ -14,8 +14,8 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.explain import _free_run
 from pamrs.diagnosis.fit import Events, Problem, residuals
+from pamrs.diagnosis.model import _free_run
 from pamrs.diagnosis.prepare import available_blocks, averaged, begun_alike, prepare
 from pamrs.diagnosis.prove import valid_result
 from pamrs.diagnosis.result import schema

@@ -16,6 +16,7 @@ from pamrs._losses import STRICT, Losses
 from pamrs._normal import solve_normal
 from pamrs.diagnosis.evidence import _candidates
 from pamrs.diagnosis.explain import _assemble
+from pamrs.diagnosis.model import _conclude
 from pamrs.diagnosis.next_experiment import _choice
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _hypotheses
@@ -86,7 +87,9 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
     ("module", "names"),
     [
         (_hypotheses, ("freed", "inclusion", "beside_wrong", "considered")),
-        (_assemble, ("describe", "budget", "free_run", "next_experiment")),
+        (_conclude, ("budget", "free_run")),
+        (pamrs.diagnosis, ("next_experiment",)),
+        (_assemble, ("describe",)),
     ],
 )
 def test_steps_that_fail_cost_themselves(
@@ -174,7 +177,7 @@ def test_parts_of_a_page_that_fail_cost_themselves(monkeypatch: pytest.MonkeyPat
 def test_under_a_test_it_is_raised(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(np.linalg.LinAlgError):
         Losses().part("this", broken)
-    monkeypatch.setattr(_assemble, "budget", broken)
+    monkeypatch.setattr(_conclude, "budget", broken)
     with pytest.raises(np.linalg.LinAlgError):
         pamrs.diagnose(leaking())
 

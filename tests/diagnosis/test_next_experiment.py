@@ -16,7 +16,6 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.explain._next import _pair, _Question, _telling
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import (
     _choice,
@@ -31,6 +30,7 @@ from pamrs.diagnosis.next_experiment import (
     taken,
     usual_noise,
 )
+from pamrs.diagnosis.next_experiment._asked import _pair, _Question, _telling
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import term_of
 from pamrs.errors import DiagnosisError, RigError

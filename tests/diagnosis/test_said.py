@@ -17,10 +17,10 @@ import pamrs
 from pamrs import report
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_aside
-from pamrs.diagnosis.explain import _assemble, _free_run
-from pamrs.diagnosis.explain._free_run import _OFF_NOISES
-from pamrs.diagnosis.explain._next import _telling, next_experiment
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
+from pamrs.diagnosis.model import _conclude, _free_run
+from pamrs.diagnosis.model._free_run import _OFF_NOISES
+from pamrs.diagnosis.next_experiment._asked import _telling, next_experiment
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
 from pamrs.experiments import experiments_of
@@ -287,8 +287,8 @@ def test_a_name_that_spoils_a_channel_is_put_aside() -> None:
     _, own = leak_group(3e-9)
     (judged,) = judge([own], SETTINGS)
     assert judged.named == ("leak_muscle",)
-    assert _assemble._blamed([judged], ["muscle_pressure"]) == {0}
-    assert _assemble._blamed([judged], ["joint_angle"]) == set()  # it acts nowhere there
+    assert _conclude._blamed([judged], ["muscle_pressure"]) == {0}
+    assert _conclude._blamed([judged], ["joint_angle"]) == set()  # it acts nowhere there
     after = put_aside(own, "leak_muscle")
     assert after.probabilities == {"unlisted": 1.0}
     assert [c.key for c in after.candidates] == [""]

@@ -8,6 +8,9 @@ from pathlib import Path
 import grimp
 import pytest
 
+import pamrs.diagnosis.fit
+import pamrs.simulation
+
 ROOT = Path(__file__).parents[2]
 
 #: From the bottom to the top; a package imports only what stands in lines above its own.
@@ -39,8 +42,8 @@ LAYERS = (
     ("cli",),
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
-STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "next_experiment")
-STEPS_OF_A_DIAGNOSIS = (*STEPS, "result", "schema", "explain", "", "prove")
+STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "model")
+STEPS_OF_A_DIAGNOSIS = (*STEPS, "next_experiment", "result", "schema", "explain", "", "prove")
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 
@@ -91,6 +94,38 @@ def test_no_step_of_a_diagnosis_imports_a_later_one():
     assert {name for pair in own for name in pair} == set(STEPS_OF_A_DIAGNOSIS)
     height = {name: index for index, name in enumerate(STEPS_OF_A_DIAGNOSIS)}
     assert not {(a, b) for a, b in own if height[b] > height[a]}
+
+
+#: What fits a model, or runs one: `pamrs.diagnosis.fit` and `pamrs.simulation` have it.
+WORK = {
+    "changes",
+    "fit",
+    "fit_events",
+    "levenberg_marquardt",
+    "look_for_events",
+    "predicted_with_doubt",
+    "replay",
+    "residuals",
+    "simulate",
+    "spread_over_pieces",
+    "stacked",
+}
+
+
+def test_what_explains_a_diagnosis_fits_and_simulates_nothing():
+    """Models are fitted and run by the steps before, which hand over what they found."""
+    package = ROOT / "python" / "pamrs" / "diagnosis" / "explain"
+    taken = {
+        name
+        for path in sorted(package.glob("*.py"))
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in imported(node)
+        if name.startswith("pamrs.")
+    }
+    assert "pamrs.diagnosis.fit.Problem" in taken
+    assert set(pamrs.diagnosis.fit.__all__) | set(pamrs.simulation.__all__) >= WORK
+    assert not [name for name in taken if name.rpartition(".")[2] in WORK]
+    assert not [name for name in taken if name.startswith("pamrs.diagnosis.search.find")]
 
 
 def test_no_modules_import_each_other():

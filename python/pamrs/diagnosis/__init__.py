@@ -9,7 +9,8 @@ other and with "unlisted" on held-out recordings.
 Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
 its own list: `settings` (every number that steers a verdict), `result` and `schema` (what is
 returned), `prove` (many cases, each in a process of its own), and the steps in the order in which
-they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `next_experiment`, `explain`.
+they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `model`, `next_experiment`,
+`explain`.
 """
 
 from __future__ import annotations
@@ -27,6 +28,8 @@ from pamrs.channels import dotted
 from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
+from pamrs.diagnosis.model import conclude
+from pamrs.diagnosis.next_experiment import next_experiment
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -57,11 +60,11 @@ from pamrs.diagnosis.prepare import (
     without_rails,
 )
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.search import examine, misread
+from pamrs.diagnosis.search import examine, misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
-from pamrs.findings import Faulty
+from pamrs.findings import Faulty, NextExperiment
 from pamrs.recordings import Case, Recording, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
@@ -251,7 +254,10 @@ def diagnose(
         part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
         read = part("the search for other units", lambda: misread(inner, case.rig))
         if read is not None:
-            diagnosis = misread_diagnosis(case, inner, outer, read, unjudged)
+            errors = {"fit": reading_errors(case.rig, inner, read), "held_out": {}}
+            if outer is not inner:
+                errors["held_out"] = reading_errors(case.rig, outer, read)
+            diagnosis = misread_diagnosis(case, inner, read, unjudged, errors)
         else:
             laid = part(
                 "the search for offsets of commands", lambda: _on_time(inner, outer, case.rig)
@@ -297,7 +303,22 @@ def _physics(
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
     say("putting the answer together")
     unjudged = [*unjudged, *_lost(every, inner)]
-    diagnosis = assemble(case, inner, outer, groups, unjudged)
+    found = conclude(case.rig, inner, outer, groups)
+    proposal = inner.losses.part(
+        "the next experiment",
+        lambda: next_experiment(
+            found.models.verdict,
+            found.ambiguity,
+            found.hypotheses(inner),
+            case.rig,
+            found.judged,
+            inner,
+            outer,
+            found.off,
+        ),
+        NextExperiment(""),
+    )
+    diagnosis = assemble(case, inner, outer, groups, found, proposal, unjudged)
     if unsettled:
         what = "length" if case.rig.model["load"] else "angle"
         told = (

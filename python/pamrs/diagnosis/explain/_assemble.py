@@ -1,78 +1,57 @@
-"""From fitted hypotheses to a verdict: probabilities, model, traces, words."""
+"""The result of a diagnosis, from what was concluded: findings, traces, words."""
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
     Candidate,
     Group,
     Judged,
-    autocorrelation_of,
-    case_ambiguity,
-    case_probabilities,
-    case_verdict,
-    determined,
-    is_parameter,
-    judge,
-    parts_of,
-    put_aside,
     share_left,
-    start_of,
     stated,
     symptoms_of,
 )
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
-from pamrs.diagnosis.explain._budget import budget
 from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
-from pamrs.diagnosis.explain._free_run import Known, free_run, said_of_constants
-from pamrs.diagnosis.explain._next import next_experiment
-from pamrs.diagnosis.explain._owners import owners_of_effects, owners_of_parameters
-from pamrs.diagnosis.explain._words import spoiled
 from pamrs.diagnosis.fit import (
     CHOSEN,
-    FINAL_STEP_SHARE,
-    LEAST_START,
-    Events,
     Key,
     Problem,
     depends,
     entry_of,
     events_of,
-    fit,
     form_in,
     known_parameters,
-    residuals,
-    with_entry,
-    with_known,
-    without_term,
+)
+from pamrs.diagnosis.model import (
+    Conclusion,
+    Models,
+    owners_of_effects,
+    owners_of_parameters,
+    said_of_constants,
+    with_std,
 )
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual, Unjudged
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.effects import CATALOGUE, id_of, info_of, is_effect, place_of, term_in
-from pamrs.errors import SimulationError
+from pamrs.effects import CATALOGUE, id_of, info_of, is_effect, place_of
 from pamrs.findings import (
-    HEALTHY,
     BlockResidual,
     ChannelError,
     Considered,
     EffectFound,
     EffectParameterFound,
     FitErrors,
-    FreeRun,
     NextExperiment,
     ParameterFound,
     StageError,
@@ -80,7 +59,6 @@ from pamrs.findings import (
     Trace,
     Tried,
     WrongParameter,
-    channels_off,
 )
 from pamrs.recordings import Case
 from pamrs.rig import Rig
@@ -89,8 +67,6 @@ __all__ = ["assemble"]
 
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
-# [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
-_ZERO_DIFFERENCE = 0.1
 # [tolerances] standard deviation below which a parameter counts as determined by the recordings
 _KNOWN_SHARE = 0.7
 
@@ -103,9 +79,11 @@ def assemble(
     fitted: Problem,
     held: Problem,
     groups: list[Group],
+    found: Conclusion,
+    proposal: NextExperiment,
     unjudged: Sequence[Unjudged] = (),
 ) -> Diagnosis:
-    """Build the diagnosis from the groups of blocks.
+    """Build the diagnosis from the groups of blocks and what was concluded of them.
 
     Parameters
     ----------
@@ -115,73 +93,59 @@ def assemble(
         Recordings to fit and held-out ones (the same object when there are no others).
     groups : list of Group
         Gas blocks and arm, examined.
+    found : Conclusion
+        Model, errors, budget and free runs.
+    proposal : NextExperiment
+        What to record next.
     unjudged : sequence of Unjudged
         Blocks of the rig that are not judged.
     """
-    nominal, settings = case.rig, fitted.settings
-    noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
-    models, fit_found, out_found = _sound_models(nominal, fitted, held, groups, noise_level)
-    judged, verdict = models.judged, models.verdict
-    probabilities = case_probabilities(judged)
-    ambiguity = case_ambiguity(judged)
-    located, part = _located(judged), fitted.losses.part
-    picture = _picture(located, nominal, fitted, fit_found, noise_level)
-    fit_table = _table(fitted, fit_found, noise_level)
-    held_table = _table(held, out_found, noise_level) if held is not fitted else {}
-    table = held_table or fit_table
-    errors = {"fit": fit_table, "held_out": held_table}
+    nominal, models, judged = case.rig, found.models, found.judged
+    verdict, noise_level, part = models.verdict, found.noise_level, fitted.losses.part
+    located = _located(judged)
+    picture = _picture(located, nominal, fitted, found.inside, noise_level)
     named = any(j.named or j.wrong for j in judged)
     known = models.chosen if named else models.starts
     owners = models.owners if named else owners_of_parameters(known)
     changed = models.added or any(j.wrong for j in judged)
-    gap = _gap(table, _LEAST_GAP) if changed else None
-    blocks = block_entries(judged, fitted, fit_found, held, out_found, noise_level)
-    budgeted = partial(budget, judged, held, out_found, noise_level, nominal)
-    terms = part("the budget", lambda: budgeted(models.final, models.events), [])
+    gap = _gap(found.table, _LEAST_GAP) if changed else None
+    blocks = block_entries(judged, fitted, found.inside, held, found.outside, noise_level)
     forms = _forms(judged, fitted)
-    stages = [(fitted, fit_found)] if held is fitted else [(held, out_found), (fitted, fit_found)]
-    uncertain = _known(models)
-    running = partial(free_run, held, out_found, nominal, models.final, models.events, uncertain)
-    nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
-    runs, runs_note = part("the free run", running, nothing)
-    off = channels_off(runs or [])
+    stages = [(fitted, found.inside)]
+    if held is not fitted:
+        stages.insert(0, (held, found.outside))
     effects = _effects(judged, verdict, fitted)
-    likely = partial(_hypotheses, judged, probabilities, nominal, fitted)
-    constants = said_of_constants(runs or [], [effect.id for effect in effects])
+    constants = said_of_constants(found.runs or [], [effect.id for effect in effects])
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
         where=words.where(located, fitted, judged, picture),
         effects=effects,
-        ambiguity=ambiguity,
-        probabilities=probabilities,
+        ambiguity=found.ambiguity,
+        probabilities=found.probabilities,
         parameters=_parameters(nominal, known, owners),
-        fit=FitErrors(fit_table, held_table, gap),
-        next_experiment=part(
-            "the next experiment",
-            lambda: next_experiment(
-                verdict, ambiguity, likely(), nominal, judged, fitted, held, list(off)
-            ),
-            NextExperiment(""),
-        ),
-        warnings=constants + _warnings(case, models, table, same=held is fitted),
+        fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
+        next_experiment=proposal,
+        warnings=constants + _warnings(case, models, found.table, same=held is fitted),
         rig=models.final
         if verdict == "none"
-        else _with_std(models.final, nominal, models.chosen, models.owners),
-        traces=_traces(fitted, held, fit_found, out_found),
+        else with_std(models.final, nominal, models.chosen, models.owners),
+        traces=_traces(fitted, held, found.inside, found.outside),
         blocks=[*blocks, *map(not_judged, unjudged)],
-        budget=terms,
-        unexplained=unexplained(judged, blocks, stages, noise_level, terms, forms, nominal, errors),
-        wrong_parameters=_wrong(models, fitted, table),
+        budget=found.budget,
+        unexplained=unexplained(
+            judged, blocks, stages, noise_level, found.budget, forms, nominal, found.errors
+        ),
+        wrong_parameters=_wrong(models, fitted, found.table),
         measured=list(case.channels),
         residuals=_block_table(groups),
         condition_map=picture.map,
         tried=_tried(groups),
         considered=part("what was asked for", lambda: _considered(judged, fitted), []),
         tested=part("the list of what was tested", lambda: _tested(groups), []),
-        free_run=runs,
-        free_run_note=runs_note,
-        settings=settings,
+        free_run=found.runs,
+        free_run_note=found.runs_note,
+        settings=fitted.settings,
     )
     return _worded(diagnosis, case, judged, forms)
 
@@ -203,64 +167,6 @@ def _picture(
         lambda: describe(block, fitted.recordings, nominal, *stages, noise_level),
         Picture(),
     )
-
-
-def _sound_models(
-    nominal: Rig,
-    fitted: Problem,
-    held: Problem,
-    groups: list[Group],
-    noise_level: dict[Key, NoiseLevel],
-) -> tuple[_Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
-    """The rig at every stage with names that spoil no channel, and the residuals of the recordings
-    to fit and of the held-out ones.
-
-    What leads a group and predicts a channel worse than the model without it does is put aside, and
-    the group is judged again without it.
-    """
-    settings = fitted.settings
-    groups = [determined(group, fitted) for group in groups]
-    while True:
-        judged = judge(groups, settings)
-        models = _models(nominal, fitted, judged, case_verdict(judged))
-        inside = models.residuals(fitted)
-        outside = inside if held is fitted else models.residuals(held)
-        problem, found = (fitted, inside) if held is fitted else (held, outside)
-        spoilt = spoiled(_table(problem, found, noise_level))
-        blamed = _blamed(models.judged, spoilt)
-        if not blamed:
-            return models, inside, outside
-        groups = [
-            _without_name(group, models.judged[k]) if k in blamed else group
-            for k, group in enumerate(groups)
-        ]
-
-
-def _without_name(group: Group, judged: Judged) -> Group:
-    """A group without what it adds to the model: its name, or the form of what has none."""
-    if judged.named:
-        return put_aside(group, judged.chosen.key)
-    return replace(group, closure=None)
-
-
-def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
-    """Groups that add to the model what spoils a channel: those that have the channel, else those
-    whose additions act in its block.
-    """
-    added = {k: _additions(j) for k, j in enumerate(judged) if _additions(j)}
-    blamed: set[int] = set()
-    for channel in spoilt:
-        own = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
-        blocks = [b for j in judged for b in j.group.blocks if b.channel == channel]
-        acting = {k for k in added if any(depends(b, n) for b in blocks for n in added[k])}
-        blamed |= own or acting
-    return blamed
-
-
-def _additions(judged: Judged) -> tuple[str, ...]:
-    """Effects that a group adds to the model."""
-    closure = judged.group.closure if judged.verdict == "unlisted" else None
-    return judged.named or (closure.effects if closure is not None else ())
 
 
 def _worded(
@@ -286,102 +192,9 @@ def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class _Models:
-    """The rig at every stage.
-
-    Attributes
-    ----------
-    judged : list of Judged
-        The groups, what they name fitted beside what other groups know better.
-    starts, chosen : list of Candidate
-        The baseline of each group, and what goes into the final model, with standard deviations
-        that hold for equations that are not quite the rig's.
-    owners : dict of str to int
-        Of each parameter the group whose value the final model has.
-    nominal, baseline, final : Rig
-        As the rig file has it, refitted inside its tolerances, and with what was found.
-    verdict : str
-        Of the case.
-    """
-
-    judged: list[Judged]
-    starts: list[Candidate]
-    chosen: list[Candidate]
-    owners: dict[str, int]
-    nominal: Rig
-    baseline: Rig
-    final: Rig
-    verdict: str
-
-    @property
-    def added(self) -> bool:
-        """Whether the model has effects that the nominal one does not hold."""
-        return len(self.final.effects) > len(self.nominal.effects)
-
-    @property
-    def events(self) -> Events | None:
-        """What happened in single recordings."""
-        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
-        return next(happened, None) if self.added else None
-
-    def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
-        """Residuals of some recordings at every stage."""
-        return {
-            "before": _run(problem, self.nominal, None),
-            "refit": _run(problem, self.baseline, None),
-            "after": _run(problem, self.final, self.events),
-        }
-
-
-def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> _Models:
-    """The rig at every stage, from the verdicts of the groups."""
-    begun = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
-    baseline = _merged(nominal, begun)
-    starts = _widened(fitted, judged, begun)
-    if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
-        final = nominal if verdict == "none" else baseline
-        return _Models(
-            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final, verdict
-        )
-    wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
-    ended = _settled(nominal, fitted, judged, wanted)
-    chosen = _widened(fitted, judged, ended)
-    judged = [
-        replace(j, chosen=c) if j.named or j.wrong else j
-        for j, c in zip(judged, chosen, strict=True)
-    ]
-    final = _merged(nominal, ended)
-    owners = owners_of_parameters(ended)
-    return _Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
-
-
-def _known(models: _Models) -> Known:
-    """What is known of the values of the final model: as they were fitted, with what goes together,
-    and of others what the rig file says.
-    """
-    of_file = {n: p for n, p in known_parameters(models.nominal).items() if p.tol > 0}
-    names, values, parts = list[str](), list[float](), list[Array]()
-    for k, candidate in enumerate(models.chosen):
-        found = candidate.fit
-        every = list(found.scales)
-        own = [n for n in every if models.owners.get(n, k) == k and math.isfinite(found.std[n])]
-        at = [every.index(n) for n in own]
-        fitted = np.sqrt(np.maximum(np.diag(found.covariance)[at], 1e-300))
-        wide = np.array([found.std[n] for n in own]) / fitted
-        size, axes = np.linalg.eigh(found.covariance[np.ix_(at, at)] * np.outer(wide, wide))
-        parts.append(axes * np.sqrt(np.maximum(size, 0.0)))
-        names += own
-        values += [found.values[n] for n in own]
-    rest = [n for n in of_file if n not in names and math.isfinite(of_file[n].tol)]
-    parts.append(np.diag([of_file[n].tol for n in rest]))
-    values += [of_file[n].value for n in rest]
-    return Known((*names, *rest), np.array(values), block_diag(*parts))
-
-
 def _warnings(
     case: Case,
-    models: _Models,
+    models: Models,
     table: dict[str, ChannelError],
     *,
     same: bool,
@@ -394,24 +207,6 @@ def _warnings(
         *(words.worse(table) if models.added else []),
         *words.warnings(case, models.judged, same),
     ]
-
-
-def _model_of(judged: Judged, start: Candidate) -> Candidate:
-    """What of a group goes into the model: what is named, or a form of what has no name, or
-    parameters alone.
-    """
-    if judged.named or judged.wrong:
-        return judged.chosen
-    return (judged.group.closure if judged.verdict == "unlisted" else None) or start
-
-
-def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
-    """Residuals of a model; what happened in single recordings in the place of what its file
-    says.
-    """
-    return residuals(
-        problem, rig if events is None else without_term(rig, events.effect), (), events
-    )
 
 
 def _tried(groups: list[Group]) -> list[Tried]:
@@ -489,143 +284,6 @@ def _tested(groups: list[Group]) -> list[Tested]:
     )
 
 
-def _hypotheses(
-    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, problem: Problem
-) -> list[tuple[str, Rig, float]]:
-    """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
-    name; those of an effect with times of its own can predict no other recording.
-    """
-    found, least = [], problem.settings.simulated_from
-    healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
-
-    def model(chosen: list[Candidate]) -> Rig:
-        stated = _widened(problem, judged, chosen)
-        return _with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
-
-    likeliest = max(healthy, key=lambda key: healthy[key], default="")
-    if sum(healthy.values()) >= least:
-        chosen = [j.group.candidates[0] for j in judged]
-        found.append((likeliest, model(chosen), sum(healthy.values())))
-    for key, p in probabilities.items():
-        wanted = frozenset(key.split("+"))
-        if p < least or not all(id_of(name) in CATALOGUE or is_parameter(name) for name in wanted):
-            continue
-        chosen = [_inside(j.group, wanted) for j in judged]
-        if any(c.fit.events is not None for c in chosen):
-            continue
-        if {name for c in chosen for name in c.names} == wanted:
-            found.append((key, model(chosen), p))
-    return found
-
-
-def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
-    """The most probable hypothesis of a group that names nothing else than what is wanted; the
-    baseline where there is none.
-    """
-    named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
-    return max(
-        named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0]
-    )
-
-
-def _settled(
-    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
-) -> list[Candidate]:
-    """The fits of the groups again, with what another group knows better (the sensors' zeros) held,
-    where theirs are others.
-
-    A rig has one zero of a sensor; the other values of a fit are right beside its own only.
-    """
-    owners = owners_of_parameters(chosen)
-    found = list(chosen)
-    for k, candidate in enumerate(chosen):
-        own = replace(problem, blocks=judged[k].group.blocks)
-        # those that were held before too: a fit that frees one again is right beside its own only
-        common = {
-            n: chosen[owner].fit
-            for n, owner in owners.items()
-            if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in own.blocks)
-        }
-        own_values = candidate.fit.rig.parameters
-        apart = any(
-            abs(own_values[n].value - other.values[n])
-            > _ZERO_DIFFERENCE * nominal.parameters[n].tol
-            for n, other in common.items()
-        )
-        if apart and candidate.fit.events is None:
-            effects = candidate.fit.effects
-            free, fixed, forms = parts_of(
-                start_of(candidate.fit, effect, LEAST_START) for effect in effects
-            )
-            settled = {n: other.values[n] for n, other in common.items()}
-            autocorrelation = autocorrelation_of(own, candidate.fit, judged[k].group.noise_level)
-            with contextlib.suppress(SimulationError):  # it then stays as it was fitted
-                again = fit(
-                    own,
-                    nominal,
-                    effects,
-                    free,
-                    autocorrelation,
-                    fixed=fixed,
-                    warm=candidate.fit,
-                    share=FINAL_STEP_SHARE,
-                    settled=settled,
-                    freed=candidate.fit.freed,
-                    forms=forms,
-                )
-                found[k] = replace(candidate, fit=again)
-    return found
-
-
-def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
-    """The fits of the groups with the standard deviations that are stated."""
-    return [stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
-
-
-def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
-    """One rig from the groups' fits; where two have a value of their own, that of the group that
-    knows it best.
-    """
-    rig = nominal
-    for _, entry in _added(nominal, candidates):
-        rig = with_entry(rig, entry)
-    owners = owners_of_parameters(candidates).items()
-    return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
-
-
-def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidate, dict[str, Any]]]:
-    """Effects that the fits have and the nominal model has not, each from the fit that knows it
-    best.
-    """
-    owners = owners_of_effects(candidates)
-    for k, candidate in enumerate(candidates):
-        for entry in candidate.fit.rig.effects:
-            if entry["id"] not in _ids(nominal) and owners.get(term_in(entry), k) == k:
-                yield candidate, entry
-
-
-def _ids(rig: Rig) -> set[str]:
-    """Ids of the effects that a rig holds."""
-    return {entry["id"] for entry in rig.effects}
-
-
-def _with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:
-    """A model with the standard deviations of its effects; of one that the nominal model held, as
-    the group has it that knows it best.
-    """
-    spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
-    rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
-    for candidate, effect in _added(nominal, candidates):
-        own = term_in(effect) + "."
-        std = {
-            n.removeprefix(own): s
-            for n, s in candidate.fit.std.items()
-            if n.startswith(own) and math.isfinite(s)
-        }
-        rig = with_entry(rig, effect, std)
-    return rig
-
-
 def _located(judged: list[Judged]) -> str | None:
     """The block that the answer is about: that with the largest mismatch, of groups with a name or
     without one; else one with a signature below the noise, else one at a wall.
@@ -647,30 +305,6 @@ def _located(judged: list[Judged]) -> str | None:
             if worst and depends(block, worst[0]):
                 return block.name
     return None
-
-
-def _table(
-    problem: Problem, found: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
-) -> dict[str, ChannelError]:
-    """Error of every channel at every stage."""
-    out = {}
-    for block in problem.blocks:
-        errors = {}
-        noise, weights = [], []
-        for prepared in problem.recordings:
-            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
-            weights.append(
-                max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum()))
-            )
-        level = math.sqrt(float(np.average(noise, weights=weights)))
-        for stage in ("before", "refit", "after"):
-            squares = []
-            for prepared in problem.recordings:
-                r = found[stage][block.name, prepared.recording.name]
-                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
-            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
-        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
-    return out
 
 
 def _gap(table: dict[str, ChannelError], least: float) -> float | None:
@@ -720,7 +354,7 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
 
 
 def _wrong(
-    models: _Models, problem: Problem, table: dict[str, ChannelError]
+    models: Models, problem: Problem, table: dict[str, ChannelError]
 ) -> list[WrongParameter]:
     """Parameters that the rig file is wrong about: its value, the one that the recordings ask for,
     and what the error becomes.

@@ -5,19 +5,15 @@ nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-
-import numpy as np
+from collections.abc import Mapping, Sequence
 
 from pamrs.diagnosis.explain._block_entries import not_judged
-from pamrs.diagnosis.fit import Problem, residuals
-from pamrs.diagnosis.prepare import Residual, Unjudged
+from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.prepare import Unjudged
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import Reading
-from pamrs.errors import SimulationError
 from pamrs.findings import ChannelError, FitErrors, Misread, NextExperiment, Where
 from pamrs.recordings import Case
-from pamrs.rig import Rig
 from pamrs.units import bar_and_psi
 
 __all__ = ["misread_diagnosis"]
@@ -26,9 +22,9 @@ __all__ = ["misread_diagnosis"]
 def misread_diagnosis(
     case: Case,
     fitted: Problem,
-    held: Problem,
     reading: Reading,
     unjudged: Sequence[Unjudged],
+    errors: Mapping[str, dict[str, ChannelError]],
 ) -> Diagnosis:
     """The diagnosis of a case whose channels are to be read in another way.
 
@@ -36,19 +32,19 @@ def misread_diagnosis(
     ----------
     case : Case
         The case.
-    fitted, held : Problem
-        Recordings to fit and held-out ones (the same object when there are no others), as their
-        log is said to be.
+    fitted : Problem
+        Recordings to fit, as their log is said to be.
     reading : Reading
         The way to read them, with its fits.
     unjudged : sequence of Unjudged
         Blocks that could not be judged in any case.
+    errors : mapping of str to dict
+        Errors of each channel, by the role of the recordings (``fit``, ``held_out``).
     """
     why = "the unit of what surrounds it is settled first"
     blocks = [Unjudged(block.name, block.covers, why) for block in fitted.blocks]
     text, advice = _told(reading), _advice(reading)
     most = fitted.settings.most_probability
-    table = _table(case.rig, fitted, reading)
     channels = list(reading.channels)
     entry = Misread(
         channels=channels,
@@ -67,7 +63,7 @@ def misread_diagnosis(
         where=Where(channel=channels[0], text=advice),
         probabilities={"units": most, "unlisted": 1.0 - most},
         blocks=[not_judged(block) for block in (*blocks, *unjudged)],
-        fit=FitErrors(table, _table(case.rig, held, reading) if held is not fitted else {}),
+        fit=FitErrors(errors["fit"], errors["held_out"]),
         next_experiment=NextExperiment(text=f"None yet. {advice}"),
         text=f"{text[:1].upper()}{text[1:]}.\n\n{advice}",
         rig=case.rig,
@@ -124,28 +120,3 @@ def _advice(reading: Reading) -> str:
         f"{_names(reading)} (in the heading, or in case.toml), or check the sensor where the log "
         "is right, and diagnose again."
     )
-
-
-def _table(nominal: Rig, problem: Problem, reading: Reading) -> dict[str, ChannelError]:
-    """Errors of each channel as the log says, before and after the refit, and read so."""
-    if reading.was is None or reading.fit is None:
-        return {}
-    turned = reading.read(problem)
-    try:
-        before = residuals(problem, nominal)
-        refit = residuals(problem, reading.was.rig)
-        after = residuals(turned, reading.fit.rig)
-    except SimulationError:
-        return {}
-    found: dict[str, ChannelError] = {}
-    for block in problem.blocks:
-        keys = [(block.name, p.recording.name) for p in problem.recordings]
-        noise = math.sqrt(float(np.mean([p.noise[block.channel] ** 2 for p in turned.recordings])))
-        errors = [_rms([stage[key] for key in keys]) for stage in (before, refit, after)]
-        found[block.channel] = ChannelError(noise, *errors)
-    return found
-
-
-def _rms(found: list[Residual]) -> float:
-    values = np.concatenate([r.value[r.rows] for r in found])
-    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan

@@ -8,6 +8,7 @@ from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.evidence import Candidate, Judged, symptoms_of
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.model import spoiled
 from pamrs.effects import CATALOGUE, id_of
 from pamrs.findings import BlockVerdict, ChannelError, Findings, Where
 from pamrs.recordings import Case
@@ -36,7 +37,6 @@ from pamrs.rig.schema import qualified
 __all__ = [
     "absolute",
     "reservations",
-    "spoiled",
     "unknown_volumes",
     "verdict",
     "warnings",
@@ -47,7 +47,6 @@ __all__ = [
 # [noise levels] error of a model with a name from which it is reported with a reservation
 _MISSED_NOISES = 3.0
 _MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is
-_SPOILED = 1.2  # error of a channel over that of the model before, from which it is reported
 _MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
 # relative scatter of an effect's size between recordings that is reported, as in evidence
 _SCATTER = 0.35
@@ -424,15 +423,6 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
             f"one by {was} {unit}: the values of this fit spoil the channel".replace("°", "deg")
         )
     return out
-
-
-def spoiled(table: dict[str, ChannelError]) -> list[str]:
-    """Channels that the model with what was added predicts worse than the one without it."""
-    return [
-        channel
-        for channel, error in table.items()
-        if error.after > _SPOILED * max(min(error.before, error.refit), error.noise)
-    ]
 
 
 def reservations(

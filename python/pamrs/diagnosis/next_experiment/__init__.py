@@ -1,14 +1,16 @@
 """What to record next, and what some channels could tell before anything is recorded.
 
-Public: `propose`, `Outcome`, `Hypothesis`, `outcome_of`, `ranked`, `apart`, `information`,
-`entropy`, `spoken` (experiments compared); `Plan`, `Sight`, `Addition`, `plan_diagnosis` (before
-there are data); `Left`, `Linear`, `checked_channels`, `measurable`, `counted`, `difference`,
-`linear`, `misfit`, `problem_of`, `taken`, `usual_noise`, `noise_of`, `weights_of` (how far two
-models differ). What a person can record at all is in :mod:`pamrs.experiments`.
+Public: `next_experiment` (what a diagnosis asks for); `propose`, `Outcome`, `Hypothesis`,
+`outcome_of`, `ranked`, `apart`, `information`, `entropy`, `spoken` (experiments compared); `Plan`,
+`Sight`, `Addition`, `plan_diagnosis` (before there are data); `Left`, `Linear`,
+`checked_channels`, `measurable`, `counted`, `difference`, `linear`, `misfit`, `problem_of`,
+`taken`, `usual_noise`, `noise_of`, `weights_of` (how far two models differ). What a person can
+record at all is in :mod:`pamrs.experiments`.
 """
 
 from __future__ import annotations
 
+from pamrs.diagnosis.next_experiment._asked import next_experiment
 from pamrs.diagnosis.next_experiment._choice import (
     Hypothesis,
     Outcome,
@@ -55,6 +57,7 @@ __all__ = [
     "linear",
     "measurable",
     "misfit",
+    "next_experiment",
     "noise_of",
     "outcome_of",
     "plan_diagnosis",

@@ -2,8 +2,8 @@
 noise, forms without a name.
 
 Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
-alone), `misread`, `Reading` (other units of channels), `find_closure`, `below_noise`, `freed`,
-`beside_quiet`, `suspected`.
+alone), `misread`, `Reading`, `reading_errors` (other units of channels), `find_closure`,
+`below_noise`, `freed`, `beside_quiet`, `suspected`.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
 from pamrs.diagnosis.search._below_noise import below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import examine
-from pamrs.diagnosis.search._readings import Reading, misread
+from pamrs.diagnosis.search._readings import Reading, misread, reading_errors
 from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed, suspected
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "find_closure",
     "freed",
     "misread",
+    "reading_errors",
     "refitted",
     "suspected",
     "with_autocorrelation",

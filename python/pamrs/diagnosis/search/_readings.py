@@ -32,14 +32,15 @@ from pamrs.diagnosis.fit import (
     stacked,
 )
 from pamrs.diagnosis.noise import excess, noise_levels
-from pamrs.diagnosis.prepare import Prepared, implausible
+from pamrs.diagnosis.prepare import Prepared, Residual, implausible
 from pamrs.diagnosis.search._baseline import refitted, thorough
 from pamrs.errors import SimulationError
+from pamrs.findings import ChannelError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 from pamrs.units import measured_from, parse_unit
 
-__all__ = ["Reading", "misread"]
+__all__ = ["Reading", "misread", "reading_errors"]
 
 # [variances of the noise] from which units are doubted: a wrong one leaves hundreds, drives two
 _SUSPECT = 3.0
@@ -373,3 +374,28 @@ def _said(problem: Problem, channel: str) -> str:
 def _size(unit: str) -> float:
     """Size of a unit, that of an absolute pressure without what says so."""
     return parse_unit(measured_from(unit)[0]).scale
+
+
+def reading_errors(nominal: Rig, problem: Problem, reading: Reading) -> dict[str, ChannelError]:
+    """Errors of each channel as the log says, before and after the refit, and read so."""
+    if reading.was is None or reading.fit is None:
+        return {}
+    turned = reading.read(problem)
+    try:
+        before = residuals(problem, nominal)
+        refit = residuals(problem, reading.was.rig)
+        after = residuals(turned, reading.fit.rig)
+    except SimulationError:
+        return {}
+    found: dict[str, ChannelError] = {}
+    for block in problem.blocks:
+        keys = [(block.name, p.recording.name) for p in problem.recordings]
+        noise = math.sqrt(float(np.mean([p.noise[block.channel] ** 2 for p in turned.recordings])))
+        errors = [_rms([stage[key] for key in keys]) for stage in (before, refit, after)]
+        found[block.channel] = ChannelError(noise, *errors)
+    return found
+
+
+def _rms(found: list[Residual]) -> float:
+    values = np.concatenate([r.value[r.rows] for r in found])
+    return float(np.sqrt(np.mean(values**2))) if values.size else math.nan

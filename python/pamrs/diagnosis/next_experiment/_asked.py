@@ -14,7 +14,8 @@ import numpy as np
 
 from pamrs.diagnosis.evidence import Judged, is_parameter
 from pamrs.diagnosis.fit import Problem, depends, without_term
-from pamrs.diagnosis.next_experiment import Hypothesis, apart, noise_of, outcome_of, propose, spoken
+from pamrs.diagnosis.next_experiment._choice import Hypothesis, apart, outcome_of, propose, spoken
+from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.prepare import Block, Prepared
 from pamrs.effects import info_of, is_effect
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError

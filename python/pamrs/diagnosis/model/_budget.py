@@ -18,7 +18,6 @@ from pamrs.diagnosis.evidence import (
     is_parameter,
     significant,
 )
-from pamrs.diagnosis.explain._owners import owners_of_effects
 from pamrs.diagnosis.fit import (
     Events,
     Key,
@@ -31,6 +30,7 @@ from pamrs.diagnosis.fit import (
     with_known,
     without_term,
 )
+from pamrs.diagnosis.model._owners import owners_of_effects
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings

@@ -1,0 +1,500 @@
+"""From judged groups of blocks to one model: what each fitted is merged, and what is left at every
+stage, alone and in the whole rig.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from pamrs.diagnosis.evidence import (
+    Candidate,
+    Group,
+    Judged,
+    autocorrelation_of,
+    case_ambiguity,
+    case_probabilities,
+    case_verdict,
+    determined,
+    is_parameter,
+    judge,
+    parts_of,
+    put_aside,
+    start_of,
+    stated,
+)
+from pamrs.diagnosis.fit import (
+    FINAL_STEP_SHARE,
+    LEAST_START,
+    Events,
+    Key,
+    Problem,
+    depends,
+    fit,
+    known_parameters,
+    residuals,
+    with_entry,
+    with_known,
+    without_term,
+)
+from pamrs.diagnosis.model._budget import budget
+from pamrs.diagnosis.model._free_run import Known, free_run
+from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
+from pamrs.diagnosis.noise import NoiseLevel
+from pamrs.diagnosis.prepare import Residual
+from pamrs.effects import CATALOGUE, id_of, term_in
+from pamrs.errors import SimulationError
+from pamrs.findings import HEALTHY, BudgetTerm, ChannelError, FreeRun, channels_off
+from pamrs.rig import Rig
+
+__all__ = ["Conclusion", "Models", "conclude", "spoiled", "with_std"]
+
+# [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
+_ZERO_DIFFERENCE = 0.1
+_SPOILED = 1.2  # error of a channel over that of the model before, from which it is reported
+
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """The rig at every stage.
+
+    Attributes
+    ----------
+    judged : list of Judged
+        The groups, what they name fitted beside what other groups know better.
+    starts, chosen : list of Candidate
+        The baseline of each group, and what goes into the final model, with standard deviations
+        that hold for equations that are not quite the rig's.
+    owners : dict of str to int
+        Of each parameter the group whose value the final model has.
+    nominal, baseline, final : Rig
+        As the rig file has it, refitted inside its tolerances, and with what was found.
+    verdict : str
+        Of the case.
+    """
+
+    judged: list[Judged]
+    starts: list[Candidate]
+    chosen: list[Candidate]
+    owners: dict[str, int]
+    nominal: Rig
+    baseline: Rig
+    final: Rig
+    verdict: str
+
+    @property
+    def added(self) -> bool:
+        """Whether the model has effects that the nominal one does not hold."""
+        return len(self.final.effects) > len(self.nominal.effects)
+
+    @property
+    def events(self) -> Events | None:
+        """What happened in single recordings."""
+        happened = (c.fit.events for c in self.chosen if c.fit.events is not None)
+        return next(happened, None) if self.added else None
+
+    def residuals(self, problem: Problem) -> dict[str, dict[Key, Residual]]:
+        """Residuals of some recordings at every stage."""
+        return {
+            "before": _run(problem, self.nominal, None),
+            "refit": _run(problem, self.baseline, None),
+            "after": _run(problem, self.final, self.events),
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """What was found, as numbers.
+
+    Attributes
+    ----------
+    models : Models
+        The rig at every stage, from the verdicts of the groups.
+    probabilities : dict of str to float
+        Of the case, by hypothesis.
+    ambiguity : list of list of str
+        Sets of names that are left open.
+    noise_level : dict
+        By block and recording.
+    inside, outside : dict of str to dict
+        Residuals of the recordings to fit and of the held-out ones (the same where there are no
+        others) by stage (``before``, ``refit``, ``after``), block and recording.
+    errors : dict of str to dict
+        Error of each channel at every stage, by the role of the recordings (``fit``, ``held_out``);
+        nothing of held-out ones where there are none.
+    budget : list of BudgetTerm
+        What takes how much of each block's mismatch.
+    runs : list of FreeRun or None
+        Simulations of each recording from its commands alone, and a note on them.
+    runs_note : str
+        What is to be said beside them.
+    """
+
+    models: Models
+    probabilities: dict[str, float]
+    ambiguity: list[list[str]]
+    noise_level: dict[Key, NoiseLevel]
+    inside: dict[str, dict[Key, Residual]]
+    outside: dict[str, dict[Key, Residual]]
+    errors: dict[str, dict[str, ChannelError]]
+    budget: list[BudgetTerm]
+    runs: list[FreeRun] | None
+    runs_note: str
+
+    @property
+    def judged(self) -> list[Judged]:
+        """The groups with their verdicts."""
+        return self.models.judged
+
+    @property
+    def table(self) -> dict[str, ChannelError]:
+        """Errors that the answer is proven by: held-out ones where there are any."""
+        return self.errors["held_out"] or self.errors["fit"]
+
+    @property
+    def off(self) -> list[str]:
+        """Channels that the whole rig misses from its commands alone, the worst first."""
+        return list(channels_off(self.runs or []))
+
+    def hypotheses(self, problem: Problem) -> list[tuple[str, Rig, float]]:
+        """The likely hypotheses that have a model: label, rig and probability."""
+        return _hypotheses(self.judged, self.probabilities, self.models.nominal, problem)
+
+
+def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[Group]) -> Conclusion:
+    """Merge what the groups of blocks found into one model, and see what that leaves.
+
+    Parameters
+    ----------
+    nominal : Rig
+        The model of the rig file.
+    fitted, held : Problem
+        Recordings to fit and held-out ones (the same object when there are no others).
+    groups : list of Group
+        Gas blocks and arm, examined.
+    """
+    noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
+    models, inside, outside = _sound_models(nominal, fitted, held, groups, noise_level)
+    judged, part = models.judged, fitted.losses.part
+    fit_table = _table(fitted, inside, noise_level)
+    held_table = _table(held, outside, noise_level) if held is not fitted else {}
+    budgeted = partial(budget, judged, held, outside, noise_level, nominal)
+    known = _known(models)
+    running = partial(free_run, held, outside, nominal, models.final, models.events, known)
+    nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
+    terms = part("the budget", lambda: budgeted(models.final, models.events), [])
+    runs, note = part("the free run", running, nothing)
+    return Conclusion(
+        models,
+        case_probabilities(judged),
+        case_ambiguity(judged),
+        noise_level,
+        inside,
+        outside,
+        {"fit": fit_table, "held_out": held_table},
+        terms,
+        runs,
+        note,
+    )
+
+
+def _sound_models(
+    nominal: Rig,
+    fitted: Problem,
+    held: Problem,
+    groups: list[Group],
+    noise_level: dict[Key, NoiseLevel],
+) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
+    """The rig at every stage with names that spoil no channel, and the residuals of the recordings
+    to fit and of the held-out ones.
+
+    What leads a group and predicts a channel worse than the model without it does is put aside, and
+    the group is judged again without it.
+    """
+    settings = fitted.settings
+    groups = [determined(group, fitted) for group in groups]
+    while True:
+        judged = judge(groups, settings)
+        models = _models(nominal, fitted, judged, case_verdict(judged))
+        inside = models.residuals(fitted)
+        outside = inside if held is fitted else models.residuals(held)
+        problem, found = (fitted, inside) if held is fitted else (held, outside)
+        spoilt = spoiled(_table(problem, found, noise_level))
+        blamed = _blamed(models.judged, spoilt)
+        if not blamed:
+            return models, inside, outside
+        groups = [
+            _without_name(group, models.judged[k]) if k in blamed else group
+            for k, group in enumerate(groups)
+        ]
+
+
+def _without_name(group: Group, judged: Judged) -> Group:
+    """A group without what it adds to the model: its name, or the form of what has none."""
+    if judged.named:
+        return put_aside(group, judged.chosen.key)
+    return replace(group, closure=None)
+
+
+def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
+    """Groups that add to the model what spoils a channel: those that have the channel, else those
+    whose additions act in its block.
+    """
+    added = {k: _additions(j) for k, j in enumerate(judged) if _additions(j)}
+    blamed: set[int] = set()
+    for channel in spoilt:
+        own = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
+        blocks = [b for j in judged for b in j.group.blocks if b.channel == channel]
+        acting = {k for k in added if any(depends(b, n) for b in blocks for n in added[k])}
+        blamed |= own or acting
+    return blamed
+
+
+def _additions(judged: Judged) -> tuple[str, ...]:
+    """Effects that a group adds to the model."""
+    closure = judged.group.closure if judged.verdict == "unlisted" else None
+    return judged.named or (closure.effects if closure is not None else ())
+
+
+def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -> Models:
+    """The rig at every stage, from the verdicts of the groups."""
+    begun = _settled(nominal, fitted, judged, [j.group.candidates[0] for j in judged])
+    baseline = _merged(nominal, begun)
+    starts = _widened(fitted, judged, begun)
+    if verdict not in ("effects", "unlisted") and not any(j.wrong for j in judged):
+        final = nominal if verdict == "none" else baseline
+        return Models(
+            judged, starts, starts, owners_of_parameters(begun), nominal, baseline, final, verdict
+        )
+    wanted = [_model_of(j, start) for j, start in zip(judged, begun, strict=True)]
+    ended = _settled(nominal, fitted, judged, wanted)
+    chosen = _widened(fitted, judged, ended)
+    judged = [
+        replace(j, chosen=c) if j.named or j.wrong else j
+        for j, c in zip(judged, chosen, strict=True)
+    ]
+    final = _merged(nominal, ended)
+    owners = owners_of_parameters(ended)
+    return Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
+
+
+def _known(models: Models) -> Known:
+    """What is known of the values of the final model: as they were fitted, with what goes together,
+    and of others what the rig file says.
+    """
+    of_file = {n: p for n, p in known_parameters(models.nominal).items() if p.tol > 0}
+    names, values, parts = list[str](), list[float](), list[Array]()
+    for k, candidate in enumerate(models.chosen):
+        found = candidate.fit
+        every = list(found.scales)
+        own = [n for n in every if models.owners.get(n, k) == k and math.isfinite(found.std[n])]
+        at = [every.index(n) for n in own]
+        fitted = np.sqrt(np.maximum(np.diag(found.covariance)[at], 1e-300))
+        wide = np.array([found.std[n] for n in own]) / fitted
+        size, axes = np.linalg.eigh(found.covariance[np.ix_(at, at)] * np.outer(wide, wide))
+        parts.append(axes * np.sqrt(np.maximum(size, 0.0)))
+        names += own
+        values += [found.values[n] for n in own]
+    rest = [n for n in of_file if n not in names and math.isfinite(of_file[n].tol)]
+    parts.append(np.diag([of_file[n].tol for n in rest]))
+    values += [of_file[n].value for n in rest]
+    return Known((*names, *rest), np.array(values), block_diag(*parts))
+
+
+def _model_of(judged: Judged, start: Candidate) -> Candidate:
+    """What of a group goes into the model: what is named, or a form of what has no name, or
+    parameters alone.
+    """
+    if judged.named or judged.wrong:
+        return judged.chosen
+    return (judged.group.closure if judged.verdict == "unlisted" else None) or start
+
+
+def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residual]:
+    """Residuals of a model; what happened in single recordings in the place of what its file
+    says.
+    """
+    return residuals(
+        problem, rig if events is None else without_term(rig, events.effect), (), events
+    )
+
+
+def _hypotheses(
+    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, problem: Problem
+) -> list[tuple[str, Rig, float]]:
+    """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
+    name; those of an effect with times of its own can predict no other recording.
+    """
+    found, least = [], problem.settings.simulated_from
+    healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
+
+    def model(chosen: list[Candidate]) -> Rig:
+        stated = _widened(problem, judged, chosen)
+        return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
+
+    likeliest = max(healthy, key=lambda key: healthy[key], default="")
+    if sum(healthy.values()) >= least:
+        chosen = [j.group.candidates[0] for j in judged]
+        found.append((likeliest, model(chosen), sum(healthy.values())))
+    for key, p in probabilities.items():
+        wanted = frozenset(key.split("+"))
+        if p < least or not all(id_of(name) in CATALOGUE or is_parameter(name) for name in wanted):
+            continue
+        chosen = [_inside(j.group, wanted) for j in judged]
+        if any(c.fit.events is not None for c in chosen):
+            continue
+        if {name for c in chosen for name in c.names} == wanted:
+            found.append((key, model(chosen), p))
+    return found
+
+
+def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
+    """The most probable hypothesis of a group that names nothing else than what is wanted; the
+    baseline where there is none.
+    """
+    named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
+    return max(
+        named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0]
+    )
+
+
+def _settled(
+    nominal: Rig, problem: Problem, judged: list[Judged], chosen: list[Candidate]
+) -> list[Candidate]:
+    """The fits of the groups again, with what another group knows better (the sensors' zeros) held,
+    where theirs are others.
+
+    A rig has one zero of a sensor; the other values of a fit are right beside its own only.
+    """
+    owners = owners_of_parameters(chosen)
+    found = list(chosen)
+    for k, candidate in enumerate(chosen):
+        own = replace(problem, blocks=judged[k].group.blocks)
+        # those that were held before too: a fit that frees one again is right beside its own only
+        common = {
+            n: chosen[owner].fit
+            for n, owner in owners.items()
+            if owner != k and n.startswith("sensors.") and any(depends(b, n) for b in own.blocks)
+        }
+        own_values = candidate.fit.rig.parameters
+        apart = any(
+            abs(own_values[n].value - other.values[n])
+            > _ZERO_DIFFERENCE * nominal.parameters[n].tol
+            for n, other in common.items()
+        )
+        if apart and candidate.fit.events is None:
+            effects = candidate.fit.effects
+            free, fixed, forms = parts_of(
+                start_of(candidate.fit, effect, LEAST_START) for effect in effects
+            )
+            settled = {n: other.values[n] for n, other in common.items()}
+            autocorrelation = autocorrelation_of(own, candidate.fit, judged[k].group.noise_level)
+            with contextlib.suppress(SimulationError):  # it then stays as it was fitted
+                again = fit(
+                    own,
+                    nominal,
+                    effects,
+                    free,
+                    autocorrelation,
+                    fixed=fixed,
+                    warm=candidate.fit,
+                    share=FINAL_STEP_SHARE,
+                    settled=settled,
+                    freed=candidate.fit.freed,
+                    forms=forms,
+                )
+                found[k] = replace(candidate, fit=again)
+    return found
+
+
+def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
+    """The fits of the groups with the standard deviations that are stated."""
+    return [stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
+
+
+def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
+    """One rig from the groups' fits; where two have a value of their own, that of the group that
+    knows it best.
+    """
+    rig = nominal
+    for _, entry in _added(nominal, candidates):
+        rig = with_entry(rig, entry)
+    owners = owners_of_parameters(candidates).items()
+    return with_known(rig, {name: candidates[k].fit.values[name] for name, k in owners})
+
+
+def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidate, dict[str, Any]]]:
+    """Effects that the fits have and the nominal model has not, each from the fit that knows it
+    best.
+    """
+    owners = owners_of_effects(candidates)
+    for k, candidate in enumerate(candidates):
+        for entry in candidate.fit.rig.effects:
+            if entry["id"] not in _ids(nominal) and owners.get(term_in(entry), k) == k:
+                yield candidate, entry
+
+
+def _ids(rig: Rig) -> set[str]:
+    """Ids of the effects that a rig holds."""
+    return {entry["id"] for entry in rig.effects}
+
+
+def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[str, int]) -> Rig:
+    """A model with the standard deviations of its effects; of one that the nominal model held, as
+    the group has it that knows it best.
+    """
+    spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
+    rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
+    for candidate, effect in _added(nominal, candidates):
+        own = term_in(effect) + "."
+        std = {
+            n.removeprefix(own): s
+            for n, s in candidate.fit.std.items()
+            if n.startswith(own) and math.isfinite(s)
+        }
+        rig = with_entry(rig, effect, std)
+    return rig
+
+
+def _table(
+    problem: Problem, found: dict[str, dict[Key, Residual]], noise_level: dict[Key, NoiseLevel]
+) -> dict[str, ChannelError]:
+    """Error of every channel at every stage."""
+    out = {}
+    for block in problem.blocks:
+        errors = {}
+        noise, weights = [], []
+        for prepared in problem.recordings:
+            noise.append(noise_level[block.name, prepared.recording.name].sample ** 2)
+            weights.append(
+                max(1, int(found["refit"][block.name, prepared.recording.name].rows.sum()))
+            )
+        level = math.sqrt(float(np.average(noise, weights=weights)))
+        for stage in ("before", "refit", "after"):
+            squares = []
+            for prepared in problem.recordings:
+                r = found[stage][block.name, prepared.recording.name]
+                squares.append(float(np.mean(r.value[r.rows] ** 2)) if r.rows.any() else 0.0)
+            errors[stage] = math.sqrt(float(np.average(squares, weights=weights)))
+        out[block.channel] = ChannelError(level, errors["before"], errors["refit"], errors["after"])
+    return out
+
+
+def spoiled(table: dict[str, ChannelError]) -> list[str]:
+    """Channels that the model with what was added predicts worse than the one without it."""
+    return [
+        channel
+        for channel, error in table.items()
+        if error.after > _SPOILED * max(min(error.before, error.refit), error.noise)
+    ]
