@@ -61,6 +61,8 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.recordings import Case
+from pamrs.report.verdict import unknown_volumes
+from pamrs.report.verdict import verdict as verdict_in_words
 from pamrs.rig import Rig
 
 __all__ = ["assemble"]
@@ -178,7 +180,7 @@ def _worded(
     """A diagnosis with its verdict in words."""
     sought = any(j.group.sought for j in judged if j.verdict == "unlisted")
     told = list(dict.fromkeys(forms.values()))
-    return replace(diagnosis, text=words.verdict(diagnosis, case, told, sought=sought))
+    return replace(diagnosis, text=verdict_in_words(diagnosis, case, told, sought=sought))
 
 
 def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
@@ -412,7 +414,7 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
 def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
     """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
-    unknown_volume = bool(words.unknown_volumes(rig))
+    unknown_volume = bool(unknown_volumes(rig))
     out: dict[str, EffectParameterFound] = {}
     for parameter in info_of(effect).form(form_in(rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
