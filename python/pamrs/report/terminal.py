@@ -1,0 +1,191 @@
+"""A diagnosis as plain text for a terminal, and as a few lines for a notebook."""
+
+from __future__ import annotations
+
+import html
+import math
+import textwrap
+from typing import Final
+
+from pamrs.channels import unit_of
+from pamrs.findings import Findings
+from pamrs.report import text as words
+from pamrs.units import with_unit
+
+__all__ = ["notebook", "summary"]
+
+_ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
+"""Signs that a terminal may lack."""
+
+
+def summary(diagnosis: Findings) -> str:
+    """Return the result as plain text for a terminal, about 20 lines."""
+    lines = [f"Diagnosis of {diagnosis.case}", *textwrap.wrap(words.headline(diagnosis) + ".", 96)]
+    left_out = words.left_out_sentence(diagnosis)
+    lines += textwrap.wrap(left_out + "." * bool(left_out), 96, subsequent_indent="  ")
+    where = diagnosis.where.text
+    if where:
+        lines += [
+            "",
+            *textwrap.wrap(where, 96, initial_indent="where  ", subsequent_indent=" " * 7),
+        ]
+    lines += _probabilities(diagnosis)
+    for effect in diagnosis.effects:
+        lines.append("")
+        lines.append(words.effect_heading(diagnosis, effect))
+        for name, own in effect.parameters.items():
+            if own.identifiable is not False:
+                value = words.format_uncertain(own.value, own.std, unicode=False)
+                lines.append(with_unit(f"  {name} = {value}", own.unit))
+            else:
+                lines.append(f"  {name}: these recordings do not determine it")
+    for wrong in diagnosis.wrong_parameters:
+        lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
+    lines += _budget(diagnosis)
+    lines += _fit(diagnosis)
+    lines += _free_run(diagnosis)
+    for kept in diagnosis.unexplained:
+        lines += textwrap.wrap(
+            f"Unexplained: {words.kept_sentence(kept)}", 96, subsequent_indent="  "
+        )
+    for asked in diagnosis.considered:
+        lines += textwrap.wrap(
+            f"Asked for: {words.considered_sentence(asked)}", 96, subsequent_indent="  "
+        )
+    if len(diagnosis.ambiguity) > 1:
+        sets = "; ".join(words.set_label(s) for s in diagnosis.ambiguity)
+        lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
+    lines += _next(diagnosis)
+    lines += _data(diagnosis)
+    for warning in diagnosis.warnings[:3]:
+        lines += textwrap.wrap(f"Warning: {warning}", 96, subsequent_indent="  ")
+    if len(diagnosis.warnings) > 3:
+        lines.append(f"({len(diagnosis.warnings) - 3} more warnings in the report)")
+    lines.append(f"{diagnosis.seconds:.1f} s")
+    return "\n".join(lines)
+
+
+def _probabilities(diagnosis: Findings) -> list[str]:
+    """Bars of each group of blocks with a mismatch."""
+    lines = []
+    for block in words.told_probabilities(diagnosis):
+        rows = words.ranked_probabilities(block.probabilities, 5)
+        if rows:
+            lines.append("")
+        if rows and len(diagnosis.judged) > 1 and block.blocks:
+            lines.append(f"{words.blocks_label(block)}:")
+        names = [words.hypothesis_label(name) for name, _ in rows]
+        width = min(max(38, *map(len, names)), 56) if names else 38
+        lines += [
+            (
+                f"{words.hypothesis_label(name):<{width}.{width}} "
+                f"{words.format_probability(p):>7}  {'#' * round(30 * p)}"
+            ).rstrip()
+            for place, (name, p) in enumerate(rows)
+            if place == 0 or p >= 0.005
+        ]
+    return lines
+
+
+def _free_run(diagnosis: Findings) -> list[str]:
+    """The whole rig from its commands alone, one line for each of the first recordings."""
+    lines = []
+    for run in (diagnosis.free_run or [])[:2]:
+        told = []
+        for channel, error in run.channels.items():
+            unit, factor = words.display_unit(error.unit, error.before)
+            before, after = (
+                words.format_number(v * factor, unicode=False) for v in (error.before, error.after)
+            )
+            told.append(f"{channel} {before} to {after} {unit}")
+        text = f"Whole rig from its commands alone, {run.recording}: {'; '.join(told)}"
+        lines += textwrap.wrap(text.translate(_ASCII), 96, subsequent_indent="  ")
+    return lines
+
+
+def _budget(diagnosis: Findings) -> list[str]:
+    """What takes the mismatch of each block."""
+    lines = []
+    for block, sentence in words.budget_sentences(diagnosis):
+        told = f"Budget of the {words.spoken_name(block)}: {sentence}".translate(_ASCII)
+        lines += textwrap.wrap(told, 96, subsequent_indent="  ")
+    # where parameters alone take all there is nothing to read wrongly
+    shares = [t for t in diagnosis.budget if t.kind != "unexplained"]
+    plain = all(t.kind == "parameters" and 0.0 <= t.share <= 1.0 for t in shares)
+    note = "" if plain else f"({words.BUDGET_NOTE})"
+    lines += textwrap.wrap(note, 96, initial_indent="  ", subsequent_indent="  ")
+    return ["", *lines] if lines else []
+
+
+def _data(diagnosis: Findings) -> list[str]:
+    """What the answer rests on, and what of it was not used."""
+    told = words.data_sentence(diagnosis)
+    return ["", *textwrap.wrap(told, 96, subsequent_indent="  ")] if told else []
+
+
+def _next(diagnosis: Findings) -> list[str]:
+    """What to record next, and what tells the leading hypothesis from each other one."""
+    own = diagnosis.next_experiment
+    if not own.text:
+        return []
+    lines = ["", *textwrap.wrap(f"Next experiment: {own.text}", 96, subsequent_indent="  ")]
+    for pair, text in words.told_pairs(diagnosis):
+        if own.pairs[0].between[0] in pair.between:
+            between = " or ".join(words.hypothesis_label(name) for name in pair.between)
+            told = f"{between}? {text}"
+            lines += textwrap.wrap(told, 96, initial_indent="  ", subsequent_indent="    ")
+    return lines
+
+
+def _fit(diagnosis: Findings) -> list[str]:
+    """Error table of the held-out recordings, else of the fitted ones."""
+    channels = diagnosis.fit.held_out or diagnosis.fit.channels
+    if not channels:
+        return []
+    title = "held-out error" if diagnosis.fit.held_out else "error (fit)"
+    lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
+    for channel, entry in channels.items():
+        sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
+        unit, factor = words.display_unit(unit_of(channel), max(sizes, default=math.nan))
+        unit = unit.replace("°", "deg")
+        row = f"{channel} [{unit}]" if unit else channel
+        for key in ("noise", "before", "refit", "after"):
+            value = entry[key]
+            shown = float(value) * factor if words.is_number(value) else None
+            row = (
+                f"{row:<22}" if key == "noise" else row
+            ) + f"{words.format_number(shown, unicode=False):>11}"
+        lines.append(row)
+    gap = diagnosis.fit.gap_closed
+    if words.is_number(gap):
+        lines.append(
+            f"gap to the noise closed over all channels, on {diagnosis.proof}: "
+            f"{100 * float(gap):.0f} %"
+        )
+    return lines
+
+
+def notebook(diagnosis: Findings) -> str:
+    """Short HTML for notebooks."""
+    rows = "".join(
+        f"<tr><td style='text-align:left'>{html.escape(words.hypothesis_label(name))}</td>"
+        f"<td>{html.escape(words.format_probability(p))}</td>"
+        f"<td style='text-align:left'><span style='display:inline-block;height:.7em;"
+        f"width:{max(0.0, min(1.0, p)) * 12:.2f}em;background:#0072b2'></span></td></tr>"
+        for name, p in words.ranked_probabilities(
+            words.told_probabilities(diagnosis)[0].probabilities, 5
+        )
+    )
+    gap = diagnosis.fit.gap_closed
+    closed = (
+        f"<p>{100 * float(gap):.0f} % of the gap to the noise closed over all channels, on "
+        f"{diagnosis.proof}.</p>"
+        if words.is_number(gap)
+        else ""
+    )
+    where = html.escape(diagnosis.where.text)
+    return (
+        f"<div><p><b>{html.escape(words.headline(diagnosis))}.</b></p><p>{where}</p>"
+        f"<table>{rows}</table>{closed}"
+        "<p><code>.report(&quot;report.html&quot;)</code> writes the whole story.</p></div>"
+    )
