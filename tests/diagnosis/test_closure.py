@@ -10,7 +10,7 @@ import pytest
 import pamrs
 from pamrs import _core
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.explain import describe_closure
+from pamrs.diagnosis.explain import forms_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, fits, residuals
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME
 from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
@@ -20,6 +20,7 @@ from pamrs.diagnosis.search._closure import _MOST_TERMS
 from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
+from pamrs.report.forms import form_sentence
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import whole
 
@@ -34,6 +35,11 @@ NOISE = {
     "joint_angle": 3e-4,
 }
 NOMINAL = pamrs.rigs.shoulder()
+
+
+def described(found: Fit, problem: Problem, baseline: Fit) -> str:
+    """A fitted closure in words."""
+    return "\n".join(map(form_sentence, forms_of(found, problem, baseline)))
 
 
 def command(kind: str) -> np.ndarray:
@@ -142,7 +148,7 @@ def test_a_hidden_torque_is_modelled_and_predicts_what_was_held_out(
     assert found.values["closure_torque.sine_4"] == pytest.approx(2.5, rel=0.1)
     assert 2 <= sum(name.startswith("closure_torque.") for name in found.values) <= _MOST_TERMS + 2
     assert case.gap_closed(found, "arm") > 0.85
-    text = describe_closure(found, case.problem, case.baseline)
+    text = described(found, case.problem, case.baseline)
     assert "a torque is missing" in text
     assert "sin(4 a)" in text
     assert "rate dependent" in text
@@ -159,7 +165,7 @@ def test_hysteresis_of_another_form_is_a_memory_of_the_way(monkeypatch: pytest.M
     found = case.found(monkeypatch, case.blocks)
     assert found is not None
     assert case.gap_closed(found, "arm") > 0.3  # the parameters take their part of a friction
-    assert "rate independent" in describe_closure(found, case.problem, case.baseline)
+    assert "rate independent" in described(found, case.problem, case.baseline)
 
 
 def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -168,9 +174,7 @@ def test_a_hidden_flow_is_modelled(monkeypatch: pytest.MonkeyPatch) -> None:
     assert found is not None
     assert found.values["closure_flow.pressure"] < 0.0
     assert case.gap_closed(found, "chamber") > 0.85
-    assert "a flow into the chamber is missing" in describe_closure(
-        found, case.problem, case.baseline
-    )
+    assert "a flow into the chamber is missing" in described(found, case.problem, case.baseline)
 
 
 @pytest.mark.parametrize("names", [("arm",), ("supply", "chamber")])
@@ -202,7 +206,7 @@ def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(DiagnosisError, match="blocks"):
         find_closure(case.problem, NOMINAL, case.baseline, case.autocorrelation, [], lambda _: None)
     with pytest.raises(DiagnosisError, match="closure_torque"):
-        describe_closure(case.baseline, case.problem, case.baseline)
+        described(case.baseline, case.problem, case.baseline)
     prepared = case.problem.recordings[0]
     given = ("arm", prepared.commands, DT, DT, [0], prepared.signals, prepared.n)
     with pytest.raises(RigError, match="no sum of terms"):

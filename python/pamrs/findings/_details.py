@@ -18,6 +18,7 @@ __all__ = [
     "ConditionMap",
     "Considered",
     "Curves",
+    "Form",
     "NextExperiment",
     "PairExperiment",
     "Protocol",
@@ -148,6 +149,39 @@ class Protocol(Entry):
         columns = np.column_stack([self.time, *self.commands.values()])
         rows = [",".join(f"{value:.9g}" for value in row) for row in columns]
         return "\n".join([",".join(headings), *rows]) + "\n"
+
+
+@dataclass(frozen=True, eq=False)
+class Form(Entry):
+    """What a mismatch without a name in one block is a function of.
+
+    Attributes
+    ----------
+    block, covers : str
+        The block, and what it covers.
+    closure : str
+        Id of the closure that was fitted.
+    effective, largest : float
+        Root mean square over the recordings, and the 99th percentile of its size [SI].
+    taken : float
+        Share of the block's mismatch that it takes.
+    shares : dict of str to float
+        Share of each kind of dependence (``static``, ``even``, ``odd``, ``time``, ``distance``).
+    memory : dict of str to float or None
+        Time [s] or distance [rad] over which it remembers, by kind.
+    terms : dict of str to (float, float)
+        Coefficient of each term and its standard deviation [SI].
+    """
+
+    block: str
+    covers: str
+    closure: str
+    effective: float
+    largest: float
+    taken: float
+    shares: dict[str, float]
+    memory: dict[str, float | None]
+    terms: dict[str, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)

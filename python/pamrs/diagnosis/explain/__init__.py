@@ -1,18 +1,18 @@
 """From judged hypotheses to an answer: where and when, in words, the model, its traces.
 
-Public: `assemble`, `data_used`, `describe_closure`, `misread_diagnosis` (units first).
+Public: `assemble`, `data_used`, `forms_of` (what has no name), `misread_diagnosis` (units first).
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.explain._assemble import assemble
-from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._data_used import data_used
+from pamrs.diagnosis.explain._forms import forms_of
 from pamrs.diagnosis.explain._misread import misread_diagnosis
 
 __all__ = [
     "assemble",
     "data_used",
-    "describe_closure",
+    "forms_of",
     "misread_diagnosis",
 ]

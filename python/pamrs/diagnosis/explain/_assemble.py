@@ -21,8 +21,8 @@ from pamrs.diagnosis.evidence import (
 )
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
-from pamrs.diagnosis.explain._closure_words import describe_closure
 from pamrs.diagnosis.explain._conditions import Picture, describe
+from pamrs.diagnosis.explain._forms import forms_of
 from pamrs.diagnosis.fit import (
     CHOSEN,
     Key,
@@ -61,6 +61,7 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.recordings import Case
+from pamrs.report.forms import form_sentence
 from pamrs.report.verdict import unknown_volumes
 from pamrs.report.verdict import verdict as verdict_in_words
 from pamrs.rig import Rig
@@ -189,7 +190,8 @@ def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
     for group in (j.group for j in judged if j.verdict == "unlisted"):
         if group.closure is not None:
             own = replace(fitted, blocks=group.blocks)
-            text = describe_closure(group.closure.fit, own, group.candidates[0].fit)
+            told = forms_of(group.closure.fit, own, group.candidates[0].fit)
+            text = "\n".join(map(form_sentence, told))
             found |= dict.fromkeys((b.name for b in group.blocks), text)
     return found
 
