@@ -88,7 +88,7 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
     [
         (_hypotheses, ("freed", "inclusion", "beside_wrong", "considered")),
         (_conclude, ("budget", "free_run")),
-        (pamrs.diagnosis, ("next_experiment",)),
+        (pamrs.diagnosis, ("next_to_record",)),
         (_assemble, ("describe",)),
     ],
 )

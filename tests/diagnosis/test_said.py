@@ -20,7 +20,7 @@ from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_as
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.model import _conclude, _free_run
 from pamrs.diagnosis.model._free_run import _OFF_NOISES
-from pamrs.diagnosis.next_experiment._asked import _telling, next_experiment
+from pamrs.diagnosis.next_experiment._asked import _telling, next_to_record
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
 from pamrs.experiments import experiments_of
@@ -168,7 +168,7 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     quiet = judge([Group(blocks, {}, {}, [base], {"": 1.0}, None, {}, [])], SETTINGS)
 
     def told(problem: Problem, *off: str) -> str:
-        return next_experiment("none", [], [], RIG, quiet, problem, problem, off).text
+        return next_to_record("none", [], [], RIG, quiet, problem, problem, off).text
 
     assert told(problem).startswith("The answer is settled")
     # a block that has the channel is asked, without one what surrounds it

@@ -29,7 +29,7 @@ from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
 from pamrs.diagnosis.model import conclude
-from pamrs.diagnosis.next_experiment import next_experiment
+from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
 from pamrs.diagnosis.prepare import (
     Block,
@@ -306,7 +306,7 @@ def _physics(
     found = conclude(case.rig, inner, outer, groups)
     proposal = inner.losses.part(
         "the next experiment",
-        lambda: next_experiment(
+        lambda: next_to_record(
             found.models.verdict,
             found.ambiguity,
             found.hypotheses(inner),

@@ -1,6 +1,6 @@
 """What to record next, and what some channels could tell before anything is recorded.
 
-Public: `next_experiment` (what a diagnosis asks for); `propose`, `Outcome`, `Hypothesis`,
+Public: `next_to_record` (what a diagnosis asks for); `propose`, `Outcome`, `Hypothesis`,
 `outcome_of`, `ranked`, `apart`, `information`, `entropy`, `spoken` (experiments compared); `Plan`,
 `Sight`, `Addition`, `plan_diagnosis` (before there are data); `Left`, `Linear`,
 `checked_channels`, `measurable`, `counted`, `difference`, `linear`, `misfit`, `problem_of`,
@@ -10,7 +10,7 @@ record at all is in :mod:`pamrs.experiments`.
 
 from __future__ import annotations
 
-from pamrs.diagnosis.next_experiment._asked import next_experiment
+from pamrs.diagnosis.next_experiment._asked import next_to_record
 from pamrs.diagnosis.next_experiment._choice import (
     Hypothesis,
     Outcome,
@@ -57,7 +57,7 @@ __all__ = [
     "linear",
     "measurable",
     "misfit",
-    "next_experiment",
+    "next_to_record",
     "noise_of",
     "outcome_of",
     "plan_diagnosis",

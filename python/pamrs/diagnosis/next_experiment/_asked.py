@@ -16,6 +16,7 @@ from pamrs.diagnosis.evidence import Judged, is_parameter
 from pamrs.diagnosis.fit import Problem, depends, without_term
 from pamrs.diagnosis.next_experiment._choice import Hypothesis, apart, outcome_of, propose, spoken
 from pamrs.diagnosis.next_experiment._differences import noise_of
+from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.prepare import Block, Prepared
 from pamrs.effects import info_of, is_effect
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
@@ -35,7 +36,7 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, regulators_of
 
-__all__ = ["next_experiment"]
+__all__ = ["next_to_record"]
 
 
 @dataclass(frozen=True)
@@ -60,75 +61,7 @@ class _Telling:
     alone: bool = True
 
 
-_LOOPS = _Telling(
-    "nested_triangles",
-    "move slowly through nested loops of three widths, then ten times as fast, inside the "
-    "pressures that are already recorded",
-    "what grows with the speed, with the width of the loop or with neither shows the class of "
-    "what is missing",
-)
-_STROKES = _Telling(
-    "nested_strokes",
-    "hold the pressure and move the length slowly through nested loops of three widths, then "
-    "faster, inside the lengths that are already recorded",
-    "what grows with the speed, with the width of the loop or with neither shows the class of "
-    "what is missing",
-    alone=False,
-)
-_SHUT = _Telling(
-    "step_and_shut",
-    "step the pressure by two sizes, 1:3, inside the pressures that are already recorded, shut the "
-    "air in after each step and watch for 4 s",
-    "what goes on while the air is shut in is the chamber's own, what fades within seconds is heat "
-    "or a lag, what is there only during the step goes with the flow",
-)
-_HOLDS = _Telling(
-    "sealed_hold",
-    "fill to three pressures, inside those that are already recorded, shut the air in at each and "
-    "hold it for 16 s",
-    "what the supply pressure does while the air is shut in is the supply's own, what it does only "
-    "while air is drawn goes with the flow",
-    alone=False,
-)
-_LEAKS = replace(
-    _HOLDS,
-    shows="what the pressure goes on losing while the air is shut in, in proportion to itself, is "
-    "a leak; what stops within seconds is heat; what turns its sign with the pressure is the "
-    "valve's null",
-)
-_SET = _Telling(
-    "set_steps",
-    "step the set pressure by two sizes, 1:3, up and down, inside the pressures that are already "
-    "recorded, and keep each for 5 s",
-    "what comes late is a lag, what is less the more air flows is a droop or a restriction, what "
-    "stays away from the set pressure at rest is an offset or a dead band",
-)
-_KEPT = _Telling(
-    "set_steps",
-    "step the pressure by two sizes, 1:3, up and down, inside the pressures that are already "
-    "recorded, and keep each for 5 s",
-    "what comes late is a lag, what grows with the flow is the valve's, what the valves have to "
-    "make good while the pressure rests is a leak",
-)
-_ONCE_MORE = _Telling(
-    "hold_low",
-    "repeat the hold at a third of the pressure",
-    "repeated with the chamber removed (transducer and fittings alone), a leak of the chamber "
-    "scales with absolute pressure and goes with it; cooling, the bench's own loss and the "
-    "transducer's drift stay",
-)
-_BLOWN = replace(
-    _ONCE_MORE,
-    text="let it blow down from a third of the pressure",
-    shows="an opening lets through the same share of the pressure at every pressure, and a hold "
-    "with the outlet shut shows what else the chamber loses",
-)
-_OVER = _Telling(
-    "blow_over",
-    "fill one chamber, open what lies between and let it blow over into the others",
-    "how the flow goes with both pressures shows what the way between lets through, and what the "
-    "chambers lose together is a leak",
-)
+_TELLINGS = {name: _Telling(**own) for name, own in words("telling").items()}
 
 
 def _telling(block: Block, rig: Rig, names: Iterable[str] = ()) -> _Telling:
@@ -136,20 +69,20 @@ def _telling(block: Block, rig: Rig, names: Iterable[str] = ()) -> _Telling:
     catalogue says what tells them, else whatever is missing.
     """
     if block.mechanical:
-        return _STROKES if has_frame(rig) else _LOOPS
+        return _TELLINGS["strokes" if has_frame(rig) else "loops"]
     if is_sealed(rig):
         if _joining(block, rig):
-            return _OVER
+            return _TELLINGS["over"]
         lines = rig.tables("line") or rig.tables("muscle")
-        return _BLOWN if lines else _ONCE_MORE
+        return _TELLINGS["blown" if lines else "once_more"]
     if regulators_of(rig) and not rig.tables("valve"):
-        return _SET
+        return _TELLINGS["set"]
     if not all(can_shut(rig, chain) for chain in _driving(block, rig)):
-        return _KEPT
+        return _TELLINGS["kept"]
     asked = {dict(info_of(n).excitation).get("kind") for n in names if is_effect(n)}
-    if block.kind != "supply" and _LEAKS.kind in asked:
-        return _LEAKS
-    return _HOLDS if block.kind == "supply" else _SHUT
+    if block.kind != "supply" and _TELLINGS["leaks"].kind in asked:
+        return _TELLINGS["leaks"]
+    return _TELLINGS["holds" if block.kind == "supply" else "shut"]
 
 
 def _driving(block: Block, rig: Rig) -> list[Chain]:
@@ -234,7 +167,7 @@ class _Question:
         """
         telling, rig = _telling(block, self.nominal, open_), self.nominal
         names = [telling.kind]
-        if telling is _OVER:
+        if telling is _TELLINGS["over"]:
             names = [f"{telling.kind}.{name}" for name in _joining(block, rig)]
         elif telling.alone and len(chains_of(rig)) > 1:  # no chain but those that drive the block
             names = [f"{telling.kind}.{chain.name}" for chain in _driving(block, rig)]
@@ -256,7 +189,7 @@ class _Question:
         return self.made[names]
 
 
-def next_experiment(
+def next_to_record(
     verdict: str,
     ambiguity: list[list[str]],
     hypotheses: Sequence[Hypothesis],

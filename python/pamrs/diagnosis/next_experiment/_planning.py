@@ -47,6 +47,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     weights_of,
 )
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
+from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -85,38 +86,6 @@ BASIC = (
     "slow_strokes",
 )
 """Kinds of experiments that a plan assumes by default, those of them that the rig can do."""
-_LUMPED = {
-    "supply and valve": (
-        "what leaves the tank by itself and what the valve takes are one sum in its pressure; only "
-        "that follows the command"
-    ),
-    "supply and line": (
-        "what leaves the tank by itself and what the line takes are one sum in its pressure; only "
-        "that follows the flow"
-    ),
-    "regulator and valve": "what the regulator gives and what the valve takes are one sum",
-    "valve, line and chamber": (
-        "no pressure is measured between the valve's outlet and the muscle, nor the temperature of "
-        "the gas"
-    ),
-    "line and chamber": "no pressure is measured along the line, nor the temperature of the gas",
-    "regulator, line and chamber": (
-        "no pressure is measured between the regulator and the chamber, nor the temperature of "
-        "the gas"
-    ),
-    "regulator, valve, line and chamber": (
-        "no pressure is measured in front of the valve nor between its outlet and the muscle, nor "
-        "the temperature of the gas"
-    ),
-    "muscle, joint and arm": "neither force nor torque is measured between the muscle and the arm",
-}
-"""Why a block lumps what it covers."""
-
-
-_BEHIND_LINE = (
-    "it is predicted from the command, through the line; what shows here and not at the line's "
-    "inlet lies behind the valve"
-)
 _Place = tuple[Block, str]
 """A block, and the name of an experiment."""
 
@@ -424,7 +393,7 @@ def _layers(
 def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
     lines = {qualified("line", n): ends["to"] for n, ends in rig.ports("line").items()}
     behind = any(lines.get(b.name) == block.name for b in blocks if b.name in lines)
-    why = _LUMPED.get(block.covers.partition(" of ")[0], "")
+    why = words("lumped").get(block.covers.partition(" of ")[0], "")
     if block.thermometer:
         why = why.removesuffix(", nor the temperature of the gas")
     return {
@@ -432,7 +401,7 @@ def _described(rig: Rig, block: Block, blocks: list[Block]) -> dict[str, Any]:
         "channel": block.channel,
         "drives": list(block.drives),
         "covers": block.covers,
-        "why": _BEHIND_LINE
+        "why": words("lumped")["behind_line"]
         if behind and "valve" in block.covers and block.kind == "chamber"
         else why,
     }
