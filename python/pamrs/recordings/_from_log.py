@@ -24,7 +24,7 @@ from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
 from pamrs.units import same_dimension, to_si
 
-__all__ = ["Clocks", "load_recordings", "recordings_of"]
+__all__ = ["Clocks", "check_asked", "completed", "load_recordings", "recordings_of"]
 
 _ROLES: Final = ("fit", "held_out")
 
@@ -92,12 +92,7 @@ def load_recordings(
     """
     file = Path(path)
     source = str(file)
-    if role not in _ROLES:
-        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
-    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise RecordingError(
-            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
-        )
+    check_asked(source, role, sample_time)
     sources = read_sources(channels, source)
     constants = [item for item in sources if not item.column]
     sources = [item for item in sources if item.column]
@@ -108,16 +103,47 @@ def load_recordings(
     content = log or read_log(file, form)
     stem = re.sub(r"\.[^.]*$", "", file.name.removesuffix(".gz"))
     found = recordings_of(content, sources, clock, name or stem, role, sample_time, cut, pieces)
-    made = []
-    for recording in found:
-        whole = _completed(replace(recording, source=source), [*sources, *constants])
-        absolute = [item.channel for item in (*sources, *constants) if item.absolute]
-        made.append(made_gauge(whole, absolute, ambient_pressure).between(start, stop))
-    return made
+    every = [*sources, *constants]
+    made = [completed(each, every, source, ambient_pressure) for each in found]
+    return [each.between(start, stop) for each in made]
 
 
-def _completed(recording: Recording, sources: Sequence[Source]) -> Recording:
-    """A recording with its constant channels, and what is said of all."""
+def check_asked(source: str, role: str, sample_time: float | None) -> None:
+    """Refuse a role or a spacing of samples that there is not.
+
+    Raises
+    ------
+    RecordingError
+        Naming the value and what is allowed.
+    """
+    if role not in _ROLES:
+        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
+    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
+        raise RecordingError(
+            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
+        )
+
+
+def completed(
+    recording: Recording, sources: Sequence[Source], source: str, ambient_pressure: float | None
+) -> Recording:
+    """A recording with its constant channels, its units and pressures that are gauge.
+
+    Parameters
+    ----------
+    recording : Recording
+        As it was read.
+    sources : sequence of Source
+        All its channels.
+    source : str
+        The file.
+    ambient_pressure : float, optional
+        What is subtracted from absolute pressures where none was recorded [Pa].
+
+    Returns
+    -------
+    Recording
+    """
     channels, masks = dict(recording.channels), dict(recording.mask)
     units = dict(recording.units)
     for item in sources:
@@ -125,11 +151,12 @@ def _completed(recording: Recording, sources: Sequence[Source]) -> Recording:
             channels[item.channel] = np.full(len(recording), float(item.si(item.value)))
             masks[item.channel] = np.ones(len(recording), dtype=bool)
             units[item.channel] = _si_unit(item)
-    return replace(
+    whole = replace(
         recording,
         channels=channels,
         mask=masks,
         units=units,
+        source=source,
         said={item.channel: item.unit for item in sources},
         notes={
             item.channel: f"is assumed to be in {item.unit}: {item.assumed}"
@@ -137,6 +164,8 @@ def _completed(recording: Recording, sources: Sequence[Source]) -> Recording:
             if item.assumed
         },
     )
+    absolute = [item.channel for item in sources if item.absolute]
+    return made_gauge(whole, absolute, ambient_pressure)
 
 
 def _si_unit(item: Source) -> str:
@@ -281,7 +310,8 @@ class Clocks:
         if key not in self._made:
             found, others = self._stamps(series, clock)
             if not np.isfinite(found).any():
-                raise RecordingError(f"{self.log.path}: {series.name!r} has no time at all")
+                where = f": {clock.column!r} has no number" if clock.column else ""
+                raise RecordingError(f"{self.log.path}: {series.name!r} has no time at all{where}")
             self._made[key] = ticks(found, others)
         return self._made[key]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import math
 import os
 import re
 from collections.abc import Mapping, Sequence
@@ -11,18 +10,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-import numpy as np
-
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import RecordingError, joined
-from pamrs.recordings._clock import Array
-from pamrs.recordings._doubts import made_gauge, unit_trouble
+from pamrs.recordings._doubts import unit_trouble
+from pamrs.recordings._from_log import check_asked, completed, recordings_of
+from pamrs.recordings._mapping import Clock, Source
 from pamrs.recordings._recording import Issue, Recording
-from pamrs.recordings._several_clocks import recording_of, sampled
-from pamrs.recordings._stamps import Ticks, ticks
-from pamrs.recordings.logs import read_log, table_of
+from pamrs.recordings.logs import Log, Series, read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, thousands_of
-from pamrs.units import measured_from, parse_unit
+from pamrs.units import measured_from
 
 __all__ = ["load_recording"]
 
@@ -81,12 +77,7 @@ def load_recording(
     """
     file = Path(path)
     source = str(file)
-    if role not in ("fit", "held_out"):
-        raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
-    if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
-        raise RecordingError(
-            f"{source}: sample_time = {sample_time!r} s is not allowed: a positive number is needed"
-        )
+    check_asked(source, role, sample_time)
     if len(delimiter) != 1:
         raise RecordingError(
             f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
@@ -102,35 +93,22 @@ def load_recording(
     else:
         table = table_of(read_log(file))
     wanted = _understood(_headings(table, columns, source), source)
-    remarks = [("time", text) for text in table.remarks]
-    raw, units = _si_columns(table, wanted, source, thousands, decimal, remarks)
+    if "time" not in wanted and sample_time is None:
+        raise RecordingError(
+            f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)"
+        )
+    log, missing = _log(file, table, wanted, thousands, decimal)
     stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
-    said = {channel: unit for channel, (_, unit, _) in wanted.items() if channel != "time"}
-    clock = _clock(raw, source, sample_time)
-    channels = [sampled(channel, raw[channel], clock, units[channel]) for channel in said]
-    remarks += [("time", text) for text in (*clock.remarks, clock.spread[1]) if text]
-    remarks += [(channel.name, text) for channel in channels for text in channel.remarks]
-    recording = recording_of(name or stem, role, channels, source, sample_time, said)
-    issues = [Issue("log", channel, 0.0, recording.duration, text) for channel, text in remarks]
-    recording = replace(recording, source=source, said=said, issues=[*issues, *recording.issues])
-    absolute = [channel for channel, (*_, absolute) in wanted.items() if absolute]
-    return made_gauge(recording, absolute, ambient_pressure)
-
-
-def _clock(raw: dict[str, Array], source: str, sample_time: float | None) -> Ticks:
-    """When the rows of a table were taken."""
-    time = raw.pop("time", None)
-    if time is None:
-        if sample_time is None:
-            raise RecordingError(
-                f"{source}: column 'time' is missing (give sample_time if the rows are evenly "
-                "spaced)"
-            )
-        rows = np.arange(len(next(iter(raw.values()))), dtype=np.float64)
-        return ticks(np.asarray(rows * sample_time))
-    if not np.isfinite(time).any():
-        raise RecordingError(f"{source}: column 'time' has no value at all")
-    return ticks(time, list(raw.values()))
+    clock = Clock("time", wanted["time"][1]) if "time" in wanted else Clock()
+    sources = [
+        Source(channel, channel, unit, absolute)
+        for channel, (_, unit, absolute) in wanted.items()
+        if channel != "time"
+    ]
+    (made,) = recordings_of(log, sources, clock, name or stem, role, sample_time)
+    issues = [Issue("log", channel, 0.0, made.duration, text) for channel, text in missing]
+    made = replace(made, issues=[*issues, *made.issues])
+    return completed(made, sources, source, ambient_pressure)
 
 
 # ------------------------------------------------------------------------- columns
@@ -199,33 +177,25 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
     return wanted
 
 
-def _si_columns(
+def _log(
+    file: Path,
     table: Table,
     wanted: Mapping[str, tuple[int, str, bool]],
-    source: str,
     thousands: str | Mapping[str, str] | None,
     decimal: str,
-    remarks: list[tuple[str, str]],
-) -> tuple[dict[str, Array], dict[str, str]]:
-    """Values and units of the columns in SI; what is no number counts as missing, and is said."""
+) -> tuple[Log, list[tuple[str, str]]]:
+    """The channels of a table as series; what is no number counts as missing, and is said."""
     if isinstance(thousands, Mapping):
         strange = [key for key in thousands if key not in wanted]
         if strange:
             raise RecordingError(
-                f"{source}: thousands names {strange[0]!r}, but the channels are: "
-                f"{', '.join(wanted)}"
+                f"{file}: thousands names {strange[0]!r}, but the channels are: {', '.join(wanted)}"
             )
-    raw: dict[str, Array] = {}
-    units: dict[str, str] = {}
+    series: dict[str, Series] = {}
+    remarks: list[tuple[str, str]] = []
     for name, (index, unit, _) in wanted.items():
         mark = thousands_of(thousands, name)
-        numbers, missing = table.samples(index, f"{name} [{unit}]", source, mark, decimal)
+        values, missing = table.samples(index, f"{name} [{unit}]", str(file), mark, decimal)
         remarks += [(name, missing)] if missing else []
-        parsed = parse_unit(unit)
-        values: Array = np.asarray(numbers * parsed.scale + parsed.offset, dtype=np.float64)
-        values[~np.isfinite(values)] = np.nan
-        raw[name] = values
-        units[name] = CHANNELS[channel_of(name)].unit
-        if channel_of(name) == "reference" and parsed.dimension != parse_unit("rad").dimension:
-            units[name] = "Pa"
-    return raw, units
+        series[name] = Series(name, values, unit)
+    return Log(file, series, remarks=table.remarks), remarks
