@@ -310,7 +310,7 @@ class Clocks:
         if key not in self._made:
             found, others = self._stamps(series, clock)
             if not np.isfinite(found).any():
-                where = f": {clock.column!r} has no number" if clock.column else ""
+                where = f": column {clock.column!r} has no value at all" if clock.column else ""
                 raise RecordingError(f"{self.log.path}: {series.name!r} has no time at all{where}")
             self._made[key] = ticks(found, others)
         return self._made[key]
