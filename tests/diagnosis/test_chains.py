@@ -24,12 +24,13 @@ from pamrs.experiments import (
     Experiment,
     can_shut,
     chains_of,
+    commands_for,
     experiments_of,
     library,
     pressure_range,
     protocol_of,
 )
-from pamrs.experiments._chains import BANDWIDTH, commands_for, driving
+from pamrs.experiments._chains import driving
 from pamrs.experiments._maker import _shares, _turned, rows
 from pamrs.experiments._protocols import _LEAST_HIGHEST
 from pamrs.recordings import Recording, load_recording
@@ -103,7 +104,7 @@ def test_pressures_follow_references_of_their_own() -> None:
     time = 0.01 * np.arange(1501)
     wave = 0.6e5 * np.sin(2.0 * np.pi * 0.1 * time)
     wanted = {"flexor": 3e5 + wave, "extensor": 3e5 - wave}
-    sent = commands_for(JOINT, wanted, sample_time=0.01, bandwidth=BANDWIDTH)
+    sent = commands_for(JOINT, wanted, sample_time=0.01)
     assert list(sent) == ["valve_command.flexor", "valve_command.extensor"]
     found = pamrs.simulate(JOINT, sample_time=0.01, **driving(sent))
     for side in SIDES:
@@ -124,7 +125,7 @@ def test_valves_that_switch_hold_a_pressure(carrier: bool) -> None:
     reference = np.interp(
         0.01 * np.arange(901), [0.0, 1.0, 4.0, 5.0, 9.0], [2e5, 3e5, 3e5, 1e5, 1e5]
     )
-    sent = commands_for(rig, {"": reference}, sample_time=0.01, bandwidth=BANDWIDTH)
+    sent = commands_for(rig, {"": reference}, sample_time=0.01)
     found = pamrs.simulate(rig, sample_time=0.01, **driving(sent))["muscle_pressure"]
     for begin, level in ((250, 3e5), (700, 1e5)):
         assert float(np.mean(found[begin : begin + 150])) == pytest.approx(level, abs=0.2e5)

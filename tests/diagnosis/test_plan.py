@@ -15,8 +15,7 @@ from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _KNOWN_SHARE, _free
 from pamrs.effects import CATALOGUE, EFFECTS
-from pamrs.experiments import library, pressure_range, trial_of
-from pamrs.experiments._chains import BANDWIDTH
+from pamrs.experiments import commands_for, library, pressure_range
 from pamrs.simulation import core_rig
 
 SETTINGS = DiagnosisSettings()
@@ -39,7 +38,7 @@ def test_commands_are_found_for_the_gas_of_the_rig(gas: tuple[float, float]) -> 
         {"gas.gas_constant": constant, "gas.heat_capacity_ratio": ratio}
     )
     reference = np.interp(np.arange(401) * 0.01, [0.0, 1.0, 2.0, 4.0], [0.0, 1e5, 1e5, 3e5])
-    command = trial_of(rig, reference, sample_time=0.01, bandwidth=BANDWIDTH)
+    (command,) = commands_for(rig, {"": reference}, sample_time=0.01).values()
     found = pamrs.simulate(rig, command, sample_time=0.01)["muscle_pressure"]
     assert np.abs(found - reference)[50:].max() < 0.1e5
 

@@ -3,7 +3,8 @@
 Public: `library`, `experiments_of` (all that a rig can do; as high and as fast as was recorded);
 `Experiment`, `protocol_of` (one of them, and its commands as a file); `Chain`, `chains_of`,
 `can_shut`, `is_sealed`, `joined` (what is commanded); `Range`, `pressure_range` (how far);
-`Rates`, `Seen` (how fast a load frame moves); `trial_of` (commands for a pressure).
+`Rates`, `Seen` (how fast a load frame moves); `commands_for` (what makes pressures follow
+references).
 """
 
 from __future__ import annotations
@@ -13,10 +14,10 @@ from pamrs.experiments._chains import (
     Range,
     can_shut,
     chains_of,
+    commands_for,
     is_sealed,
     joined,
     pressure_range,
-    trial_of,
 )
 from pamrs.experiments._experiment import Experiment, protocol_of
 from pamrs.experiments._frame import Rates, Seen
@@ -30,11 +31,11 @@ __all__ = [
     "Seen",
     "can_shut",
     "chains_of",
+    "commands_for",
     "experiments_of",
     "is_sealed",
     "joined",
     "library",
     "pressure_range",
     "protocol_of",
-    "trial_of",
 ]

@@ -35,10 +35,8 @@ __all__ = [
     "is_sealed",
     "joined",
     "pressure_range",
-    "sent_for",
     "spans_of",
     "top_of",
-    "trial_of",
 ]
 
 BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are found on the model
@@ -294,43 +292,19 @@ class _Valve:
         return float(self.null + side * self.half * duty)
 
 
-def commands_for(
+def _valve_commands(
     rig: Rig,
     references: Mapping[str, Array],
     *,
     sample_time: float,
-    bandwidth: float,
+    bandwidth: float = BANDWIDTH,
     shut: Mapping[str, Mask] | None = None,
     dither: Array | None = None,
     initial: Mapping[str, float] | None = None,
     length: Array | None = None,
 ) -> dict[str, Array]:
-    """Commands that make the pressures of a rig's chains follow references.
-
-    Parameters
-    ----------
-    rig : Rig
-        A rig with valves.
-    references : mapping of str to (n,) array
-        Gauge pressure [Pa] by the name of each chain.
-    sample_time : float
-        Time between samples [s].
-    bandwidth : float
-        Of the loops [rad/s].
-    shut : mapping of str to (n,) bool array, optional
-        By chain: samples at which its valves are shut (the null voltage, or no flow of a valve that
-        switches).
-    dither : (n,) array, optional
-        Added to every command [V].
-    initial : mapping, optional
-        As for :func:`pamrs.simulate`.
-    length : (n,) array, optional
-        What a load frame prescribes meanwhile [m]; needed where there is one.
-
-    Returns
-    -------
-    dict of str to (n,) array
-        Commands [V] by channel.
+    """Valve commands [V] by channel that make pressures follow references, as of
+    :func:`commands_for`.
     """
     chains = [chain for chain in chains_of(rig) if chain.name in references]
     n = next(iter(references.values())).size
@@ -369,7 +343,7 @@ def commands_for(
     return {channel: np.ascontiguousarray(found[channel][:n]) for channel in channels}
 
 
-def sent_for(
+def commands_for(
     rig: Rig, references: Mapping[str, Array], *, length: Array | None = None, **options: Any
 ) -> dict[str, Array]:
     """What is sent to a rig so that the pressures of its chains follow references.
@@ -383,7 +357,10 @@ def sent_for(
     length : (n,) array, optional
         What its load frame prescribes [m]; needed where there is one.
     **options
-        As for :func:`commands_for`; of what is set to its pressure they mean nothing.
+        ``sample_time`` [s]; of valves ``bandwidth`` of the loops by which their commands are found
+        [rad/s], ``shut`` (by chain (n,) bool: samples at which its valves are shut: the null
+        voltage, or no flow of a valve that switches), ``dither`` ((n,) array added to every command
+        [V]) and ``initial`` (as for :func:`pamrs.simulate`).
 
     Returns
     -------
@@ -392,41 +369,10 @@ def sent_for(
     """
     chains = [chain for chain in chains_of(rig) if chain.name in references]
     if chains[0].valves:
-        sent = commands_for(rig, references, length=length, **options)
+        sent = _valve_commands(rig, references, length=length, **options)
     else:
         sent = {chain.commands[0]: references[chain.name] for chain in chains}
     return sent if length is None else {**sent, "length": length}
-
-
-def trial_of(
-    rig: Rig, reference: Array, *, sample_time: float, bandwidth: float, **options: Any
-) -> Array:
-    """Valve commands that make the muscle pressure of a rig of one chain follow a reference.
-
-    Parameters
-    ----------
-    rig : Rig
-        A rig of one chain with a valve.
-    reference : (n,) array
-        Gauge pressure [Pa].
-    sample_time : float
-        Time between samples [s].
-    bandwidth : float
-        Of the loop [rad/s].
-    **options
-        ``shut`` ((n,) bool array: samples at which the command is the null voltage), ``dither``
-        ((n,) array added to the command [V]), ``initial`` (as for :func:`pamrs.simulate`).
-
-    Returns
-    -------
-    (n,) array
-        Command [V].
-    """
-    shut = {"": options.pop("shut")} if "shut" in options else None
-    found = commands_for(
-        rig, {"": reference}, sample_time=sample_time, bandwidth=bandwidth, shut=shut, **options
-    )
-    return next(iter(found.values()))
 
 
 def _source(rig: Rig, chain: Chain) -> float:
@@ -570,7 +516,7 @@ def pressure_range(
 def _played(rig: Rig, references: Mapping[str, Array]) -> Simulation:
     """A rig whose chains follow pressures at 100 Hz, regulators by being set to them."""
     try:
-        commands = sent_for(rig, references, sample_time=0.01, bandwidth=BANDWIDTH)
+        commands = commands_for(rig, references, sample_time=0.01)
         return simulate(rig, sample_time=0.01, **driving(commands))
     except SimulationError as error:
         raise DiagnosisError(
@@ -643,9 +589,9 @@ def spans_of(
     alone = {}
     for chain in chains:
         still: dict[str, Array] = {
-            c.name: _line(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
+            c.name: np.interp(time, [0.0, 2.0], [c.before(rig), held[c.name]]) for c in chains
         }
-        moving = _line(
+        moving = np.interp(
             time,
             [0.0, 2.0, _RAMP_TIME],
             [chain.before(rig), 0.1 * tops[chain.name], tops[chain.name]],
@@ -653,11 +599,6 @@ def spans_of(
         found = _played(rig, {**still, chain.name: moving})
         alone[chain.name] = _free(rig, chain, [chain], found, tops[chain.name], first=200)
     return Spans(held, alone)
-
-
-def _line(time: Array, at: Sequence[float], values: Sequence[float]) -> Array:
-    """Straight lines through values at some times."""
-    return np.asarray(np.interp(time, at, values), dtype=np.float64)
 
 
 def _free(

@@ -25,10 +25,10 @@ from pamrs.experiments._chains import (
     Range,
     Spans,
     can_shut,
+    commands_for,
+    driving,
     pressure_range,
-    sent_for,
     spans_of,
-    trial_of,
 )
 from pamrs.experiments._experiment import Experiment, in_bar, in_mm, limited, other_payload
 from pamrs.experiments._frame import Frame
@@ -274,7 +274,7 @@ class Maker:
                 inside = np.clip(length, self.frame.lengths.low, self.frame.lengths.high)
                 length = limited(inside, self.frame.rate * self.dt)
         options.setdefault("bandwidth", row.get("bandwidth", BANDWIDTH))
-        (channel, command), *more = sent_for(
+        (channel, command), *more = commands_for(
             rig, references, length=length, sample_time=self.dt, initial=initial, **options
         ).items()
         seconds, name = (command.size - 1) * self.dt, row["name"] + moved
@@ -438,8 +438,8 @@ class Maker:
         pressure, (angle,) = self.spans.alone[""].at(0.5), chain.moves
         joint = self.rig.tables("joint")[angle.partition(".")[2]]
         slow = np.interp(np.arange(601) * 0.01, [0.0, 3.0], [0.0, pressure])
-        command = trial_of(self.rig, slow, sample_time=0.01, bandwidth=BANDWIDTH)
-        rest = float(simulate(self.rig, command, sample_time=0.01)[angle][-1])
+        sent = commands_for(self.rig, {"": slow}, sample_time=0.01)
+        rest = float(simulate(self.rig, sample_time=0.01, **driving(sent))[angle][-1])
         turned = rest + 0.15 * (joint["max_angle"] - joint["min_angle"])
         turned = min(turned, joint["max_angle"] - 0.05)
         reference = np.full(round(row["start"][-1][0] / self.dt) + 1, pressure)
