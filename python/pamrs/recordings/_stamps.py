@@ -29,52 +29,6 @@ __all__ = [
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-#: Words that name a series of times.
-CLOCK_WORDS: Final = frozenset(
-    {
-        "t",
-        "time",
-        "times",
-        "zeit",
-        "timestamp",
-        "timestamps",
-        "stamp",
-        "stamps",
-        "ts",
-        "seconds",
-        "sec",
-        "secs",
-        "clock",
-        "when",
-        "tijd",
-        "tiempo",
-        "temps",
-        "tempo",
-        "millis",
-        "micros",
-        "nanos",
-        "ms",
-        "us",
-        "ns",
-        "msec",
-        "usec",
-        "nsec",
-        "nsecs",
-        "milliseconds",
-        "microseconds",
-        "nanoseconds",
-        "elapsed",
-        "epoch",
-        "uptime",
-        "datetime",
-        "datum",
-        "uhrzeit",
-        "zeitstempel",
-        "zeitpunkt",
-        "laufzeit",
-        "date",
-    }  # fmt: skip
-)
 _NAMED: Final = {
     word: unit
     for unit, words in {
@@ -85,6 +39,14 @@ _NAMED: Final = {
     }.items()
     for word in words.split()
 }
+_CLOCKS: Final = (
+    "t time times zeit timestamp timestamps stamp stamps ts seconds sec secs clock when tijd "
+    "tiempo temps tempo millis micros nanos ms us ns msec usec nsec nsecs milliseconds "
+    "microseconds nanoseconds elapsed epoch uptime datetime datum uhrzeit zeitstempel zeitpunkt "
+    "laufzeit date"
+)
+#: Words that name a series of times.
+CLOCK_WORDS: Final = frozenset(_CLOCKS.split())
 _FINER: Final = ("s", "ms", "us", "ns")
 _EPOCH: Final = (9.4e8, 2.1e9)  # seconds since 1970 of the years 2000 to 2036
 _SLOWEST: Final = 60.0  # seconds between samples of a log with such stamps
