@@ -132,7 +132,7 @@ test-python-all: build
 
 snapshots: build  ## write the files of the work done anew, where it has changed on purpose
 	PAMRS_SNAPSHOTS=write $(BIN)/python -m pytest -q tests/work
-	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --test work
+	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --test laws work::
 
 hostile: build  ## the table of hostile inputs that were tried, and what each came to
 	$(BIN)/python -m tests.hostile
@@ -145,7 +145,7 @@ EXAMPLES ?= 20000
 fuzz: export PROPTEST_CASES = $(EXAMPLES)
 fuzz: build  ## rigs, commands, states and bytes of logs changed at random (EXAMPLES=100000 for hours)
 	PAMRS_FUZZ=$(EXAMPLES) $(BIN)/python -m pytest -q tests/hostile/test_fuzz.py
-	$(CARGO) test --quiet --release -p pam-core $(LOCKED) --test fuzz
+	$(CARGO) test --quiet --release -p pam-core $(LOCKED) --test laws fuzz::
 
 deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
 	@command -v cargo-deny > /dev/null || { echo "cargo-deny is not installed; it is with: cargo install --locked cargo-deny"; exit 1; }

@@ -1,6 +1,6 @@
 """A new effect through the whole package: a Rust file, a file of words and a class of the trial.
 
-The core's tests use the Rust file as it stands (crates/pam-core/tests/toy_effect.rs). Here the
+The core's tests use the Rust file as it stands (crates/pam-core/tests/laws/toy_effect.rs). Here the
 extension is built with it in the catalogue (feature `toy`), beside a copy of the package that has
 its words; `toy_case.py` then runs with that copy.
 """

@@ -1,11 +1,9 @@
 //! Effects against what is known in closed form, and the order of convergence with them.
 
-mod rigs;
-
+use crate::rigs::{effect, lone_tank, regulated, shoulder, TYPICAL};
 use pam_core::description::{ArmSpec, EffectSpec, JointSpec, LinkSpec};
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{effect, lone_tank, regulated, shoulder, TYPICAL};
 
 const AMBIENT: f64 = 101_325.0;
 const RT: f64 = 287.05 * 293.15;

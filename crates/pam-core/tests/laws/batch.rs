@@ -11,7 +11,7 @@ use std::sync::Arc;
 const TIMING: Timing = Timing { sample_time: 0.002, substeps: 2 };
 
 fn rig() -> Arc<Rig> {
-    Arc::new(Rig::new(RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()).unwrap())
+    Arc::new(Rig::new(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()).unwrap())
 }
 
 /// The same with an effect, which lanes do not know.
@@ -262,7 +262,7 @@ fn a_bad_command_is_an_error_or_the_end_of_its_row() {
 fn what_does_not_fit_is_named_with_its_row() {
     let base = rig();
     let other = Arc::new(
-        Rig::new(RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()).unwrap(),
+        Rig::new(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()).unwrap(),
     );
     let mut spec = base.spec().clone();
     spec.muscles[0].name = "flexor".into();

@@ -1,12 +1,12 @@
 //! Plants side by side against each of them alone.
 
-mod rigs;
-
 use pam_core::lanes::{simulate as side_by_side, Outcome, Reduce, Reduction, Request, Signal};
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::run::Run;
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::Rig;
+
+use crate::rigs;
 
 const ROWS: usize = 161;
 const TIMING: Timing = Timing { sample_time: 0.005, substeps: 5 };

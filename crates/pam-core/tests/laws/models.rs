@@ -5,7 +5,7 @@ use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
 use pam_core::simulate::{simulate, Initial, Timing};
 use pam_core::{Rig, RigSpec};
 
-const SHOULDER: &str = include_str!("data/shoulder.json");
+const SHOULDER: &str = include_str!("../data/shoulder.json");
 const GEOMETRIES: [&str; 3] = ["cylinder", "elliptic", "elliptic_published"];
 
 fn spec(model: &str, geometry: &str) -> MuscleSpec {

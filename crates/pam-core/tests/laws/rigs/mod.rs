@@ -1,5 +1,4 @@
 //! Rigs that several tests use.
-#![allow(dead_code)]
 
 use pam_core::description::{
     dotted, ArmSpec, ChamberSpec, EffectSpec, JointSpec, LineSpec, LinkSpec, TransmissionSpec,
@@ -9,7 +8,7 @@ use pam_core::RigSpec;
 
 /// One link, six muscles, a valve and a tank.
 pub fn shoulder() -> RigSpec {
-    RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()
+    RigSpec::from_json(include_str!("../../data/shoulder.json")).unwrap()
 }
 
 /// The same rig, its gases with an energy balance.

@@ -9,8 +9,7 @@ use pam_core::simulate::{drive::Drive, simulate, Initial, Progress, Timing, Traj
 use pam_core::{Rig, RigSpec};
 use std::f64::consts::PI;
 
-mod rigs;
-use rigs::shoulder;
+use crate::rigs::shoulder;
 
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;

@@ -7,8 +7,7 @@ use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
-mod rigs;
-use rigs::{antagonists, shoulder, two_joints, with_struts};
+use crate::rigs::{antagonists, shoulder, two_joints, with_struts};
 
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;

@@ -1,8 +1,10 @@
 //! Laws of every effect: off it changes nothing, its sensitivities are those of differences, a
 //! restart is bit for bit, one block can be named, and every kind of rig takes it.
 
-mod rigs;
-
+use crate::rigs::{
+    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints,
+    with_struts, Typical, FORMS, TYPICAL,
+};
 use pam_core::cut_chain::{predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::description::EffectSpec;
@@ -10,10 +12,6 @@ use pam_core::effects::EFFECTS;
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{
-    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints,
-    with_struts, Typical, FORMS, TYPICAL,
-};
 
 const DT: f64 = 0.01;
 const TIMING: Timing = Timing { sample_time: DT, substeps: 10 };

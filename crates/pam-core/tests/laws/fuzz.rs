@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use serde_json::Value;
 
-const SHOULDER: &str = include_str!("data/shoulder.json");
+const SHOULDER: &str = include_str!("../data/shoulder.json");
 /// Steps of a sample that a test waits for.
 const MOST_STEPS: usize = 20_000;
 

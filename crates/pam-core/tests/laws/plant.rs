@@ -9,7 +9,7 @@ use pam_core::{Error, Rig, RigSpec};
 use std::collections::BTreeMap;
 
 fn spec() -> RigSpec {
-    RigSpec::from_json(include_str!("data/shoulder.json")).unwrap()
+    RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()
 }
 
 fn effect(id: &str, parameters: &[(&str, f64)]) -> EffectSpec {

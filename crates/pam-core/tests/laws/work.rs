@@ -6,14 +6,14 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use crate::rigs::{
+    antagonists, effect, lone_tank, regulated, rig_for, shoulder, two_joints, TYPICAL,
+};
 use pam_core::batch::Batch;
 use pam_core::lanes::{simulate as side_by_side, Request, Signal, Spent};
 use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
 use pam_core::simulate::{Initial, Timing};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect, lone_tank, regulated, rig_for, shoulder, two_joints, TYPICAL};
-
-mod rigs;
 
 const GEOMETRIES: [&str; 3] = ["cylinder", "elliptic", "elliptic_published"];
 const SAMPLE: Timing = Timing { sample_time: 0.1, substeps: 1 };

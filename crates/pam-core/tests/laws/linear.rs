@@ -2,13 +2,11 @@
 //! effects move. That they are the differences of simulations is tested from Python, for every
 //! packaged rig.
 
-mod rigs;
-
+use crate::rigs::{antagonists, effect_at, regulated, rig_for, shoulder, two_joints, TYPICAL};
 use pam_core::effects::{Role, EFFECTS};
 use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::{Initial, Progress};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect_at, regulated, rig_for, shoulder, two_joints, TYPICAL};
 
 fn linearised(rig: &Rig, side: Side) -> LinearModel {
     let start = Initial::rest(rig).with(rig, &rig.names().initial[1].0, 2e5).unwrap();

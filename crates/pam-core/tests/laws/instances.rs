@@ -1,8 +1,9 @@
 //! Several instances of one effect, each at its own block with its own parameters, and what cannot
 //! be together.
 
-mod rigs;
-
+use crate::rigs::{
+    antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, TYPICAL,
+};
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
 use pam_core::effects::{
@@ -11,7 +12,6 @@ use pam_core::effects::{
 };
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, TYPICAL};
 
 const ROWS: usize = 60;
 const TIMING: Timing = Timing { sample_time: 0.01, substeps: 10 };

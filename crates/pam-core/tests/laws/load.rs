@@ -6,7 +6,7 @@ use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
-const SHOULDER: &str = include_str!("data/shoulder.json");
+const SHOULDER: &str = include_str!("../data/shoulder.json");
 
 fn rig(kind: &str, mass: f64, friction: f64) -> Rig {
     let mut spec = RigSpec::from_json(SHOULDER).unwrap();

@@ -1,13 +1,11 @@
 //! A gas with a thermometer: its temperature is predicted from the run of its pressure, and both
 //! begin at what the thermometer reads.
 
-mod rigs;
-
+use crate::rigs::{effect, shoulder, warm};
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-use rigs::{effect, shoulder, warm};
 
 const DT: f64 = 0.01;
 const ROWS: usize = 160;

@@ -1,11 +1,9 @@
-//! A new effect is one file: `toy/toy_spring.rs`, which the core does not know, acts in a rig as
+//! A new effect is one file: `../toy/toy_spring.rs`, which the core does not know, acts in a rig as
 //! those of the catalogue do. The same file is an entry of the catalogue where the feature `toy` is
 //! on (tests/effects/test_toy.py).
 
-mod rigs;
-#[path = "toy/toy_spring.rs"]
-mod toy_spring;
-
+use crate::rigs::{effect_at, shoulder, two_joints};
+use crate::toy_spring::{INFO, RELAXING, SECANT};
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
 use pam_core::effects::{EffectInfo, Role};
@@ -13,10 +11,6 @@ use pam_core::plant::{ParameterId, StateRole};
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
-// What the file of an effect takes from the crate that it belongs to.
-use pam_core::{blocks, effects, made_by, scalar};
-use rigs::{effect_at, shoulder, two_joints};
-use toy_spring::{INFO, RELAXING, SECANT};
 
 static TOY: &[&EffectInfo] = &[&INFO];
 const DT: f64 = 0.01;
