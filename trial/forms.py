@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from .effects.base import (
     Setting,
     Start,
     State,
+    drawn,
     either_sign,
     uniform,
 )
@@ -39,17 +40,10 @@ def sonic(pressure: float, ambient: float, conductance: float, ratio: float = 0.
 
 
 @dataclass(frozen=True)
-class OrificeTankLeak(Effect):
+class OrificeTankLeak(Effect, id="supply_leak", block="supply", graded=("conductance",)):
     """Hole in the tank: a sonic conductance C [m3/(s Pa)]."""
 
-    id: ClassVar[str] = "supply_leak"
-    block: ClassVar[str] = "supply"
-    graded: ClassVar[tuple[str, ...]] = ("conductance",)
-    conductance: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.8e-11, 1.4e-11))
+    conductance: float = drawn(0.8e-11, 1.4e-11)
 
     def tank(self, env: Env, first: int) -> Port:
         pa, c = env.par.ambient, self.conductance
@@ -58,17 +52,10 @@ class OrificeTankLeak(Effect):
 
 
 @dataclass(frozen=True)
-class Play(Effect):
+class Play(Effect, id="valve_hysteresis", block="valve", graded=("half_width",)):
     """Play of the spool of +- `half_width` of half the stroke."""
 
-    id: ClassVar[str] = "valve_hysteresis"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("half_width",)
-    half_width: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.0015, 0.003))
+    half_width: float = drawn(0.0015, 0.003)
 
     def most(self) -> float:
         return 0.1 / max(self.half_width, 1e-9)
@@ -84,18 +71,11 @@ class Play(Effect):
 
 
 @dataclass(frozen=True)
-class FadingLeakage(Effect):
+class FadingLeakage(Effect, id="valve_centre_leakage", block="valve", graded=("conductance",)):
     """Leakage of both lands, sonic conductance [m3/(s Pa)] that fades as ``exp(-|x|/reach)``."""
 
-    id: ClassVar[str] = "valve_centre_leakage"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("conductance",)
-    conductance: float
-    reach: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.8e-11, 1.5e-11), uniform(rng, 0.02, 0.05))
+    conductance: float = drawn(0.8e-11, 1.5e-11)
+    reach: float = drawn(0.02, 0.05)
 
     def gap(self, env: Env, first: int) -> Port:
         c, reach, pa = self.conductance, self.reach, env.par.ambient
@@ -108,21 +88,14 @@ class FadingLeakage(Effect):
 
 
 @dataclass(frozen=True)
-class JitterDelay(Effect):
+class JitterDelay(Effect, id="input_path_lag", block="valve", graded=("pure",)):
     """Dead time [s] of the command that jitters: the far end reads it on a clock of its own, so
     that up to `jitter` of the delay comes or goes from sample to sample.
     """
 
-    id: ClassVar[str] = "input_path_lag"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("pure",)
-    pure: float
-    jitter: float
-    beat: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.012, 0.02), uniform(rng, 0.3, 0.6), uniform(rng, 3.0, 7.0))
+    pure: float = drawn(0.012, 0.02)
+    jitter: float = drawn(0.3, 0.6)
+    beat: float = drawn(3.0, 7.0)
 
     def most(self) -> float:
         return 0.2 / max(self.pure, 1e-9)
@@ -147,20 +120,13 @@ class JitterDelay(Effect):
 
 
 @dataclass(frozen=True)
-class ElasticHose(Effect):
+class ElasticHose(Effect, id="tube_flow_restriction", block="line", graded=("turbulent",)):
     """Hose that widens with pressure: ``pv^2 - p^2 = b m |m| / (1 + pg/pe)^4``; the transducer sits
     at the valve.
     """
 
-    id: ClassVar[str] = "tube_flow_restriction"
-    block: ClassVar[str] = "line"
-    graded: ClassVar[tuple[str, ...]] = ("turbulent",)
-    turbulent: float
-    pressure: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e15, 2.0e15), uniform(rng, 1.0e6, 2.0e6))
+    turbulent: float = drawn(1.0e15, 2.0e15)
+    pressure: float = drawn(1.0e6, 2.0e6)
 
     def line(self, env: Env) -> Port:
         b, pe, pa = self.turbulent, self.pressure, env.par.ambient
@@ -173,12 +139,9 @@ class ElasticHose(Effect):
 
 
 @dataclass(frozen=True)
-class SealLeak(Effect):
+class SealLeak(Effect, id="leak_muscle", block="chamber", graded=("conductance",)):
     """Seal at the end fitting that leaks only where the muscle is shorter than `onset` [m]."""
 
-    id: ClassVar[str] = "leak_muscle"
-    block: ClassVar[str] = "chamber"
-    graded: ClassVar[tuple[str, ...]] = ("conductance",)
     conductance: float
     onset: float
     width: float
@@ -198,18 +161,11 @@ class SealLeak(Effect):
 
 
 @dataclass(frozen=True)
-class CrackLeak(Effect):
+class CrackLeak(Effect, id="leak_muscle", block="chamber", graded=("rate",)):
     """Leak through cracks: ``m = k pg^n`` with the flow `rate` [kg/s] at 4 bar gauge."""
 
-    id: ClassVar[str] = "leak_muscle"
-    block: ClassVar[str] = "chamber"
-    graded: ClassVar[tuple[str, ...]] = ("rate",)
-    rate: float
-    exponent: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.6e-4, 1.2e-4), uniform(rng, 1.1, 1.4))
+    rate: float = drawn(0.6e-4, 1.2e-4)
+    exponent: float = drawn(1.1, 1.4)
 
     def leak(self, env: Env) -> Port:
         pa = env.par.ambient
@@ -221,29 +177,14 @@ class CrackLeak(Effect):
 
 
 @dataclass(frozen=True)
-class LuGre(Effect):
+class LuGre(Effect, id="muscle_hysteresis", block="muscle", graded=("friction",), scales=(0.001,)):
     """Bristles of the braid whose stiffness falls with pressure, ``z' = v - |v| z / d(pg)``, on a
     friction proportional to gauge pressure; `friction` [N] at 4 bar, `distance` d [m] there.
     """
 
-    id: ClassVar[str] = "muscle_hysteresis"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("friction",)
-    friction: float
-    distance: float
-    loss: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 450.0, 800.0), uniform(rng, 0.6e-3, 1.5e-3), uniform(rng, 0.005, 0.02)
-        )
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0e-3]
+    friction: float = drawn(450.0, 800.0)
+    distance: float = drawn(0.6e-3, 1.5e-3)
+    loss: float = drawn(0.005, 0.02)
 
     def force(self, env: Env, first: int) -> Port:
         def resist(pg: float, x: float, v: float, y: State, d: State) -> float:
@@ -257,25 +198,12 @@ class LuGre(Effect):
 
 
 @dataclass(frozen=True)
-class OneWay(Effect):
+class OneWay(Effect, id="muscle_hysteresis", block="muscle", graded=("friction",), scales=(1.0,)):
     """Dahl friction of the braid, proportional to gauge pressure and wider while it lengthens."""
 
-    id: ClassVar[str] = "muscle_hysteresis"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("friction",)
-    friction: float
-    distance: float
-    share: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 500.0, 800.0), uniform(rng, 0.6e-3, 1.8e-3), uniform(rng, 0.2, 0.5))
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0]
+    friction: float = drawn(500.0, 800.0)
+    distance: float = drawn(0.6e-3, 1.8e-3)
+    share: float = drawn(0.2, 0.5)
 
     def force(self, env: Env, first: int) -> Port:
         def resist(pg: float, x: float, v: float, y: State, d: State) -> float:
@@ -288,27 +216,16 @@ class OneWay(Effect):
 
 
 @dataclass(frozen=True)
-class ForceRelaxation(Effect):
+class ForceRelaxation(
+    Effect, id="muscle_creep", block="muscle", graded=("share",), scales=(1.0e3,)
+):
     """A share of the muscles' whole force lags by `time_constant` [s]: it falls at rest."""
 
-    id: ClassVar[str] = "muscle_creep"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("share",)
-    share: float
-    time_constant: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.02, 0.04), uniform(rng, 2.0, 8.0))
+    share: float = drawn(0.02, 0.04)
+    time_constant: float = drawn(2.0, 8.0)
 
     def most(self) -> float:
         return 0.4 / self.share if self.share else 1.0
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0e3]
 
     def force(self, env: Env, first: int) -> Port:
         pull = env.tables.pull
@@ -322,19 +239,12 @@ class ForceRelaxation(Effect):
 
 
 @dataclass(frozen=True)
-class Viscous(Effect):
+class Viscous(Effect, id="muscle_rate_damping", block="muscle", graded=("constant", "slope")):
     """``F = (b0 + b1 pg) v``, `lengthening` times as much while the muscle lengthens."""
 
-    id: ClassVar[str] = "muscle_rate_damping"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("constant", "slope")
-    constant: float
-    slope: float
-    lengthening: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 500.0, 1500.0), uniform(rng, 0.005, 0.015), uniform(rng, 0.3, 0.9))
+    constant: float = drawn(500.0, 1500.0)
+    slope: float = drawn(0.005, 0.015)
+    lengthening: float = drawn(0.3, 0.9)
 
     def force(self, env: Env, first: int) -> Port:
         def resist(pg: float, x: float, v: float, y: State, d: State) -> float:
@@ -345,17 +255,10 @@ class Viscous(Effect):
 
 
 @dataclass(frozen=True)
-class ExponentialOnset(Effect):
+class ExponentialOnset(Effect, id="activation_pressure", block="muscle", graded=("threshold",)):
     """Pressure spent on the bladder, ``lost = th (1 - exp(-pg/th))``."""
 
-    id: ClassVar[str] = "activation_pressure"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("threshold",)
-    threshold: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 5.0e3, 15.0e3))
+    threshold: float = drawn(5.0e3, 15.0e3)
 
     def lost_pressure(self, env: Env) -> Port:
         th = self.threshold
@@ -363,17 +266,10 @@ class ExponentialOnset(Effect):
 
 
 @dataclass(frozen=True)
-class DeadBand(Effect):
+class DeadBand(Effect, id="activation_pressure", block="muscle", graded=("threshold",)):
     """Nothing happens below a gauge pressure `threshold` [Pa], which stays lost above it."""
 
-    id: ClassVar[str] = "activation_pressure"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("threshold",)
-    threshold: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 5.0e3, 15.0e3))
+    threshold: float = drawn(5.0e3, 15.0e3)
 
     def lost_pressure(self, env: Env) -> Port:
         th = self.threshold
@@ -381,27 +277,16 @@ class DeadBand(Effect):
 
 
 @dataclass(frozen=True)
-class PressureSoftening(Effect):
+class PressureSoftening(
+    Effect, id="mullins_softening", block="muscle", graded=("damage",), scales=(1.0e5,)
+):
     """Softening below the largest gauge pressure of the past; state: that pressure [Pa]."""
 
-    id: ClassVar[str] = "mullins_softening"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("damage",)
-    damage: float
-    width: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.05, 0.1), uniform(rng, 0.5e5, 1.2e5))
+    damage: float = drawn(0.05, 0.1)
+    width: float = drawn(0.5e5, 1.2e5)
 
     def most(self) -> float:
         return 0.9 / self.damage if self.damage else 1.0
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0e5]
 
     def elastic(self, env: Env, first: int) -> Port:
         pa = env.par.ambient
@@ -422,25 +307,13 @@ class PressureSoftening(Effect):
 
 
 @dataclass(frozen=True)
-class AngleFriction(Effect):
+class AngleFriction(Effect, id="joint_coulomb_stribeck", block="joint", graded=("friction",)):
     """Break-away friction of a joint whose bearing is tighter at some angles (rad)."""
 
-    id: ClassVar[str] = "joint_coulomb_stribeck"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("friction",)
-    friction: float
-    speed: float
-    order: float
-    phase: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 1.0, 2.0),
-            uniform(rng, 0.1, 0.3),
-            uniform(rng, 2.0, 4.0),
-            uniform(rng, 0.0, 6.0),
-        )
+    friction: float = drawn(1.0, 2.0)
+    speed: float = drawn(0.1, 0.3)
+    order: float = drawn(2.0, 4.0)
+    phase: float = drawn(0.0, 6.0)
 
     def torque(self, env: Env, first: int) -> Port:
         def drag(angle: float, rate: float, pg: float, y: State, d: State) -> float:
@@ -453,12 +326,9 @@ class AngleFriction(Effect):
 
 
 @dataclass(frozen=True)
-class SlidingMass(Effect):
+class SlidingMass(Effect, id="payload_change", block="arm", graded=("mass",), scales=(1.0,)):
     """Mass [kg] that slides along the arm by `way` [m] when it is steep; state: its place, 0..1."""
 
-    id: ClassVar[str] = "payload_change"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("mass",)
     mass: float
     way: float
     angle: float
@@ -476,12 +346,6 @@ class SlidingMass(Effect):
     def most(self) -> float:
         return 6.0 / self.mass if self.mass else 1.0
 
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0]
-
     def torque(self, env: Env, first: int) -> Port:
         lever = self.mass * env.par.gravity * self.way
 
@@ -494,15 +358,11 @@ class SlidingMass(Effect):
 
 
 @dataclass(frozen=True)
-class Waves(Effect):
+class Waves(Effect, id="external_torque", block="arm", graded=("size",), needs_clock=True):
     """Torque [N m] on the arm as a sum of sines of angular frequencies [rad/s]: a steady vibration
     (one or two), or wind (many, the slow ones stronger).
     """
 
-    id: ClassVar[str] = "external_torque"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("size",)
-    needs_clock: ClassVar[bool] = True
     size: tuple[float, ...]
     rate: tuple[float, ...]
     phase: tuple[float, ...]
@@ -533,14 +393,11 @@ class Waves(Effect):
 
 
 @dataclass(frozen=True)
-class TwoOpenings(Effect):
+class TwoOpenings(Effect, id="valve_area", block="valve", graded=("difference",)):
     """A share `difference` more opening where the valve fills, less where it vents; no wider than
     the stroke.
     """
 
-    id: ClassVar[str] = "valve_area"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("difference",)
     difference: float
 
     @classmethod
@@ -557,12 +414,9 @@ class TwoOpenings(Effect):
 
 
 @dataclass(frozen=True)
-class BentOpening(Effect):
+class BentOpening(Effect, id="valve_area", block="valve", graded=("bend",)):
     """Opening that bends over the stroke, ``x (1 + b (1 - |x|))``; the ends stay."""
 
-    id: ClassVar[str] = "valve_area"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("bend",)
     bend: float
 
     @classmethod
@@ -578,26 +432,18 @@ class BentOpening(Effect):
 
 
 @dataclass(frozen=True)
-class FirstOrderReading(Effect):
+class FirstOrderReading(
+    Effect, id="pressure_lag", block="sensors", graded=("lag",), scales=(1.0e5,)
+):
     """First-order lag [s] of the transducer of the muscle pressure."""
 
-    id: ClassVar[str] = "pressure_lag"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("lag",)
-    lag: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.02, 0.03))
+    lag: float = drawn(0.02, 0.03)
 
     def most(self) -> float:
         return 0.5 / max(self.lag, 1e-9)
 
     def start(self, at: Start) -> State:
         return [at.pressure]
-
-    def sizes(self) -> State:
-        return [1.0e5]
 
     def follow(self, env: Env, first: int) -> Port:
         # a lag below 0.3 ms cannot be seen and would only make the equations stiff
@@ -617,19 +463,12 @@ class FirstOrderReading(Effect):
 
 
 @dataclass(frozen=True)
-class ClockJitter(Effect):
+class ClockJitter(Effect, id="clock_skew", block="sensors", graded=("offset",)):
     """Log of the pressures whose stamps are late by `offset` [s] and wander by a share of it."""
 
-    id: ClassVar[str] = "clock_skew"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("offset",)
-    offset: float
-    share: float
-    beat: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 6.0e-3, 12.0e-3), uniform(rng, 0.4, 0.8), uniform(rng, 3.0, 9.0))
+    offset: float = drawn(6.0e-3, 12.0e-3)
+    share: float = drawn(0.4, 0.8)
+    beat: float = drawn(3.0, 9.0)
 
     def most(self) -> float:
         return 0.3 / max(abs(self.offset), 1e-9)

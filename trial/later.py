@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from .effects.base import (
     Setting,
     Start,
     State,
+    drawn,
     either_sign,
     uniform,
 )
@@ -29,12 +30,9 @@ _LEAST = 3.0e-4
 
 
 @dataclass(frozen=True)
-class OffsetMass(Effect):
+class OffsetMass(Effect, id="com_offset", block="arm", graded=("angle",)):
     """Centre of mass beside the line of the arm, by an angle [rad] seen from the joint."""
 
-    id: ClassVar[str] = "com_offset"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("angle",)
     angle: float
 
     @classmethod
@@ -50,14 +48,11 @@ class OffsetMass(Effect):
 
 
 @dataclass(frozen=True)
-class SaggingMass(Effect):
+class SaggingMass(Effect, id="com_offset", block="arm", graded=("angle",)):
     """Payload on a bracket that sags: its angle beside the line [rad] is larger by a share `sag`
     where the arm hangs, as the weight pulls along the bracket where it is level.
     """
 
-    id: ClassVar[str] = "com_offset"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("angle",)
     angle: float
     sag: float
 
@@ -79,14 +74,11 @@ class SaggingMass(Effect):
 
 
 @dataclass(frozen=True)
-class LiquidMass(Effect):
+class LiquidMass(Effect, id="com_offset", block="arm", graded=("angle",), scales=(1.0,)):
     """Half-full vessel as payload: its centre of mass runs to the lower side, late by
     `time_constant` [s]. State: the angle beside the line [rad] in parts of `angle`.
     """
 
-    id: ClassVar[str] = "com_offset"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("angle",)
     angle: float
     time_constant: float
     tilt: float
@@ -109,9 +101,6 @@ class LiquidMass(Effect):
     def start(self, at: Start) -> State:
         return [self.place(at.angle)]
 
-    def sizes(self) -> State:
-        return [1.0]
-
     def torque(self, env: Env, first: int) -> Port:
         moment = self.angle * env.par.weight
 
@@ -123,17 +112,10 @@ class LiquidMass(Effect):
 
 
 @dataclass(frozen=True)
-class LateAngle(Effect):
+class LateAngle(Effect, id="sensor_lag", block="sensors", graded=("late",)):
     """Angle that is logged late by `late` [s], the pressures not."""
 
-    id: ClassVar[str] = "sensor_lag"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("late",)
-    late: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 6.0e-3, 14.0e-3))
+    late: float = drawn(6.0e-3, 14.0e-3)
 
     def most(self) -> float:
         return 0.4 / max(self.late, 1e-9)
@@ -143,28 +125,18 @@ class LateAngle(Effect):
 
 
 @dataclass(frozen=True)
-class FilteredAngle(Effect):
+class FilteredAngle(Effect, id="sensor_lag", block="sensors", graded=("lag",), scales=(1.0,)):
     """Angle behind a low pass of first order with a time constant `lag` [s]. State: what it gives
     out.
     """
 
-    id: ClassVar[str] = "sensor_lag"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("lag",)
-    lag: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 8.0e-3, 20.0e-3))
+    lag: float = drawn(8.0e-3, 20.0e-3)
 
     def most(self) -> float:
         return 0.4 / max(self.lag, 1e-9)
 
     def start(self, at: Start) -> State:
         return [at.angle]
-
-    def sizes(self) -> State:
-        return [1.0]
 
     def follow(self, env: Env, first: int) -> Port:
         if self.lag < _LEAST:
@@ -182,21 +154,14 @@ class FilteredAngle(Effect):
 
 
 @dataclass(frozen=True)
-class JitteringAngle(Effect):
+class JitteringAngle(Effect, id="sensor_lag", block="sensors", graded=("late",)):
     """Angle over a bus that is busy: late by `late` [s], and now and then by a share more or
     less.
     """
 
-    id: ClassVar[str] = "sensor_lag"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("late",)
-    late: float
-    share: float
-    beat: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 6.0e-3, 14.0e-3), uniform(rng, 0.4, 0.8), uniform(rng, 1.0, 5.0))
+    late: float = drawn(6.0e-3, 14.0e-3)
+    share: float = drawn(0.4, 0.8)
+    beat: float = drawn(1.0, 5.0)
 
     def most(self) -> float:
         return 0.3 / max(self.late, 1e-9)
@@ -211,13 +176,9 @@ class JitteringAngle(Effect):
 
 
 @dataclass(frozen=True)
-class Drift(Effect):
+class Drift(Effect, id="parameter_drift", block="muscle", graded=("change",), needs_clock=True):
     """Base: the force of the bladder, all that its moduli make, changes by a share."""
 
-    id: ClassVar[str] = "parameter_drift"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("change",)
-    needs_clock: ClassVar[bool] = True
     change: float
 
     def most(self) -> float:

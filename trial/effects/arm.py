@@ -4,15 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, either_sign, uniform
+from .base import (
+    RECORDING_PERIOD,
+    Effect,
+    Env,
+    Port,
+    Setting,
+    Start,
+    State,
+    drawn,
+    either_sign,
+    uniform,
+)
 
 
 @dataclass(frozen=True)
-class PayloadSwing(Effect):
+class PayloadSwing(Effect, id="payload_swing", block="arm", graded=("share",), scales=(1.0, 1.0)):
     """Part of the payload hangs on a rope of `length` [m] and swings, braked by the air:
     ``-q phi' |phi'|``.
 
@@ -20,31 +31,13 @@ class PayloadSwing(Effect):
     the vertical [rad] and its rate.
     """
 
-    id: ClassVar[str] = "payload_swing"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("share",)
-    share: float
-    length: float
-    drag: float
-    loss: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 0.01, 0.02),
-            uniform(rng, 0.12, 0.45),
-            uniform(rng, 0.02, 0.1),
-            uniform(rng, 0.003, 0.02),
-        )
+    share: float = drawn(0.01, 0.02)
+    length: float = drawn(0.12, 0.45)
+    drag: float = drawn(0.02, 0.1)
+    loss: float = drawn(0.003, 0.02)
 
     def most(self) -> float:
         return 1.0 / self.share if self.share else 1.0
-
-    def start(self, at: Start) -> State:
-        return [0.0, 0.0]
-
-    def sizes(self) -> State:
-        return [1.0, 1.0]
 
     def motion(self, env: Env, first: int) -> Port:
         par = env.par
@@ -84,17 +77,13 @@ def _ease(s: float) -> float:
 
 
 @dataclass(frozen=True)
-class PayloadChange(Effect):
+class PayloadChange(Effect, id="payload_change", block="arm", graded=("mass",), needs_clock=True):
     """Mass is added or taken during a recording, over a time as with sand or a gripper.
 
     One entry per event: `time` [s] (recording number times 1000 plus the time in it), `mass` [kg],
     `span` [s]. Every recording starts with the nominal load.
     """
 
-    id: ClassVar[str] = "payload_change"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("mass",)
-    needs_clock: ClassVar[bool] = True
     time: tuple[float, ...]
     mass: tuple[float, ...]
     span: tuple[float, ...]
@@ -129,7 +118,7 @@ class PayloadChange(Effect):
 
 
 @dataclass(frozen=True)
-class ExternalTorque(Effect):
+class ExternalTorque(Effect, id="external_torque", block="arm", graded=("size",), needs_clock=True):
     """Pushes on the arm: ``tau sin^2`` over a span, with a tail that dies out, at times that no
     command knows.
 
@@ -137,10 +126,6 @@ class ExternalTorque(Effect):
     `span` [s].
     """
 
-    id: ClassVar[str] = "external_torque"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("size",)
-    needs_clock: ClassVar[bool] = True
     time: tuple[float, ...]
     size: tuple[float, ...]
     span: tuple[float, ...]
@@ -178,7 +163,9 @@ class ExternalTorque(Effect):
 
 
 @dataclass(frozen=True)
-class BaseFlexibility(Effect):
+class BaseFlexibility(
+    Effect, id="base_flexibility", block="arm", graded=("compliance",), scales=(0.1, 1.0)
+):
     """Mounting that yields under the joint torque, stiffer when bent further; the encoder sits on
     the joint.
 
@@ -186,28 +173,13 @@ class BaseFlexibility(Effect):
     [Hz], `damping` z, `hardening` r [1/rad2]. States: tilt of the base [rad] and its rate.
     """
 
-    id: ClassVar[str] = "base_flexibility"
-    block: ClassVar[str] = "arm"
-    graded: ClassVar[tuple[str, ...]] = ("compliance",)
-    compliance: float
-    frequency: float
-    damping: float
-    hardening: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 1.0e-5, 2.0e-5),
-            uniform(rng, 3.0, 9.0),
-            uniform(rng, 0.01, 0.05),
-            uniform(rng, 0.0, 200.0),
-        )
+    compliance: float = drawn(1.0e-5, 2.0e-5)
+    frequency: float = drawn(3.0, 9.0)
+    damping: float = drawn(0.01, 0.05)
+    hardening: float = drawn(0.0, 200.0)
 
     def start(self, at: Start) -> State:
         return [-self.compliance * at.weight, 0.0]
-
-    def sizes(self) -> State:
-        return [0.1, 1.0]
 
     def motion(self, env: Env, first: int) -> Port:
         c, w, r, second = self.compliance, 2.0 * math.pi * self.frequency, self.hardening, first + 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
@@ -59,24 +59,37 @@ class Start:
     weight: float
 
 
+def drawn(low: float, high: float) -> Any:
+    """A field that is drawn evenly from a range."""
+    return field(metadata={"drawn": (low, high)})
+
+
 @dataclass(frozen=True)
 class Effect:
     """Base of all effects.
 
     The ports return a function for the right-hand side, or None when the effect does not enter
     there; `first` is the index of the first own state. `graded` names the fields that carry the
-    size: with all of them at zero the plant is as without the effect.
+    size: with all of them at zero the plant is as without the effect. `scales` has the typical
+    size of each own state.
     """
 
     id: ClassVar[str] = ""
     block: ClassVar[str] = ""
     graded: ClassVar[tuple[str, ...]] = ()
     needs_clock: ClassVar[bool] = False
+    scales: ClassVar[tuple[float, ...]] = ()
+
+    def __init_subclass__(cls, **told: Any) -> None:
+        """Take `id`, `block`, `graded`, `needs_clock` and `scales` where a class is declared."""
+        super().__init_subclass__()
+        for name, value in told.items():
+            setattr(cls, name, value)
 
     @classmethod
     def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        """Draw an effect of moderate size."""
-        raise NotImplementedError
+        """Draw an effect of moderate size: every field within the range that it states."""
+        return cls(*(uniform(rng, *f.metadata["drawn"]) for f in fields(cls)))
 
     def scaled(self, factor: float) -> Self:
         """Copy with every graded field multiplied by `factor`."""
@@ -103,11 +116,11 @@ class Effect:
 
     def start(self, at: Start) -> State:
         """Own states at the start of a recording."""
-        return []
+        return [0.0] * len(self.scales)
 
     def sizes(self) -> State:
         """Typical size of each own state, for the error control."""
-        return []
+        return list(self.scales)
 
     def tank(self, env: Env, first: int) -> Port:
         """``f(ps, m_in, y, d)``: added rate of the tank pressure [Pa/s]."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -23,7 +23,7 @@ from .base import (
 
 
 @dataclass(frozen=True)
-class Leak(Effect):
+class Leak(Effect, id="leak_muscle", block="chamber", graded=("coefficient",)):
     """Leak of the muscles to ambient.
 
     `form` is "orifice" (ISO 6358 with `ratio` b: ``C rho0 p sqrt(T0/T) psi``), "crack" (the same
@@ -31,9 +31,6 @@ class Leak(Effect):
     (``k (p^2 - pa^2)``); `coefficient` is C [m3/(s Pa)] or k [kg/(s Pa2)].
     """
 
-    id: ClassVar[str] = "leak_muscle"
-    block: ClassVar[str] = "chamber"
-    graded: ClassVar[tuple[str, ...]] = ("coefficient",)
     form: str
     coefficient: float
     ratio: float = 0.3
@@ -89,7 +86,7 @@ class Leak(Effect):
 
 
 @dataclass(frozen=True)
-class HeatTransfer(Effect):
+class HeatTransfer(Effect, id="heat_transfer", block="chamber", graded=("share",), scales=(30.0,)):
     """Energy balance of the gas with a temperature of its own, in place of the fixed coefficients.
 
     Wall exchange ``h = h0 sqrt(p T / (pa T0))`` [W/(m2 K)] over the inner wall of the muscles,
@@ -97,9 +94,6 @@ class HeatTransfer(Effect):
     follows the balance, the rest follows the fixed coefficients. State: gas temperature [K].
     """
 
-    id: ClassVar[str] = "heat_transfer"
-    block: ClassVar[str] = "chamber"
-    graded: ClassVar[tuple[str, ...]] = ("share",)
     coefficient: float
     jet: float
     share: float
@@ -113,6 +107,3 @@ class HeatTransfer(Effect):
 
     def start(self, at: Start) -> State:
         return [REFERENCE_TEMPERATURE]
-
-    def sizes(self) -> State:
-        return [30.0]

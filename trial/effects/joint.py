@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from .base import Effect, Env, Port, Setting, Start, State, uniform
+from .base import Effect, Env, Port, Setting, State, drawn, uniform
 
 
 @dataclass(frozen=True)
-class Stribeck(Effect):
+class Stribeck(Effect, id="joint_coulomb_stribeck", block="joint", graded=("friction",)):
     """Break-away friction on top of the baseline: ``f / (1 + (w/w_s)^2)`` against the motion, more
     one way.
 
@@ -20,22 +20,10 @@ class Stribeck(Effect):
     sigmoid), `asymmetry` -1..1.
     """
 
-    id: ClassVar[str] = "joint_coulomb_stribeck"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("friction",)
-    friction: float
-    speed: float
-    turn: float
-    asymmetry: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 1.0, 2.0),
-            uniform(rng, 0.04, 0.12),
-            uniform(rng, 4.0e-3, 8.0e-3),
-            uniform(rng, -0.2, 0.2),
-        )
+    friction: float = drawn(1.0, 2.0)
+    speed: float = drawn(0.04, 0.12)
+    turn: float = drawn(4.0e-3, 8.0e-3)
+    asymmetry: float = drawn(-0.2, 0.2)
 
     def torque(self, env: Env, first: int) -> Port:
         f, ws, turn, skew, sqrt = self.friction, self.speed, self.turn, self.asymmetry, math.sqrt
@@ -49,16 +37,13 @@ class Stribeck(Effect):
 
 
 @dataclass(frozen=True)
-class EndStop(Effect):
+class EndStop(Effect, id="joint_end_stop", block="joint", graded=("stiffness",)):
     """Rubber bumper inside the range: progressive, with loss in compression.
 
     ``tau = -k d (1 + (d/d0)^2) (1 + loss rate)``, never pulling; `angle` [rad] where it touches,
     `stiffness` k [N m/rad], `depth` d0 [rad], `loss` [s/rad].
     """
 
-    id: ClassVar[str] = "joint_end_stop"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("stiffness",)
     angle: float
     stiffness: float
     depth: float
@@ -87,7 +72,7 @@ class EndStop(Effect):
 
 
 @dataclass(frozen=True)
-class HoseTorque(Effect):
+class HoseTorque(Effect, id="hose_torque", block="joint", graded=("spring", "slip"), scales=(1.0,)):
     """Hose laid over the joint: a spring that stiffens with pressure and slips in its clamps (in no
     catalogue).
 
@@ -95,9 +80,6 @@ class HoseTorque(Effect):
     [N m] of a Dahl element with the angle `give` [rad].
     """
 
-    id: ClassVar[str] = "hose_torque"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("spring", "slip")
     spring: float
     slip: float
     rest: float
@@ -113,12 +95,6 @@ class HoseTorque(Effect):
             uniform(rng, 0.8e5, 2.0e5),
             math.radians(uniform(rng, 1.0, 4.0)),
         )
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0]
 
     def torque(self, env: Env, first: int) -> Port:
         spring, slip, rest, pr, give, sin = (
@@ -140,20 +116,13 @@ class HoseTorque(Effect):
 
 
 @dataclass(frozen=True)
-class TendonCompliance(Effect):
+class TendonCompliance(Effect, id="tendon_compliance", block="joint", graded=("compliance",)):
     """Tendon and brackets stretch: the muscles shorten further, ``s = c F`` (in no catalogue).
 
     `compliance` c [m/N] for the force F of all muscles; one Newton step on the muscle stiffness.
     """
 
-    id: ClassVar[str] = "tendon_compliance"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("compliance",)
-    compliance: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e-6, 2.0e-6))
+    compliance: float = drawn(1.0e-6, 2.0e-6)
 
     def gear(self, env: Env) -> Port:
         c, pull = self.compliance, env.tables.pull
@@ -169,16 +138,13 @@ class TendonCompliance(Effect):
 
 
 @dataclass(frozen=True)
-class MomentArm(Effect):
+class MomentArm(Effect, id="moment_arm_error", block="joint", graded=("error",)):
     """Tendon geometry wrong by more than its tolerance (in no catalogue).
 
     The muscles see the angle ``a + e sin(n a + phase)``, so force arm and volume stay consistent;
     `error` e [rad], `order` n.
     """
 
-    id: ClassVar[str] = "moment_arm_error"
-    block: ClassVar[str] = "joint"
-    graded: ClassVar[tuple[str, ...]] = ("error",)
     error: float
     order: float
     phase: float

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from .base import Effect, Env, Port, Setting, Start, State, uniform
+from .base import Effect, Env, Port, Setting, Start, State, drawn, uniform
 
 
 @dataclass(frozen=True)
-class Hysteresis(Effect):
+class Hysteresis(Effect, id="muscle_hysteresis", block="muscle", graded=("friction",)):
     """Friction of the braid, scaled by ``gauge pressure / reference_pressure``.
 
     `form` "bouc_wen": one state ``z' = x'/d (1 - |z|^n (beta sgn(x' z) + 1 - beta))``; "dahl_bank":
@@ -20,9 +20,6 @@ class Hysteresis(Effect):
     `distance` [m] have one entry per state; x is the contraction.
     """
 
-    id: ClassVar[str] = "muscle_hysteresis"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("friction",)
     form: str
     friction: tuple[float, ...]
     distance: tuple[float, ...]
@@ -83,7 +80,7 @@ class Hysteresis(Effect):
 
 
 @dataclass(frozen=True)
-class Creep(Effect):
+class Creep(Effect, id="muscle_creep", block="muscle", graded=("stiffness",)):
     """Stress relaxation over three decades: parallel branches whose stiffness falls with their time
     constant.
 
@@ -91,9 +88,6 @@ class Creep(Effect):
     of all muscles and all branches together, time constants [s].
     """
 
-    id: ClassVar[str] = "muscle_creep"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("stiffness",)
     stiffness: float
     power: float
     time_constant: tuple[float, ...]
@@ -133,7 +127,7 @@ class Creep(Effect):
 
 
 @dataclass(frozen=True)
-class RateDamping(Effect):
+class RateDamping(Effect, id="muscle_rate_damping", block="muscle", graded=("damping",)):
     """Shear-thinning friction of the thread in the rubber: ``F = b (1 + pg/p_r) v_r asinh(v/v_r)``,
     weaker on extension.
 
@@ -141,22 +135,10 @@ class RateDamping(Effect):
     `asymmetry` -1..1.
     """
 
-    id: ClassVar[str] = "muscle_rate_damping"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("damping",)
-    damping: float
-    pressure: float
-    speed: float
-    asymmetry: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 1.5e3, 3.0e3),
-            uniform(rng, 0.5e5, 1.5e5),
-            uniform(rng, 0.01, 0.03),
-            uniform(rng, 0.2, 0.5),
-        )
+    damping: float = drawn(1.5e3, 3.0e3)
+    pressure: float = drawn(0.5e5, 1.5e5)
+    speed: float = drawn(0.01, 0.03)
+    asymmetry: float = drawn(0.2, 0.5)
 
     def force(self, env: Env, first: int) -> Port:
         b, pr, vr, skew, asinh, sqrt = (
@@ -177,19 +159,12 @@ class RateDamping(Effect):
 
 
 @dataclass(frozen=True)
-class ActivationPressure(Effect):
+class ActivationPressure(Effect, id="activation_pressure", block="muscle", graded=("threshold",)):
     """Pressure spent on laying the bladder against the braid: ``lost = pg p_th / (pg + p_th)``,
     `threshold` p_th [Pa].
     """
 
-    id: ClassVar[str] = "activation_pressure"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("threshold",)
-    threshold: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 5.0e3, 15.0e3))
+    threshold: float = drawn(5.0e3, 15.0e3)
 
     def lost_pressure(self, env: Env) -> Port:
         th = self.threshold
@@ -197,32 +172,22 @@ class ActivationPressure(Effect):
 
 
 @dataclass(frozen=True)
-class Mullins(Effect):
+class Mullins(Effect, id="mullins_softening", block="muscle", graded=("damage",), scales=(0.05,)):
     """Softening of the bladder below the largest contraction of the past.
 
     The elastic torque falls by ``damage (1 - exp(-(x_max - x)/w))``; `worked` [m] is the
     contraction before the recording, `width` w [m]. State: x_max.
     """
 
-    id: ClassVar[str] = "mullins_softening"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("damage",)
-    damage: float
-    width: float
-    worked: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.05, 0.1), uniform(rng, 4.0e-3, 9.0e-3), uniform(rng, 0.0, 8.0e-3))
+    damage: float = drawn(0.05, 0.1)
+    width: float = drawn(4.0e-3, 9.0e-3)
+    worked: float = drawn(0.0, 8.0e-3)
 
     def most(self) -> float:
         return 0.9 / self.damage if self.damage else 1.0
 
     def start(self, at: Start) -> State:
         return [max(at.contraction, self.worked)]
-
-    def sizes(self) -> State:
-        return [0.05]
 
     def elastic(self, env: Env, first: int) -> Port:
         damage, width, exp = self.damage, self.width, math.exp
@@ -245,7 +210,7 @@ class Mullins(Effect):
 
 
 @dataclass(frozen=True)
-class Crowding(Effect):
+class Crowding(Effect, id="pam_crowding_contact", block="muscle", graded=("stiffness",)):
     """Contact of swelling neighbours: ``F = c pg (x - x_c)^1.5`` against contraction, with a little
     friction.
 
@@ -253,16 +218,9 @@ class Crowding(Effect):
     friction.
     """
 
-    id: ClassVar[str] = "pam_crowding_contact"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("stiffness",)
-    stiffness: float
-    onset: float
-    rubbing: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.1, 0.2), uniform(rng, 0.014, 0.021), uniform(rng, 0.0, 0.15))
+    stiffness: float = drawn(0.1, 0.2)
+    onset: float = drawn(0.014, 0.021)
+    rubbing: float = drawn(0.0, 0.15)
 
     def force(self, env: Env, first: int) -> Port:
         c, onset, rub = self.stiffness, self.onset, self.rubbing
@@ -277,25 +235,16 @@ class Crowding(Effect):
 
 
 @dataclass(frozen=True)
-class Buckling(Effect):
+class Buckling(Effect, id="muscle_buckling", block="muscle", graded=("push",)):
     """Muscles that fold while they carry little pressure push back (in no catalogue).
 
     ``F = F_b (x/w) exp(1 - x/w) / (1 + (pg/p_b)^2)``, `push` F_b [N], `length` w [m], `pressure`
     p_b [Pa].
     """
 
-    id: ClassVar[str] = "muscle_buckling"
-    block: ClassVar[str] = "muscle"
-    graded: ClassVar[tuple[str, ...]] = ("push",)
-    push: float
-    length: float
-    pressure: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 60.0, 120.0), uniform(rng, 3.0e-3, 8.0e-3), uniform(rng, 0.8e5, 1.6e5)
-        )
+    push: float = drawn(60.0, 120.0)
+    length: float = drawn(3.0e-3, 8.0e-3)
+    pressure: float = drawn(0.8e5, 1.6e5)
 
     def force(self, env: Env, first: int) -> Port:
         push, w, pb, exp = self.push, self.length, self.pressure, math.exp

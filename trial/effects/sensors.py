@@ -4,35 +4,36 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
-from .base import RECORDING_PERIOD, Effect, Env, Port, Setting, Start, State, either_sign, uniform
+from .base import (
+    RECORDING_PERIOD,
+    Effect,
+    Env,
+    Port,
+    Setting,
+    Start,
+    State,
+    drawn,
+    either_sign,
+    uniform,
+)
 
 
 @dataclass(frozen=True)
-class PressureLag(Effect):
+class PressureLag(Effect, id="pressure_lag", block="sensors", graded=("lag",), scales=(1.0e5,)):
     """Snubber in front of the muscle pressure transducer: its volume fills faster at high pressure.
 
     ``ps' = (p - ps) p / (lag p_r)`` with `lag` [s] at `pressure` p_r [Pa absolute].
     """
 
-    id: ClassVar[str] = "pressure_lag"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("lag",)
-    lag: float
-    pressure: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.02, 0.03), uniform(rng, 2.0e5, 3.5e5))
+    lag: float = drawn(0.02, 0.03)
+    pressure: float = drawn(2.0e5, 3.5e5)
 
     def start(self, at: Start) -> State:
         return [at.pressure]
-
-    def sizes(self) -> State:
-        return [1.0e5]
 
     def follow(self, env: Env, first: int) -> Port:
         # a lag below 0.3 ms cannot be seen and would only make the equations stiff
@@ -53,7 +54,7 @@ class PressureLag(Effect):
 
 
 @dataclass(frozen=True)
-class ClockSkew(Effect):
+class ClockSkew(Effect, id="clock_skew", block="sensors", graded=("offset", "skew")):
     """Channels from a second logger: their clock starts late and runs fast or slow, and is set back
     now and then.
 
@@ -61,9 +62,6 @@ class ClockSkew(Effect):
     against the command).
     """
 
-    id: ClassVar[str] = "clock_skew"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("offset", "skew")
     offset: float
     skew: float
     channels: str
@@ -91,14 +89,13 @@ class ClockSkew(Effect):
 
 
 @dataclass(frozen=True)
-class GearLash(Effect):
+class GearLash(
+    Effect, id="encoder_gear_lash", block="sensors", graded=("half_play",), scales=(1.0,)
+):
     """Play in the gear of the angle encoder (in no catalogue); `half_play` [rad]. State: angle of
     the encoder.
     """
 
-    id: ClassVar[str] = "encoder_gear_lash"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("half_play",)
     half_play: float
 
     @classmethod
@@ -107,9 +104,6 @@ class GearLash(Effect):
 
     def start(self, at: Start) -> State:
         return [at.angle]
-
-    def sizes(self) -> State:
-        return [1.0]
 
     def tick(self, env: Env, first: int) -> Port:
         half = self.half_play
@@ -124,14 +118,11 @@ class GearLash(Effect):
 
 
 @dataclass(frozen=True)
-class EncoderError(Effect):
+class EncoderError(Effect, id="encoder_error", block="sensors", graded=("first", "second")):
     """Magnetic encoder off its axis: the angle reads ``a + A sin(a + phase) + B sin(2 a + phase) +
     C sin(4 a)``, the last by the iron around it; A, B [rad], C in parts of A.
     """
 
-    id: ClassVar[str] = "encoder_error"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("first", "second")
     first: float
     second: float
     fourth: float
@@ -157,15 +148,13 @@ class EncoderError(Effect):
 
 
 @dataclass(frozen=True)
-class PressureDrift(Effect):
+class PressureDrift(
+    Effect, id="pressure_zero_drift", block="sensors", graded=("size",), needs_clock=True
+):
     """Zero of the muscle pressure transducer that wanders while it warms up (in no catalogue);
     `size` [Pa], times in s.
     """
 
-    id: ClassVar[str] = "pressure_zero_drift"
-    block: ClassVar[str] = "sensors"
-    graded: ClassVar[tuple[str, ...]] = ("size",)
-    needs_clock: ClassVar[bool] = True
     size: float
     time_constant: float
     period: float

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -12,16 +12,13 @@ from .base import Effect, Env, Port, Setting, Start, State, log_uniform, uniform
 
 
 @dataclass(frozen=True)
-class SupplyLeak(Effect):
+class SupplyLeak(Effect, id="supply_leak", block="supply", graded=("rate",)):
     """Leak of the tank: laminar, ``k (ps^2 - pa^2)``, or through a slit that opens with pressure,
     ``k (ps - pa)^n``.
 
     `rate` [kg/s] is the flow at `reference` [Pa absolute].
     """
 
-    id: ClassVar[str] = "supply_leak"
-    block: ClassVar[str] = "supply"
-    graded: ClassVar[tuple[str, ...]] = ("rate",)
     form: str
     rate: float
     exponent: float
@@ -47,7 +44,14 @@ class SupplyLeak(Effect):
 
 
 @dataclass(frozen=True)
-class Compressor(Effect):
+class Compressor(
+    Effect,
+    id="compressor_cut_in",
+    block="supply",
+    graded=("delivery",),
+    needs_clock=True,
+    scales=(1.0, 1.0),
+):
     """Piston compressor between two tank pressures.
 
     Delivery [kg/s] falls with the back pressure by the clearance volume (`clearance`), comes up
@@ -55,10 +59,6 @@ class Compressor(Effect):
     with depth `pulsation` at `frequency` [Hz]. `on` and `off` are absolute pressures [Pa].
     """
 
-    id: ClassVar[str] = "compressor_cut_in"
-    block: ClassVar[str] = "supply"
-    graded: ClassVar[tuple[str, ...]] = ("delivery",)
-    needs_clock: ClassVar[bool] = True
     delivery: float
     on: float
     off: float
@@ -83,9 +83,6 @@ class Compressor(Effect):
     def start(self, at: Start) -> State:
         running = 1.0 if at.supply < self.on else 0.0
         return [running, running]
-
-    def sizes(self) -> State:
-        return [1.0, 1.0]
 
     def tank(self, env: Env, first: int) -> Port:
         pa, clock, second = env.par.ambient, env.clock, first + 1
@@ -120,16 +117,15 @@ class Compressor(Effect):
 
 
 @dataclass(frozen=True)
-class SupplyCooling(Effect):
+class SupplyCooling(
+    Effect, id="supply_gas_cooling", block="supply", graded=("share",), scales=(1.0,)
+):
     """Gas in the tank cools while it expands and warms at the wall (in no catalogue).
 
     `share` is the part of the temperature change that reaches the pressure; `time_constant` [s] of
     the wall.
     """
 
-    id: ClassVar[str] = "supply_gas_cooling"
-    block: ClassVar[str] = "supply"
-    graded: ClassVar[tuple[str, ...]] = ("share",)
     share: float
     time_constant: float
 
@@ -139,12 +135,6 @@ class SupplyCooling(Effect):
 
     def most(self) -> float:
         return 1.2 / self.share if self.share else 1.0
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0]
 
     def tank(self, env: Env, first: int) -> Port:
         par, share, tau = env.par, self.share, self.time_constant

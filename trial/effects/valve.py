@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Self
 
 import numpy as np
 
@@ -14,8 +14,8 @@ from .base import (
     Env,
     Port,
     Setting,
-    Start,
     State,
+    drawn,
     either_sign,
     log_uniform,
     uniform,
@@ -23,21 +23,16 @@ from .base import (
 
 
 @dataclass(frozen=True)
-class DeadZone(Effect):
+class DeadZone(
+    Effect, id="valve_dead_zone", block="valve", graded=("supply_width", "exhaust_width")
+):
     """Overlap of the spool, normalised widths of both edges; clearance rounds the corner over
     `rounding` widths.
     """
 
-    id: ClassVar[str] = "valve_dead_zone"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("supply_width", "exhaust_width")
-    supply_width: float
-    exhaust_width: float
-    rounding: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.02, 0.04), uniform(rng, 0.02, 0.04), uniform(rng, 0.08, 0.2))
+    supply_width: float = drawn(0.02, 0.04)
+    exhaust_width: float = drawn(0.02, 0.04)
+    rounding: float = drawn(0.08, 0.2)
 
     def most(self) -> float:
         return 0.3 / max(self.supply_width, self.exhaust_width, 1e-9)
@@ -59,22 +54,15 @@ class DeadZone(Effect):
 
 
 @dataclass(frozen=True)
-class ValveHysteresis(Effect):
+class ValveHysteresis(Effect, id="valve_hysteresis", block="valve", graded=("half_width",)):
     """Friction of the spool: it lags the command by up to `half_width` of half the stroke.
 
     Dahl's law over the path of the command: ``dz = (1 - z sgn(dx)) |dx| / d sgn(dx)``, so the
     corner of the loop is round, with `d` = `bend` half widths.
     """
 
-    id: ClassVar[str] = "valve_hysteresis"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("half_width",)
-    half_width: float
-    bend: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.0015, 0.003), uniform(rng, 1.2, 2.5))
+    half_width: float = drawn(0.0015, 0.003)
+    bend: float = drawn(1.2, 2.5)
 
     def most(self) -> float:
         return 0.1 / max(self.half_width, 1e-9)
@@ -97,16 +85,15 @@ class ValveHysteresis(Effect):
 
 
 @dataclass(frozen=True)
-class CentreLeakage(Effect):
+class CentreLeakage(
+    Effect, id="valve_centre_leakage", block="valve", graded=("supply_land", "exhaust_land")
+):
     """Laminar leakage past the lands of the spool, ``k (pu^2 - pd^2) / (1 + |x| / x_l)``: the gap
     grows longer.
 
     `supply_land` and `exhaust_land` are k of the two lands [kg/(s Pa2)], `reach` is x_l.
     """
 
-    id: ClassVar[str] = "valve_centre_leakage"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("supply_land", "exhaust_land")
     supply_land: float
     exhaust_land: float
     reach: float
@@ -127,22 +114,15 @@ class CentreLeakage(Effect):
 
 
 @dataclass(frozen=True)
-class ValveArea(Effect):
+class ValveArea(Effect, id="valve_area", block="valve", graded=("excess",)):
     """Window of the sleeve that narrows beyond a knee: a share `excess` more opening per stroke
     below `knee` (a part of half the stroke), less above it, the same at the end; `venting` of it on
     the side that vents.
     """
 
-    id: ClassVar[str] = "valve_area"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("excess",)
-    excess: float
-    knee: float
-    venting: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 0.1, 0.3), uniform(rng, 0.25, 0.5), uniform(rng, 0.5, 1.0))
+    excess: float = drawn(0.1, 0.3)
+    knee: float = drawn(0.25, 0.5)
+    venting: float = drawn(0.5, 1.0)
 
     def most(self) -> float:
         return 0.8 * (1.0 / self.knee - 1.0) / max(self.excess, 1e-9)
@@ -159,25 +139,16 @@ class ValveArea(Effect):
 
 
 @dataclass(frozen=True)
-class InputLag(Effect):
+class InputLag(Effect, id="input_path_lag", block="valve", graded=("pure", "lag"), scales=(1.0,)):
     """Pure delay [s] of the command, then a spool that follows with a time constant `lag` [s],
     slower for big steps.
 
     ``xs' = (s/lag) tanh((x - xs)/s)`` with `stroke` s, a part of half the full stroke.
     """
 
-    id: ClassVar[str] = "input_path_lag"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("pure", "lag")
-    pure: float
-    lag: float
-    stroke: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(
-            uniform(rng, 8.0e-3, 14.0e-3), uniform(rng, 6.0e-3, 10.0e-3), uniform(rng, 0.08, 0.3)
-        )
+    pure: float = drawn(8.0e-3, 14.0e-3)
+    lag: float = drawn(6.0e-3, 10.0e-3)
+    stroke: float = drawn(0.08, 0.3)
 
     def most(self) -> float:
         return 0.25 / max(self.pure + self.lag, 1e-9)
@@ -188,12 +159,6 @@ class InputLag(Effect):
 
     def delay(self) -> float:
         return self.pure if self._slow() else self.pure + self.lag
-
-    def start(self, at: Start) -> State:
-        return [0.0]
-
-    def sizes(self) -> State:
-        return [1.0]
 
     def spool(self, env: Env, first: int) -> Port:
         if not self._slow():
@@ -209,22 +174,17 @@ class InputLag(Effect):
 
 
 @dataclass(frozen=True)
-class TubeRestriction(Effect):
+class TubeRestriction(
+    Effect, id="tube_flow_restriction", block="line", graded=("laminar", "turbulent")
+):
     """Hose between the valve manifold, where the transducer sits, and the muscles.
 
     Isothermal pipe flow with a laminar and a turbulent part: ``pv^2 - p^2 = a m + b m |m|``, with
     `laminar` a [Pa2 s/kg] and `turbulent` b [Pa2 s2/kg2].
     """
 
-    id: ClassVar[str] = "tube_flow_restriction"
-    block: ClassVar[str] = "line"
-    graded: ClassVar[tuple[str, ...]] = ("laminar", "turbulent")
-    laminar: float
-    turbulent: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e11, 4.0e11), uniform(rng, 4.0e14, 8.0e14))
+    laminar: float = drawn(1.0e11, 4.0e11)
+    turbulent: float = drawn(4.0e14, 8.0e14)
 
     def line(self, env: Env) -> Port:
         a, b, sqrt = self.laminar, self.turbulent, math.sqrt
@@ -236,19 +196,14 @@ class TubeRestriction(Effect):
 
 
 @dataclass(frozen=True)
-class ExhaustBackPressure(Effect):
+class ExhaustBackPressure(
+    Effect, id="exhaust_back_pressure", block="valve", graded=("resistance",)
+):
     """Silencer behind the exhaust edge: ``pe^2 - pa^2 = b m^2`` with `resistance` b [Pa2 s2/kg2]
     (in no catalogue).
     """
 
-    id: ClassVar[str] = "exhaust_back_pressure"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("resistance",)
-    resistance: float
-
-    @classmethod
-    def draw(cls, rng: np.random.Generator, setting: Setting) -> Self:
-        return cls(uniform(rng, 1.0e16, 2.0e16))
+    resistance: float = drawn(1.0e16, 2.0e16)
 
     def exhaust(self, env: Env) -> Port:
         b, pa2, sqrt = self.resistance, env.par.ambient**2, math.sqrt
@@ -256,16 +211,13 @@ class ExhaustBackPressure(Effect):
 
 
 @dataclass(frozen=True)
-class NullDrift(Effect):
+class NullDrift(Effect, id="valve_null_drift", block="valve", graded=("warm", "wave")):
     """Null voltage that drifts with the temperature of the solenoid (in no catalogue).
 
     A warm-up with `time_constant` [s] by `warm` of half the stroke, and a slow wave of `wave` with
     `period` [s].
     """
 
-    id: ClassVar[str] = "valve_null_drift"
-    block: ClassVar[str] = "valve"
-    graded: ClassVar[tuple[str, ...]] = ("warm", "wave")
     warm: float
     wave: float
     time_constant: float
