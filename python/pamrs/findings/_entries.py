@@ -455,6 +455,8 @@ class Misread(Entry):
         as the log says and read so.
     text : str
         The same in words.
+    gain, std : float
+        Of a factor of a few per cent: the one that is free, and its standard error; NaN of others.
     """
 
     channels: list[str]
@@ -465,6 +467,8 @@ class Misread(Entry):
     before: float = field(metadata=told("what the baseline leaves, in variances of the noise"))
     after: float = field(metadata=told("the same with the channels read so"))
     text: str
+    gain: float = field(default=math.nan, metadata=told(json=False))
+    std: float = field(default=math.nan, metadata=told(json=False))
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,8 @@ nothing else.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from pamrs.diagnosis.explain._block_entries import not_judged
 from pamrs.diagnosis.fit import Problem
@@ -14,7 +14,7 @@ from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import Reading
 from pamrs.findings import ChannelError, FitErrors, Misread, NextExperiment, Where
 from pamrs.recordings import Case
-from pamrs.units import bar_and_psi
+from pamrs.report.units import misread_advice, misread_sentence
 
 __all__ = ["misread_diagnosis"]
 
@@ -43,7 +43,6 @@ def misread_diagnosis(
     """
     why = "the unit of what surrounds it is settled first"
     blocks = [Unjudged(block.name, block.covers, why) for block in fitted.blocks]
-    text, advice = _told(reading), _advice(reading)
     most = fitted.settings.most_probability
     channels = list(reading.channels)
     entry = Misread(
@@ -54,12 +53,15 @@ def misread_diagnosis(
         offset=reading.offset,
         before=reading.before,
         after=reading.after,
-        text=text,
+        text="",
+        gain=reading.gain,
+        std=reading.std,
     )
+    text, advice = misread_sentence(entry), misread_advice(entry)
     return Diagnosis(
         case=case.name,
         verdict="units",
-        misread=[entry],
+        misread=[replace(entry, text=text)],
         where=Where(channel=channels[0], text=advice),
         probabilities={"units": most, "unlisted": 1.0 - most},
         blocks=[not_judged(block) for block in (*blocks, *unjudged)],
@@ -69,54 +71,4 @@ def misread_diagnosis(
         rig=case.rig,
         measured=list(case.channels),
         settings=fitted.settings,
-    )
-
-
-def _names(reading: Reading) -> str:
-    *first, last = reading.channels
-    return f"{', '.join(first)} and {last}" if first else last
-
-
-def _told(reading: Reading) -> str:
-    """What is likely, and the evidence."""
-    names, many = _names(reading), len(reading.channels) > 1
-    verb = "are" if many else "is"
-    if reading.offset:
-        what = (
-            f"{names} {verb} likely {reading.likely} and not {reading.said}: with "
-            f"{bar_and_psi(abs(reading.offset))} "
-            f"{'taken off' if reading.offset < 0.0 else 'added'}"
-        )
-    else:
-        what = f"{names} {verb} likely in {reading.likely}, not in {reading.said}"
-    if math.isfinite(reading.gain):
-        return (
-            f"{what}, or {'their gauges have' if many else 'its gauge has'} another gain: with "
-            f"parameters that move inside their tolerances the values times {reading.gain:.4f} +- "
-            f"{reading.std:.1g} fit best, and {reading.likely} over {reading.said} is "
-            f"{reading.factors[0]:.4f}"
-        )
-    what += "" if reading.offset else ": read so,"
-    return (
-        f"{what} the refitted model leaves {reading.after:.2g} times the variance of the noise "
-        f"instead of {reading.before:.2g} times, and a free "
-        f"{'offset' if reading.offset else 'factor'} would be the same"
-    )
-
-
-def _advice(reading: Reading) -> str:
-    """What to do about it."""
-    how = (
-        "subtract the ambient pressure"
-        if reading.likely == "absolute"
-        else "give the values as they are, as gauge pressures"
-        if reading.offset
-        else f"write {reading.likely}"
-        if math.isnan(reading.gain)
-        else f"write {reading.likely}, or with its calibration scale = {reading.gain:.4f},"
-    )
-    return (
-        f"No physics was judged, since a wrong unit looks like missing physics: {how} for "
-        f"{_names(reading)} (in the heading, or in case.toml), or check the sensor where the log "
-        "is right, and diagnose again."
     )
