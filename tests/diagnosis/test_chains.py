@@ -196,7 +196,9 @@ def test_all_chains_move_at_once_and_none_as_another() -> None:
     assert np.ptp(angle) > np.radians(40)  # against each other
 
 
-@pytest.mark.parametrize("rig", [JOINT, TWO], ids=["one joint", "two joints"])
+@pytest.mark.parametrize(
+    "rig", [pytest.param(JOINT, marks=pytest.mark.slow), TWO], ids=["one joint", "two joints"]
+)
 def test_experiments_keep_to_what_rig_and_recordings_allow(rig: Rig) -> None:
     text = rig.to_toml_text() + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
     limited = parse_rig(text + 'payloads = { value = [0.1, 0.9], unit = "kg" }\n')

@@ -116,7 +116,7 @@ COPIES = (
 )
 
 
-@pytest.mark.parametrize("bits", [0.0, 2.0])
+@pytest.mark.parametrize("bits", [pytest.param(0.0, marks=pytest.mark.slow), 2.0])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("how", COPIES)
 def test_copies_are_found_however_they_were_made(how: str, kind: str, bits: float) -> None:
@@ -136,7 +136,15 @@ def test_where_the_copy_lies_is_told() -> None:
     assert found.share > 0.9
 
 
-@pytest.mark.parametrize("bits", [0.0, 0.5, 2.0, 6.0])
+@pytest.mark.parametrize(
+    "bits",
+    [
+        0.0,
+        pytest.param(0.5, marks=pytest.mark.slow),
+        pytest.param(2.0, marks=pytest.mark.slow),
+        6.0,
+    ],
+)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("dt", [0.002, 0.005, 0.02])
 def test_a_repetition_is_no_copy(kind: str, bits: float, dt: float) -> None:

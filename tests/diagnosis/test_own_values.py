@@ -130,7 +130,7 @@ def told_of(found: pamrs.Diagnosis, name: str) -> tuple[dict[str, float], str]:
     return {recording: float(value) for value, recording in values}, told
 
 
-@pytest.mark.parametrize("in_rig", [True, False])
+@pytest.mark.parametrize("in_rig", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_a_value_of_each_recording_is_found_there(in_rig: bool) -> None:
     rig = left_to_recordings(SHOULDER, "discharge_area_max") if in_rig else SHOULDER
     case = pamrs.Case("nozzles", rig, nozzles(error="" if in_rig else "own"), Path())

@@ -46,6 +46,7 @@ def test_a_healthy_spool_misses_nothing() -> None:
     assert diagnosed(SPRUNG).verdict == "none"
 
 
+@pytest.mark.slow
 def test_a_slower_spool_is_named() -> None:
     found = diagnosed(SPRUNG, valve__natural_frequency=15.0)
     assert found.verdict == "parameters"

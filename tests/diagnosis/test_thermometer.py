@@ -274,9 +274,16 @@ def test_a_thermometer_adds_its_block_and_changes_no_other() -> None:
     assert own.window is None
 
 
-@pytest.mark.parametrize("every", [5, 25])
-@pytest.mark.parametrize("holds", [True, False])
-def test_a_thermometer_slower_than_the_log_is_left_alone(every: int, holds: bool) -> None:
+@pytest.mark.parametrize(
+    ("holds", "every"),
+    [
+        (True, 5),
+        (False, 25),
+        pytest.param(True, 25, marks=pytest.mark.slow),
+        pytest.param(False, 5, marks=pytest.mark.slow),
+    ],
+)
+def test_a_thermometer_slower_than_the_log_is_left_alone(holds: bool, every: int) -> None:
     rig = parse_rig(TANK)
     slow = []
     for recording in blown(rig):

@@ -222,6 +222,7 @@ def _rounded(case: Case, place: float) -> Case:
     return replace(case, recordings=made)
 
 
+@pytest.mark.slow
 def test_rounding_to_eight_bits_is_no_physics() -> None:
     """Of a coarse converter the rounding is not white: it stays for as long as a step lasts."""
     case = _rounded(_healthy(lambda _: None), 0.0)
@@ -252,6 +253,7 @@ def test_two_recordings_of_eight_bits_leave_no_more_than_noise(pair: str, place:
         assert own.ratio <= own.limit, block.name
 
 
+@pytest.mark.slow
 def test_blocks_without_a_value_are_no_physics() -> None:
     def holes(channels: dict[str, np.ndarray]) -> None:
         channels["muscle_pressure"][300:380] = np.nan
@@ -260,7 +262,7 @@ def test_blocks_without_a_value_are_no_physics() -> None:
     assert pamrs.diagnose(_healthy(holes)).verdict in ("none", "parameters")
 
 
-@pytest.mark.parametrize("which", ["abc", "c"])
+@pytest.mark.parametrize("which", ["abc", pytest.param("c", marks=pytest.mark.slow)])
 def test_a_command_that_was_not_logged_is_said_and_the_rest_is_judged(which: str) -> None:
     """In all recordings the valve and what it fills are not judged; one beside others goes."""
     case = pamrs.load_case(HERE / "12_absolute_as_gauge")

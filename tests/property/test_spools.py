@@ -56,7 +56,7 @@ _MOMENTS = [
 ]
 
 
-@settings(max_examples=12, **SLOW)
+@settings(max_examples=5, **SLOW)
 @given(
     st.floats(8.0, 60.0),
     st.sampled_from([0.08, 0.3, 0.7, 1.0, 1.6]),
