@@ -48,14 +48,10 @@ def recorded(
     return Recording(name, role, time, 0.005, channels, mask, [], dict.fromkeys(channels, ""))
 
 
-def case(true: pamrs.Rig, nominal: pamrs.Rig, *, force: float = 0.0) -> pamrs.Case:
-    roles = ("fit", "fit", "held_out")
-    return pamrs.Case(
-        "case",
-        nominal,
-        [recorded(true, f"r{k}", role, seed=k, force=force) for k, role in enumerate(roles)],
-        Path(),
-    )
+def case(true: pamrs.Rig, nominal: pamrs.Rig, **options: float) -> pamrs.Case:
+    roles = enumerate(("fit", "fit", "held_out"))
+    found = [recorded(true, f"r{k}", role, seed=k, **options) for k, role in roles]
+    return pamrs.Case("case", nominal, found, Path())
 
 
 @pytest.mark.parametrize(
@@ -102,7 +98,7 @@ def test_a_value_inside_its_tolerance_is_not_called_wrong() -> None:
 def test_a_name_in_the_chamber_stands_beside_an_arm_without_one() -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.with_effect("valve_dead_zone", {"half_width": 0.05})
-    found = pamrs.diagnose(case(true, rig, force=4e-3))
+    found = pamrs.diagnose(case(true, rig, force=4e-3, seconds=12.0))
     assert found.verdict == "effects"
     assert [e["id"] for e in found.effects] == ["valve_dead_zone"]
     assert found.effects[0]["probability"] > 0.8
