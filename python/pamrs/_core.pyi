@@ -14,6 +14,7 @@ __all__ = [
     "Rig",
     "Simulator",
     "__version__",
+    "blocks",
     "effects",
     "side_by_side",
 ]
@@ -181,6 +182,7 @@ class Simulator:
     @property
     def samples(self) -> int: ...
 
+def blocks() -> str: ...
 def effects() -> str: ...
 def side_by_side(
     rig: Rig,

@@ -12,10 +12,11 @@ import pytest
 import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
-from pamrs.diagnosis.fit import ACTS, starts_of
+from pamrs.diagnosis.fit import same_data_in, starts_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
+from pamrs.rig.schema import ACTS
 from pamrs.simulation import core_rig
 from pamrs.units import parse_unit
 
@@ -324,3 +325,15 @@ def test_a_step_that_leaves_the_range_behind_a_hose_is_an_error_and_no_panic():
     start = {"joint_rate": 3e3, "muscle_pressure": 3e5}
     with pytest.raises(pamrs.SimulationError):
         pamrs.simulate(rig, np.full(20, 8.0), sample_time=0.005, initial=start)
+
+
+def test_a_late_clock_is_the_dead_time_of_what_the_commands_go_to() -> None:
+    other = {
+        name: same_data_in(getattr(pamrs.rigs, name)(), "clock_skew")
+        for name in ("shoulder", "regulated_joint", "sealed_chamber")
+    }
+    assert other["sealed_chamber"] is None
+    assert [getattr(other[name], "effect", "") for name in ("shoulder", "regulated_joint")] == [
+        "input_path_lag",
+        "supply_regulator_delay",
+    ]

@@ -16,7 +16,7 @@ SOURCE = Path(__file__).parents[2] / "crates" / "pam-core" / "src"
 #: line do not know each other.
 LAYERS = (
     ("dual", "error"),
-    ("scalar", "room", "chebyshev"),
+    ("scalar", "room", "chebyshev", "keys"),
     ("braid", "clock"),
     ("muscle",),
     ("blocks",),

@@ -22,6 +22,7 @@ pub mod description;
 pub mod dual;
 pub mod effects;
 pub mod error;
+pub mod keys;
 pub mod lanes;
 pub mod muscle;
 pub mod plant;

@@ -5,6 +5,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pam_core::blocks::gas::Gas as CoreGas;
 use pam_core::blocks::tube::Tube;
 use pam_core::error::check_range;
+use pam_core::key;
 use pyo3::prelude::*;
 
 /// A gas with its orifice law (SI units, absolute pressures).
@@ -25,13 +26,13 @@ impl Gas {
         heat_capacity_ratio: f64,
     ) -> PyResult<Self> {
         let checked = [
-            ("ambient_pressure", ambient_pressure, 1e3, 1e6, "Pa"),
-            ("temperature", temperature, 150.0, 500.0, "K"),
-            ("gas_constant", gas_constant, 10.0, 5000.0, "J/(kg K)"),
-            ("heat_capacity_ratio", heat_capacity_ratio, 1.01, 1.7, "(1)"),
+            (key!("gas", "ambient_pressure"), ambient_pressure),
+            (key!("gas", "temperature"), temperature),
+            (key!("gas", "gas_constant"), gas_constant),
+            (key!("gas", "heat_capacity_ratio"), heat_capacity_ratio),
         ];
-        for (name, value, low, high, unit) in checked {
-            check_range(name, value, low, high, unit).map_err(|e| error(py, &e))?;
+        for (key, value) in checked {
+            key.check(key.name, value).map_err(|e| error(py, &e))?;
         }
         Ok(Self {
             inner: CoreGas::new(ambient_pressure, temperature, gas_constant, heat_capacity_ratio),

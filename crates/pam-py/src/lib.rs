@@ -22,6 +22,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<joint::Joint>()?;
     m.add_class::<simulator::Simulator>()?;
     m.add_class::<batch::Batch>()?;
+    m.add_function(wrap_pyfunction!(rig::blocks, m)?)?;
     m.add_function(wrap_pyfunction!(rig::effects, m)?)?;
     m.add_function(wrap_pyfunction!(lanes::side_by_side, m)?)?;
     Ok(())

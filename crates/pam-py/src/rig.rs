@@ -9,6 +9,7 @@ use numpy::{PyArray2, PyArrayMethods, PyReadonlyArray1};
 use pam_core::cut_chain::{closure_terms, predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::effects::EFFECTS;
+use pam_core::keys::BLOCKS;
 use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::run::Run;
@@ -314,6 +315,12 @@ impl Rig {
         )?;
         array(py, terms).reshape([samples, columns])
     }
+}
+
+/// Every kind of block of a rig with its keys, as JSON text.
+#[pyfunction]
+pub fn blocks() -> PyResult<String> {
+    serde_json::to_string(BLOCKS).map_err(|e| PyRuntimeError::new_err(e.to_string()))
 }
 
 /// What every effect of the core is, as JSON text: a list in the order of the chain.

@@ -75,9 +75,7 @@ def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form
     )
 
 
-def _same_data(told: dict[str, Any] | None, words: dict[str, Any]) -> SameData | None:
-    if told is None:
-        return None
+def _same_data(told: dict[str, Any], words: dict[str, Any]) -> SameData:
     held = tuple((name, value) for name, value in told["held"])
     return SameData(**{**told, "held": held, "told_by": words["told_by"]})
 
@@ -108,7 +106,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         reference=told["source"],
         rivals=tuple(words.get("rivals", ())),
         catalogue=told["named"],
-        same_data=_same_data(told["same_data"], words),
+        same_data=tuple(_same_data(same, words) for same in told["same_data"]),
         terms=terms,
         label=words.get("label", ""),
         stated_by=tuple(words.get("stated_by", ())),

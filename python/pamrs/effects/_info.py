@@ -241,8 +241,9 @@ class EffectInfo:
         two effects each names the other.
     catalogue : bool
         Whether it is a name for physics, which a diagnosis may give; a sum of terms is none.
-    same_data : SameData or None
-        Another effect whose recordings it leaves where a parameter is zero.
+    same_data : tuple of SameData
+        Other effects whose recordings it leaves where a parameter is zero, each in rigs that have
+        what that one acts on; of several in one rig the first.
     terms : tuple of Term
         Of a sum of terms, in the order of its parameters; behind them stand the shapes of its
         memories.
@@ -289,7 +290,7 @@ class EffectInfo:
     reference: str
     rivals: tuple[str, ...] = ()
     catalogue: bool = True
-    same_data: SameData | None = None
+    same_data: tuple[SameData, ...] = ()
     terms: tuple[Term, ...] = ()
     label: str = ""
     stated_by: tuple[str, ...] = ()

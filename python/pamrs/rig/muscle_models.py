@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
+from pamrs.rig.schema import BLOCKS
+
 __all__ = [
     "ALL_MODELS",
     "ELASTIC_PARAMETERS",
@@ -16,27 +18,24 @@ __all__ = [
     "own_geometry",
 ]
 
-_POLYNOMIAL: Final = ("modulus_slope", "modulus_offset")
-#: model -> the elastic parameters that it has, in the order of the physics reference.
-ELASTIC_PARAMETERS: Final[dict[str, tuple[str, ...]]] = {
-    "gaylord": (),
-    "chou_hannaford": (),
-    "mooney_rivlin": ("c10", "c01"),
-    "ferraresi": _POLYNOMIAL,
-    "kothera": _POLYNOMIAL,
-    "robinson": _POLYNOMIAL,
-    "elbow_linear": ("bladder_modulus", "extension_factors"),
-}
-#: What a muscle that is known by its measured forces alone has.
-MAP_PARAMETERS: Final = ("map_pressure", "map_contraction", "map_force")
-#: The same of every model, the map included.
-PARAMETERS: Final[dict[str, tuple[str, ...]]] = {**ELASTIC_PARAMETERS, "map": MAP_PARAMETERS}
+_KEYS: Final = {key.name: key for key in BLOCKS["muscle"]}
+#: Names of all models, in the order of the physics reference.
+ALL_MODELS: Final = _KEYS["model"].choices
 #: Names of the force models with elastic parameters, which can be fitted.
-MODELS: Final = tuple(ELASTIC_PARAMETERS)
-#: Names of all models.
-ALL_MODELS: Final = tuple(PARAMETERS)
+MODELS: Final = tuple(model for model in ALL_MODELS if model != "map")
+#: model -> the parameters that it has and others with elastic parameters have not.
+PARAMETERS: Final[dict[str, tuple[str, ...]]] = {
+    model: tuple(
+        name for name, key in _KEYS.items() if model in key.only and not {*MODELS} <= {*key.only}
+    )
+    for model in ALL_MODELS
+}
+#: The same of the models with elastic parameters.
+ELASTIC_PARAMETERS: Final = {model: PARAMETERS[model] for model in MODELS}
+#: What a muscle that is known by its measured forces alone has.
+MAP_PARAMETERS: Final = PARAMETERS["map"]
 #: Names of the outer profiles.
-GEOMETRIES: Final = ("cylinder", "elliptic", "elliptic_published")
+GEOMETRIES: Final = _KEYS["geometry"].choices
 
 
 def models_with(parameter: str) -> tuple[str, ...]:

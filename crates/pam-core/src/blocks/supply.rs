@@ -13,7 +13,7 @@
 use crate::scalar::{constant, Scalar};
 
 /// Rate of a regulator's outlet pressure that is no limit [Pa/s].
-pub const FASTEST: f64 = 1e12;
+pub use crate::keys::FASTEST;
 
 /// Set pressure of a regulator over a step [Pa, absolute]: one, and then another.
 ///

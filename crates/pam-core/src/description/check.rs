@@ -1,14 +1,12 @@
-//! Whether the words and fixed numbers of a description are possible. The bounds of a parameter
-//! stand where it enters the table of parameters, and how blocks fit together is the wiring's: both
+//! Whether the words and fixed numbers of a description are possible, by [`crate::keys`]. What a fit
+//! may move is checked where it enters the table of parameters, and how blocks fit together is the wiring's: both
 //! in [`crate::plant`].
 
 use super::{dotted, ArmSpec, LinkSpec, LoadSpec, RigSpec};
 use crate::blocks::joint::Joint;
 use crate::error::check_range;
-use crate::{Error, Result};
-
-/// Most segments of a tube.
-const MOST_SEGMENTS: usize = 256;
+use crate::keys::Key;
+use crate::{key, Result};
 
 /// Checks one block's keys; names them in full only when there is something wrong.
 struct Block<'a> {
@@ -17,23 +15,23 @@ struct Block<'a> {
 }
 
 impl Block<'_> {
-    fn range(&self, key: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<()> {
-        check_range(key, value, low, high, unit).map(|_| ()).or_else(|_| {
-            let full = format!("{}.{key}", dotted(self.kind, self.name));
-            check_range(&full, value, low, high, unit).map(|_| ())
-        })
+    fn full(&self, key: &Key) -> String {
+        format!("{}.{}", dotted(self.kind, self.name), key.name)
     }
 
-    fn choice(&self, key: &str, value: &str, allowed: &[&str]) -> Result<()> {
-        if allowed.contains(&value) {
-            return Ok(());
-        }
-        let quoted: Vec<_> = allowed.iter().map(|a| format!("\"{a}\"")).collect();
-        Err(Error::Choice {
-            name: format!("{}.{key}", dotted(self.kind, self.name)),
-            value: format!("\"{value}\""),
-            allowed: format!("one of {}", quoted.join(", ")),
-        })
+    fn number(&self, key: &Key, value: f64) -> Result<()> {
+        key.check(key.name, value).or_else(|_| key.check(&self.full(key), value)).map(|_| ())
+    }
+
+    /// A number between limits that another value sets, besides the bounds of its key.
+    fn within(&self, key: &Key, value: f64, low: f64, high: f64, note: &str) -> Result<()> {
+        let (least, most, unit) = key.bounds();
+        let (low, high) = (low.max(least), high.min(most));
+        check_range(&self.full(key), value, low, high, &format!("{unit}{note}")).map(|_| ())
+    }
+
+    fn word(&self, key: &Key, value: &str) -> Result<()> {
+        key.check_word(key.name, value).or_else(|_| key.check_word(&self.full(key), value))
     }
 }
 
@@ -44,10 +42,10 @@ impl RigSpec {
     /// [`Error::Parameter`] or [`Error::Choice`] naming the first impossible value.
     pub fn validate(&self) -> Result<()> {
         let gas = Block { kind: "gas", name: "" };
-        gas.range("ambient_pressure", self.gas.ambient_pressure, 1e3, 1e6, "Pa")?;
-        gas.range("temperature", self.gas.temperature, 150.0, 500.0, "K")?;
-        gas.range("gas_constant", self.gas.gas_constant, 10.0, 5000.0, "J/(kg K)")?;
-        gas.range("heat_capacity_ratio", self.gas.heat_capacity_ratio, 1.01, 1.7, "")?;
+        gas.number(key!("gas", "ambient_pressure"), self.gas.ambient_pressure)?;
+        gas.number(key!("gas", "temperature"), self.gas.temperature)?;
+        gas.number(key!("gas", "gas_constant"), self.gas.gas_constant)?;
+        gas.number(key!("gas", "heat_capacity_ratio"), self.gas.heat_capacity_ratio)?;
         self.check_air(-self.gas.ambient_pressure)?;
         for group in &self.muscles {
             group.muscle.validate()?;
@@ -56,12 +54,13 @@ impl RigSpec {
         for joint in &self.joints {
             let block = Block { kind: "joint", name: &joint.name };
             joint.transmission.as_ref().map(Joint::new).transpose()?;
-            block.range("stop_stiffness", joint.stop_stiffness, 0.0, 1e9, "N m/rad")?;
-            block.range("stop_damping", joint.stop_damping, 0.0, 1e9, "N m s/rad")?;
-            block.range("rest_angle", joint.rest_angle, -7.0, 7.0, "rad")?;
+            block.number(key!("joint", "stop_stiffness"), joint.stop_stiffness)?;
+            block.number(key!("joint", "stop_damping"), joint.stop_damping)?;
+            block.number(key!("joint", "rest_angle"), joint.rest_angle)?;
             let (low, high) = (joint.min_angle, joint.max_angle);
-            block.range("min_angle", low, -7.0, high, "rad (below max_angle)")?;
-            block.range("max_angle", high, low, 7.0, "rad")?;
+            let below = " (below max_angle)";
+            block.within(key!("joint", "min_angle"), low, f64::NEG_INFINITY, high, below)?;
+            block.within(key!("joint", "max_angle"), high, low, f64::INFINITY, "")?;
         }
         if let Some(load) = &self.load {
             load.validate()?;
@@ -75,28 +74,28 @@ impl RigSpec {
     fn check_air(&self, vacuum: f64) -> Result<()> {
         for supply in &self.supplies {
             let block = Block { kind: "supply", name: &supply.name };
-            block.choice("kind", &supply.kind, &["tank", "constant", "regulator"])?;
-            block.range("initial_pressure", supply.initial_pressure, vacuum, 1e8, "Pa")?;
+            block.word(key!("supply", "kind"), &supply.kind)?;
+            block.number(key!("supply", "initial_pressure"), supply.initial_pressure)?;
         }
         for valve in &self.valves {
             let block = Block { kind: "valve", name: &valve.name };
-            block.choice("flow", &valve.flow, &["orifice", "iso_6358"])?;
-            block.range("half_range", valve.half_range, 1e-9, 1e3, "V")?;
-            block.choice("spool", &valve.spool, &["ideal", "second_order", "switching"])?;
-            let closed = ["closed", "fill", "vent"];
-            block.choice("without_current", &valve.without_current, &closed)?;
+            block.word(key!("valve", "flow"), &valve.flow)?;
+            block.number(key!("valve", "half_range"), valve.half_range)?;
+            block.word(key!("valve", "spool"), &valve.spool)?;
+            block.word(key!("valve", "without_current"), &valve.without_current)?;
             valve.spool_form()?;
         }
         for line in &self.lines {
             let block = Block { kind: "line", name: &line.name };
-            block.choice("kind", &line.kind, &["tube", "orifice"])?;
-            let most = if line.kind == "tube" { MOST_SEGMENTS } else { 0 };
-            block.range("segments", line.segments as f64, 0.0, most as f64, "")?;
+            block.word(key!("line", "kind"), &line.kind)?;
+            let most = if line.kind == "tube" { f64::INFINITY } else { 0.0 };
+            block.within(key!("line", "segments"), line.segments as f64, 0.0, most, "")?;
         }
         for chamber in &self.chambers {
             let block = Block { kind: "chamber", name: &chamber.name };
-            block.choice("gas", &chamber.gas, &["coefficients", "energy_balance"])?;
-            block.range("initial_pressure", chamber.initial_pressure, vacuum, 1e8, "Pa")?;
+            block.word(key!("chamber", "gas"), &chamber.gas)?;
+            let (initial, most) = (chamber.initial_pressure, f64::INFINITY);
+            block.within(key!("chamber", "initial_pressure"), initial, vacuum, most, "")?;
         }
         Ok(())
     }
@@ -105,41 +104,36 @@ impl RigSpec {
 impl ArmSpec {
     fn validate(&self) -> Result<()> {
         let block = Block { kind: "arm", name: "" };
-        block.choice("kind", &self.kind, &["one_link", "planar"])?;
-        block.range("gravity", self.gravity, -1e3, 1e3, "m/s2")?;
+        block.word(key!("arm", "kind"), &self.kind)?;
+        block.number(key!("arm", "gravity"), self.gravity)?;
         if self.kind == "planar" {
             return self.links.iter().try_for_each(LinkSpec::validate);
         }
-        block.range("length", self.length, 0.0, 1e3, "m")?;
-        block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")
+        block.number(key!("arm", "length"), self.length)?;
+        block.number(key!("arm", "coulomb_speed"), self.coulomb_speed)
     }
 }
 
 impl LinkSpec {
     fn validate(&self) -> Result<()> {
         let block = Block { kind: "link", name: &self.name };
-        block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")
+        block.number(key!("link", "coulomb_speed"), self.coulomb_speed)
     }
 }
 
 impl LoadSpec {
     fn validate(&self) -> Result<()> {
         let block = Block { kind: "load", name: "" };
-        block.choice("kind", &self.kind, &["mass", "frame"])?;
-        block.range(
-            "min_length",
-            self.min_length,
-            1e-3,
-            self.max_length,
-            "m (below load.max_length)",
-        )?;
-        block.range("max_length", self.max_length, self.min_length, 20.0, "m")?;
+        block.word(key!("load", "kind"), &self.kind)?;
+        let (low, high, below) = (self.min_length, self.max_length, " (below load.max_length)");
+        block.within(key!("load", "min_length"), low, f64::NEG_INFINITY, high, below)?;
+        block.within(key!("load", "max_length"), high, low, f64::INFINITY, "")?;
         if self.is_frame() {
             return Ok(());
         }
-        block.range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "m/s")?;
-        block.range("gravity", self.gravity, -1e3, 1e3, "m/s2")?;
-        block.range("stop_stiffness", self.stop_stiffness, 0.0, 1e12, "N/m")?;
-        block.range("stop_damping", self.stop_damping, 0.0, 1e12, "N s/m")
+        block.number(key!("load", "coulomb_speed"), self.coulomb_speed)?;
+        block.number(key!("load", "gravity"), self.gravity)?;
+        block.number(key!("load", "stop_stiffness"), self.stop_stiffness)?;
+        block.number(key!("load", "stop_damping"), self.stop_damping)
     }
 }

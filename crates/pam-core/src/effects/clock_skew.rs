@@ -25,14 +25,8 @@ pub const INFO: EffectInfo = EffectInfo {
         why: "its delay is no state of the rig; take it out, and give it as the delay of the loop",
         of_supplies: false,
     }),
-    same_data: Some(SameData {
-        effect: "input_path_lag",
-        form: "dead_time",
-        parameter: "delay",
-        size: "offset",
-        without: "rate",
-        held: &[("angle_share", 1.0)],
-    }),
+    // commands go to valves, and where a rig has none to its regulator
+    same_data: &[late("input_path_lag"), late("supply_regulator_delay")],
     acts_in: &["supply", "chamber", "arm", "pull"],
     source: "Mills (1991), offset and skew of clocks",
     forms: &[Form {
@@ -51,6 +45,18 @@ pub const INFO: EffectInfo = EffectInfo {
     }],
     ..EffectInfo::USUAL
 };
+
+/// A dead time in front of what the commands go to.
+const fn late(effect: &'static str) -> SameData {
+    SameData {
+        effect,
+        form: "dead_time",
+        parameter: "delay",
+        size: "offset",
+        without: "rate",
+        held: &[("angle_share", 1.0)],
+    }
+}
 
 /// How late a pressure is recorded at a time [s].
 #[inline]

@@ -4,6 +4,7 @@
 use super::port::{Effect, Port};
 use crate::blocks::gas::Gas;
 use crate::dual::{Dual, LANES, WIDE_LANES};
+use crate::keys::Key;
 use crate::scalar::Scalar;
 use serde::Serialize;
 
@@ -120,6 +121,12 @@ impl EffectParameter {
             like: "",
             needed_in: &[],
         }
+    }
+
+    /// The same as a key of a rig, with a typical value.
+    #[must_use]
+    pub const fn of(key: &Key, default: f64) -> Self {
+        Self::new(key.name, key.unit, key.lower, key.upper, default)
     }
 
     /// The same with values from which a fit starts.
@@ -376,8 +383,9 @@ pub struct EffectInfo {
     pub kink: Option<Kink>,
     /// How it is changed for a linear model about a state of rest.
     pub at_rest: &'static [AtRest],
-    /// Another effect whose recordings it leaves.
-    pub same_data: Option<SameData>,
+    /// Other effects whose recordings it leaves, each in rigs that have what it acts on; of several
+    /// in one rig the first.
+    pub same_data: &'static [SameData],
     /// Its forms.
     pub forms: &'static [Form],
     /// Where it comes from.
@@ -400,7 +408,7 @@ impl EffectInfo {
         dry_friction: false,
         kink: None,
         at_rest: &[],
-        same_data: None,
+        same_data: &[],
         forms: &[],
         source: "",
     };

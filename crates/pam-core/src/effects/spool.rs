@@ -21,6 +21,7 @@ use super::{
 };
 use crate::blocks::gas::Gas;
 use crate::blocks::spool::moved;
+use crate::key;
 use crate::made_by;
 use crate::scalar::{constant, Scalar};
 use std::f64::consts::TAU;
@@ -48,8 +49,8 @@ pub const INFO: EffectInfo = EffectInfo {
 const SECOND_ORDER: Form = Form {
     name: "second_order",
     parameters: &[
-        EffectParameter::new("natural_frequency", "Hz", 0.1, 1e5, 100.0),
-        EffectParameter::new("damping_ratio", "1", 0.01, 100.0, 0.7),
+        EffectParameter::of(key!("valve", "natural_frequency"), 100.0),
+        EffectParameter::of(key!("valve", "damping_ratio"), 0.7),
     ],
     states: &[
         BEGINNING,
@@ -66,10 +67,10 @@ const fn keeps(name: &'static str) -> EffectState {
 }
 
 const DELAYS_AND_CARRIER: &[EffectParameter] = &[
-    EffectParameter::new("opening_delay", "s", 0.0, 10.0, 0.0),
-    EffectParameter::new("closing_delay", "s", 0.0, 10.0, 0.0),
-    EffectParameter::new("carrier_frequency", "Hz", 0.0, 1e5, 0.0),
-    EffectParameter::new("carrier_phase", "1", 0.0, 1.0, 0.0),
+    EffectParameter::of(key!("valve", "opening_delay"), 0.0),
+    EffectParameter::of(key!("valve", "closing_delay"), 0.0),
+    EffectParameter::of(key!("valve", "carrier_frequency"), 0.0),
+    EffectParameter::of(key!("valve", "carrier_phase"), 0.0),
 ];
 
 const SWITCHING_STATES: &[EffectState] = &[

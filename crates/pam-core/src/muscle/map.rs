@@ -11,15 +11,14 @@
 //!
 //! The muscle's geometry gives its volume only.
 
-use super::pressures::{HIGHEST_PRESSURE, LOWEST_PRESSURE};
 use crate::error::{check_range, Error, Result};
+use crate::key;
+use crate::keys::Key;
 use crate::scalar::{constant, Scalar};
 
 /// Nodes along pressure and along contraction at most.
 pub const MOST_NODES: (usize, usize) = (200, 400);
 
-/// Largest force that a map may hold [N].
-const LARGEST_FORCE: f64 = 1e7;
 /// Points along each side of a cell at which it is asked whether it is monotone.
 const CHECKS: u32 = 8;
 /// How often the slopes at the corners of a cell are halved before they are taken away.
@@ -126,8 +125,8 @@ fn place<S: Scalar>(axis: &[f64], value: S) -> (usize, S, S) {
 /// [`Error::Parameter`] for an axis that does not rise or a value that is not possible,
 /// [`Error::Length`] if there are not as many forces as nodes.
 pub fn check(pressure: &[f64], contraction: &[f64], force: &[f64]) -> Result<()> {
-    axis("map_pressure", pressure, MOST_NODES.0, LOWEST_PRESSURE, HIGHEST_PRESSURE, "Pa")?;
-    axis("map_contraction", contraction, MOST_NODES.1, -1.0, 1.0, "(1)")?;
+    axis(key!("muscle", "map_pressure"), pressure, MOST_NODES.0)?;
+    axis(key!("muscle", "map_contraction"), contraction, MOST_NODES.1)?;
     let expected = pressure.len() * contraction.len();
     if force.len() != expected {
         return Err(Error::Length {
@@ -137,25 +136,21 @@ pub fn check(pressure: &[f64], contraction: &[f64], force: &[f64]) -> Result<()>
             why: "a row over muscle.map_contraction for each muscle.map_pressure".into(),
         });
     }
-    for (k, value) in force.iter().enumerate() {
-        let name = format!("muscle.map_force[{k}]");
-        check_range(&name, *value, -LARGEST_FORCE, LARGEST_FORCE, "N")?;
-    }
-    Ok(())
+    key!("muscle", "map_force").check_all("muscle", force)
 }
 
-fn axis(name: &str, values: &[f64], most: usize, low: f64, high: f64, unit: &str) -> Result<()> {
-    let count = format!("muscle.{name} length");
+fn axis(key: &Key, values: &[f64], most: usize) -> Result<()> {
+    let count = format!("muscle.{} length", key.name);
     check_range(&count, values.len() as f64, 2.0, most as f64, "values")?;
-    for (k, value) in values.iter().enumerate() {
-        let label = format!("muscle.{name}[{k}]");
-        check_range(&label, *value, low, high, unit)?;
-        if k > 0 && *value <= values[k - 1] {
-            let allowed = format!("rising values, more than {}", values[k - 1]);
-            return Err(Error::parameter(&label, *value, allowed));
-        }
+    key.check_all("muscle", values)?;
+    match (1..values.len()).find(|k| values[*k] <= values[k - 1]) {
+        None => Ok(()),
+        Some(k) => Err(Error::parameter(
+            format!("muscle.{}[{k}]", key.name),
+            values[k],
+            format!("rising values, more than {}", values[k - 1]),
+        )),
     }
-    Ok(())
 }
 
 /// All nodes, contraction fastest.

@@ -8,19 +8,12 @@ use super::map::MapSurface;
 use super::model::ForceModel;
 use crate::braid::{Dimensions, EndRatio, MuscleGeometry, Profile};
 use crate::error::{check_range, Error, Result};
+use crate::key;
+pub use crate::keys::STRUT;
 use crate::scalar::Scalar;
 
-/// Bounds of the factor on every modulus, with its unit.
-pub const MODULUS_SCALE: (f64, f64, &str) = (0.0, 1e3, "(1)");
-/// Possible values of [`MuscleSpec::softening`].
-pub const SOFTENING: (f64, f64, &str) = (-0.1, 0.1, "1/K");
-/// Possible temperatures of a muscle.
-pub const TEMPERATURE: (f64, f64, &str) = (150.0, 500.0, "K");
 /// Largest order of the stress polynomial.
 pub const HIGHEST_ORDER: usize = 12;
-/// Buckling load of a muscle that pushes like a strut, whatever it is pushed with [N]; by default a
-/// muscle pushes nothing.
-pub const STRUT: f64 = 1e9;
 
 /// Share of its moduli at the reference temperature that a muscle has at a temperature [1].
 #[inline]
@@ -301,52 +294,38 @@ impl MuscleSpec {
     pub fn validate(&self) -> Result<()> {
         let model = self.force_model()?;
         self.profile()?;
-        let degree = std::f64::consts::PI / 180.0;
-        check_range("muscle.count", f64::from(self.count), 1.0, 1000.0, "muscles")?;
-        check_range("muscle.rest_length", self.rest_length, 1e-3, 20.0, "m")?;
-        check_range("muscle.rest_diameter", self.rest_diameter, 1e-4, 2.0, "m")?;
-        check_range(
-            "muscle.braid_angle",
-            self.braid_angle,
-            45.0 * degree,
-            89.0 * degree,
-            "rad (45 to 89 deg)",
-        )?;
+        let numbers = [
+            (key!("muscle", "count"), f64::from(self.count)),
+            (key!("muscle", "rest_length"), self.rest_length),
+            (key!("muscle", "rest_diameter"), self.rest_diameter),
+            (key!("muscle", "braid_angle"), self.braid_angle),
+            (key!("muscle", "modulus_scale"), self.modulus_scale),
+            (key!("muscle", "softening"), self.softening),
+            (key!("muscle", "temperature"), self.temperature),
+            (key!("muscle", "reference_temperature"), self.reference_temperature),
+            (key!("muscle", "friction_coefficient"), self.friction_coefficient),
+            (key!("muscle", "friction_pressure_slope"), self.friction_pressure_slope),
+            (key!("muscle", "friction_floor"), self.friction_floor),
+            (key!("muscle", "friction_presliding"), self.friction_presliding),
+            (key!("muscle", "buckling_load"), self.buckling_load),
+            (key!("muscle", "k0"), self.k0),
+            (key!("muscle", "contraction_slope"), self.contraction_slope),
+            (key!("muscle", "extension_slope"), self.extension_slope),
+            (key!("muscle", "neck_floor"), self.neck_floor),
+        ];
+        numbers.iter().try_for_each(|(key, value)| key.check_all("muscle", &[*value]))?;
         let thickest = 0.45 * self.rest_diameter;
+        let (least, ..) = key!("muscle", "wall_thickness").bounds();
         check_range(
             "muscle.wall_thickness",
             self.wall_thickness,
-            0.0,
+            least,
             thickest,
             "m (0.45 rest diameters)",
         )?;
         self.check_elastic(model)?;
-        let (low, high, unit) = MODULUS_SCALE;
-        check_range("muscle.modulus_scale", self.modulus_scale, low, high, unit)?;
-        let (low, high, unit) = SOFTENING;
-        check_range("muscle.softening", self.softening, low, high, unit)?;
-        let (low, high, unit) = TEMPERATURE;
-        check_range("muscle.temperature", self.temperature, low, high, unit)?;
-        check_range("muscle.reference_temperature", self.reference_temperature, low, high, unit)?;
         check_softened("muscle", self.softening, self.temperature, self.reference_temperature)?;
-        for (factor, name) in self.extension_factors.iter().zip(["0", "1", "2"]) {
-            check_range(&format!("muscle.extension_factors[{name}]"), *factor, -10.0, 10.0, "(1)")?;
-        }
-        check_range("muscle.friction_coefficient", self.friction_coefficient, -1.0, 1.0, "(1)")?;
-        check_range(
-            "muscle.friction_pressure_slope",
-            self.friction_pressure_slope,
-            -1e-4,
-            1e-4,
-            "1/Pa",
-        )?;
-        check_range("muscle.friction_floor", self.friction_floor, 0.0, 1.0, "(1)")?;
-        check_range("muscle.friction_presliding", self.friction_presliding, 1e-7, 1.0, "m")?;
-        check_range("muscle.buckling_load", self.buckling_load, 0.0, STRUT, "N")?;
-        check_range("muscle.k0", self.k0, 0.3, 10.0, "(1)")?;
-        check_range("muscle.contraction_slope", self.contraction_slope, -20.0, 20.0, "(1)")?;
-        check_range("muscle.extension_slope", self.extension_slope, -20.0, 20.0, "(1)")?;
-        check_range("muscle.neck_floor", self.neck_floor, 0.3, 1.0, "(1)")?;
+        key!("muscle", "extension_factors").check_all("muscle", &self.extension_factors)?;
         Ok(())
     }
 
@@ -389,11 +368,9 @@ impl MuscleSpec {
                 return Err(Error::Choice { name: format!("muscle.{name}"), value, allowed });
             }
         }
-        for (name, value) in
-            [("c10", self.c10), ("c01", self.c01), ("bladder_modulus", self.bladder_modulus)]
-        {
-            check_range(&format!("muscle.{name}"), value, -1e13, 1e13, "Pa")?;
-        }
+        key!("muscle", "c10").check_all("muscle", &[self.c10])?;
+        key!("muscle", "c01").check_all("muscle", &[self.c01])?;
+        key!("muscle", "bladder_modulus").check_all("muscle", &[self.bladder_modulus])?;
         if map {
             return super::map::check(&self.map_pressure, &self.map_contraction, &self.map_force);
         }
@@ -415,11 +392,7 @@ impl MuscleSpec {
                 why: "one for each muscle.modulus_slope".into(),
             });
         }
-        for (k, (slope, offset)) in self.modulus_slope.iter().zip(&self.modulus_offset).enumerate()
-        {
-            check_range(&format!("muscle.modulus_slope[{k}]"), *slope, -1e6, 1e6, "(1)")?;
-            check_range(&format!("muscle.modulus_offset[{k}]"), *offset, -1e13, 1e13, "Pa")?;
-        }
-        Ok(())
+        key!("muscle", "modulus_slope").check_all("muscle", &self.modulus_slope)?;
+        key!("muscle", "modulus_offset").check_all("muscle", &self.modulus_offset)
     }
 }

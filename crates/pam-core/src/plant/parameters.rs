@@ -2,6 +2,7 @@
 
 use crate::dual::Dual;
 use crate::error::check_range;
+use crate::keys::{Bounds, Key};
 use crate::scalar::{constant, Scalar};
 use crate::{Error, Result};
 use std::sync::Arc;
@@ -39,15 +40,23 @@ struct Table {
     others: Vec<(String, ParameterId)>,
 }
 
-/// Least and greatest possible value, with the unit.
-pub(crate) type Bounds = (f64, f64, &'static str);
-
 impl Parameters {
-    /// Append a parameter by its dotted name, for example `valve.flexor.null_voltage`.
+    /// Append a parameter of a block, under the name of the block in full and its own, for example
+    /// `valve.flexor.null_voltage`.
     ///
     /// # Errors
     /// [`Error::Parameter`] for a value outside its bounds.
-    pub(crate) fn add(&mut self, name: String, value: f64, bounds: Bounds) -> Result<ParameterId> {
+    pub(crate) fn add(&mut self, block: &str, key: &Key, value: f64) -> Result<ParameterId> {
+        self.add_between(format!("{block}.{}", key.name), value, key.bounds())
+    }
+
+    /// The same for one that is no key of a block.
+    pub(crate) fn add_between(
+        &mut self,
+        name: String,
+        value: f64,
+        bounds: Bounds,
+    ) -> Result<ParameterId> {
         check(&name, value, bounds)?;
         let table = Arc::make_mut(&mut self.table);
         table.names.push(name);
@@ -140,13 +149,14 @@ impl<S: Scalar> std::ops::Index<ParameterId> for Values<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::key;
 
     #[test]
     fn names_are_found_and_unknown_names_are_errors() {
         let mut table = Parameters::default();
         let (a, b) = (
-            table.add("arm.payload".into(), 2.0, (0.0, 9.0, "kg")).unwrap(),
-            table.add("valve.flexor.null_voltage".into(), 5.0, (0.0, 9.0, "V")).unwrap(),
+            table.add("arm", key!("arm", "payload"), 2.0).unwrap(),
+            table.add("valve.flexor", key!("valve", "null_voltage"), 5.0).unwrap(),
         );
         assert_eq!(table.find("valve.flexor.null_voltage").unwrap(), b);
         assert_eq!((table.value(a), table.lift::<f64>()[b]), (2.0, 5.0));

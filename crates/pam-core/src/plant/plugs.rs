@@ -113,8 +113,11 @@ fn instance(
         let Some(value) = effect.parameters.get(key).copied() else {
             return model(format!("effect '{}' lacks its parameter '{key}' [{unit}]", effect.id));
         };
-        let id =
-            table.add(format!("{name}.{key}"), value, (parameter.lower, parameter.upper, unit))?;
+        let id = table.add_between(
+            format!("{name}.{key}"),
+            value,
+            (parameter.lower, parameter.upper, unit),
+        )?;
         table.also(format!("{full}.{key}"), id);
         parameters.push(id);
     }

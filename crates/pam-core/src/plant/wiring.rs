@@ -1,7 +1,7 @@
 //! How the air and the effects of a description fit together: ports become indices, numbers become
 //! parameters.
 
-use super::parameters::{Bounds, ParameterId, Parameters};
+use super::parameters::{ParameterId, Parameters};
 use super::plugs::switch_on;
 use super::ports::Ports as EffectPorts;
 use super::units::{
@@ -10,11 +10,12 @@ use super::units::{
 };
 use super::wired::Wiring;
 use super::wiring_motion::{body, coordinates, groups};
-use crate::blocks::supply::FASTEST;
 use crate::blocks::valve::AreaTable;
 use crate::description::{coordinate_names, dotted, RigSpec, SupplySpec, ValveSpec};
 use crate::effects::{EffectInfo, Form};
 use crate::error::model;
+use crate::key;
+use crate::keys::Key;
 use crate::Result;
 
 /// Finds ports.
@@ -182,31 +183,23 @@ fn inlet(spec: &RigSpec, ports: &Ports<'_>, supply: &SupplySpec) -> Result<Optio
 
 fn supplies(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<Vec<SupplyUnit>> {
     let mut unit = |supply: &SupplySpec| {
-        let name = |key: &str| format!("{}.{key}", dotted("supply", &supply.name));
+        let block = dotted("supply", &supply.name);
         let inlet = inlet(spec, ports, supply)?;
         Ok(match supply.kind.as_str() {
             "tank" => {
-                SupplyUnit::Tank(table.add(name("volume"), supply.volume, (1e-7, 1e4, "m3"))?)
+                SupplyUnit::Tank(table.add(&block, key!("supply", "volume"), supply.volume)?)
             }
             "regulator" => SupplyUnit::Regulator {
                 time_constant: table.add(
-                    name("time_constant"),
+                    &block,
+                    key!("supply", "time_constant"),
                     supply.time_constant,
-                    (1e-5, 1e3, "s"),
                 )?,
-                droop: table.add(name("droop"), supply.droop, (0.0, 1e13, "Pa s/kg"))?,
-                rise_limit: table.add(
-                    name("rise_limit"),
-                    supply.rise_limit,
-                    (1.0, FASTEST, "Pa/s"),
-                )?,
-                fall_limit: table.add(
-                    name("fall_limit"),
-                    supply.fall_limit,
-                    (1.0, FASTEST, "Pa/s"),
-                )?,
-                dead_time: table.add(name("dead_time"), supply.dead_time, (0.0, 10.0, "s"))?,
-                dead_band: table.add(name("dead_band"), supply.dead_band, (0.0, 1e7, "Pa"))?,
+                droop: table.add(&block, key!("supply", "droop"), supply.droop)?,
+                rise_limit: table.add(&block, key!("supply", "rise_limit"), supply.rise_limit)?,
+                fall_limit: table.add(&block, key!("supply", "fall_limit"), supply.fall_limit)?,
+                dead_time: table.add(&block, key!("supply", "dead_time"), supply.dead_time)?,
+                dead_band: table.add(&block, key!("supply", "dead_band"), supply.dead_band)?,
                 inlet,
             },
             _ => SupplyUnit::Constant,
@@ -215,13 +208,10 @@ fn supplies(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result
     spec.supplies.iter().map(&mut unit).collect()
 }
 
-/// Bounds of what a gauge reads too much.
-const ZERO: Bounds = (-1e7, 1e7, "Pa");
-
 fn supply_zeros(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<ParameterId>> {
     let mut zero = |supply: &SupplySpec| {
-        let name = format!("{}.pressure_zero", dotted("supply", &supply.name));
-        table.add(name, supply.pressure_zero, ZERO)
+        let block = dotted("supply", &supply.name);
+        table.add(&block, key!("supply", "pressure_zero"), supply.pressure_zero)
     };
     spec.supplies.iter().map(&mut zero).collect()
 }
@@ -250,11 +240,7 @@ fn valves(spec: &RigSpec, ports: &Ports<'_>, table: &mut Parameters) -> Result<V
             to,
             table: AreaTable::new(&valve.opening, &valve.fraction)?,
             passes: passes(valve, &block, table)?,
-            null: table.add(
-                format!("{block}.null_voltage"),
-                valve.null_voltage,
-                (-1e3, 1e3, "V"),
-            )?,
+            null: table.add(&block, key!("valve", "null_voltage"), valve.null_voltage)?,
             half_range: valve.half_range,
             spool: spool(valve, &block, table)?,
         });
@@ -270,28 +256,27 @@ fn spool(
 ) -> Result<Option<(&'static Form, Vec<ParameterId>)>> {
     let Some(form) = valve.spool_form()? else { return Ok(None) };
     let parameters = form.parameters.iter().map(|parameter| {
-        let (name, bounds) = (parameter.name, (parameter.lower, parameter.upper, parameter.unit));
-        table.add(format!("{block}.{name}"), valve.of_spool(name), bounds)
+        let (name, value) = (format!("{block}.{}", parameter.name), valve.of_spool(parameter.name));
+        table.add_between(name, value, (parameter.lower, parameter.upper, parameter.unit))
     });
     Ok(Some((form, parameters.collect::<Result<_>>()?)))
 }
 
 /// What a valve passes where it is wide open.
 fn passes(valve: &ValveSpec, block: &str, table: &mut Parameters) -> Result<Passes> {
-    let mut add = |key: &str, value, bounds| table.add(format!("{block}.{key}"), value, bounds);
+    let mut add = |key: &Key, value| table.add(block, key, value);
     if valve.flow == "orifice" {
-        let area = add("discharge_area_max", valve.discharge_area_max, (0.0, 1.0, "m2"))?;
+        let area = add(key!("valve", "discharge_area_max"), valve.discharge_area_max)?;
         return Ok(Passes::Area(area));
     }
-    let (conductance, ratio) = ((0.0, 1.0, "m3/(s Pa)"), (0.0, 0.9, ""));
     Ok(Passes::Conductances([
         [
-            add("fill_conductance", valve.fill_conductance, conductance)?,
-            add("fill_critical_ratio", valve.fill_critical_ratio, ratio)?,
+            add(key!("valve", "fill_conductance"), valve.fill_conductance)?,
+            add(key!("valve", "fill_critical_ratio"), valve.fill_critical_ratio)?,
         ],
         [
-            add("vent_conductance", valve.vent_conductance, conductance)?,
-            add("vent_critical_ratio", valve.vent_critical_ratio, ratio)?,
+            add(key!("valve", "vent_conductance"), valve.vent_conductance)?,
+            add(key!("valve", "vent_critical_ratio"), valve.vent_critical_ratio)?,
         ],
     ]))
 }
@@ -327,18 +312,13 @@ fn lines(
             }
             inlets.push((k, to));
         }
-        let name = |key: &str| format!("{block}.{key}");
         let path = if line.kind == "tube" {
             Path::Tube {
-                length: table.add(name("length"), line.length, (1e-4, 1e4, "m"))?,
-                diameter: table.add(name("diameter"), line.diameter, (1e-5, 1.0, "m"))?,
+                length: table.add(&block, key!("line", "length"), line.length)?,
+                diameter: table.add(&block, key!("line", "diameter"), line.diameter)?,
             }
         } else {
-            Path::Orifice(table.add(
-                name("discharge_area"),
-                line.discharge_area,
-                (0.0, 1.0, "m2"),
-            )?)
+            Path::Orifice(table.add(&block, key!("line", "discharge_area"), line.discharge_area)?)
         };
         units.push(LineUnit { from, to, path, segments: line.segments });
     }
@@ -358,8 +338,8 @@ fn waves(
         let (Path::Tube { length, diameter }, true) = (unit.path, line.segments > 0) else {
             continue;
         };
-        let (name, segments) = (format!("{}.alpha", dotted("line", &line.name)), line.segments);
-        let alpha = table.add(name, line.alpha, (0.5, 2.0, ""))?;
+        let (block, segments) = (dotted("line", &line.name), line.segments);
+        let alpha = table.add(&block, key!("line", "alpha"), line.alpha)?;
         units.push(WaveUnit { line: k, length, diameter, alpha, segments, gas, flow });
         (gas, flow) = (gas + segments - 1, flow + segments);
     }
@@ -387,29 +367,25 @@ fn gases(
         Node::Ambient => 0.0,
     };
     for chamber in &spec.chambers {
-        let name = |key: &str| format!("{}.{key}", dotted("chamber", &chamber.name));
-        let filled = spec.muscles.iter().any(|m| m.chamber == dotted("chamber", &chamber.name));
-        let least = if filled { 0.0 } else { 1e-9 };
-        let volume = table.add(name("dead_volume"), chamber.dead_volume, (least, 1e4, "m3"))?;
+        let block = dotted("chamber", &chamber.name);
+        let volume = table.add(&block, key!("chamber", "dead_volume"), chamber.dead_volume)?;
         let law = if chamber.gas == "energy_balance" {
-            let (name, value) =
-                (name("heat_transfer_coefficient"), chamber.heat_transfer_coefficient);
-            GasLaw::Energy(table.add(name, value, (0.0, 1e5, "W/(m2 K)"))?)
+            let key = key!("chamber", "heat_transfer_coefficient");
+            GasLaw::Energy(table.add(&block, key, chamber.heat_transfer_coefficient)?)
         } else {
-            let polytropic = (0.2, 3.0, "");
             GasLaw::Coefficients([
-                table.add(name("alpha_in"), chamber.alpha_in, polytropic)?,
-                table.add(name("alpha_out"), chamber.alpha_out, polytropic)?,
-                table.add(name("alpha"), chamber.alpha, polytropic)?,
+                table.add(&block, key!("chamber", "alpha_in"), chamber.alpha_in)?,
+                table.add(&block, key!("chamber", "alpha_out"), chamber.alpha_out)?,
+                table.add(&block, key!("chamber", "alpha"), chamber.alpha)?,
             ])
         };
         units.push(plain(Some(volume), law, chamber.initial_pressure));
     }
     for (k, end) in inlets {
         let line = &spec.lines[*k];
-        let name = |key: &str| format!("{}.{key}", dotted("line", &line.name));
-        let volume = table.add(name("inlet_volume"), line.inlet_volume, (0.0, 1e3, "m3"))?;
-        let zero = table.add(name("pressure_zero"), line.pressure_zero, ZERO)?;
+        let block = dotted("line", &line.name);
+        let volume = table.add(&block, key!("line", "inlet_volume"), line.inlet_volume)?;
+        let zero = table.add(&block, key!("line", "pressure_zero"), line.pressure_zero)?;
         let wave = waves.iter().find(|wave| wave.line == *k);
         let law = wave.map_or(GasLaw::Isothermal, |wave| GasLaw::Alike(wave.alpha));
         let inlet = plain(Some(volume), law, begins(*end));
@@ -424,11 +400,12 @@ fn gases(
 
 fn sensors(spec: &RigSpec, table: &mut Parameters, gases: &mut [GasUnit]) -> Result<()> {
     for sensor in &spec.sensors {
-        let name = |key: &str| format!("{}.{key}", dotted("sensors", &sensor.name));
-        let pressure = table.add(name("pressure_zero"), sensor.pressure_zero, ZERO)?;
-        table.add(name("angle_zero"), sensor.angle_zero, (-7.0, 7.0, "rad"))?;
+        let block = dotted("sensors", &sensor.name);
+        let mut add = |key: &Key, value| table.add(&block, key, value);
+        let pressure = add(key!("sensors", "pressure_zero"), sensor.pressure_zero)?;
+        add(key!("sensors", "angle_zero"), sensor.angle_zero)?;
         if spec.load.is_some() && sensor.name.is_empty() {
-            table.add(name("length_zero"), sensor.length_zero, (-10.0, 10.0, "m"))?;
+            add(key!("sensors", "length_zero"), sensor.length_zero)?;
         }
         let chambers = spec.chambers.iter().map(|c| &c.name);
         let known =

@@ -6,12 +6,10 @@ use crate::blocks::arm::planar::Stops;
 use crate::blocks::joint::Joint;
 use crate::description::{dotted, ArmSpec, JointSpec, LinkSpec, LoadSpec, RigSpec};
 use crate::error::model;
-use crate::muscle::spec::{MODULUS_SCALE, SOFTENING, TEMPERATURE};
+use crate::key;
+use crate::keys::Key;
 use crate::muscle::{CompiledMuscle, Muscle};
 use crate::Result;
-
-/// Bounds of an angle that an arm is mounted at, or that a spring is at rest at.
-const TURNED: (f64, f64, &str) = (-7.0, 7.0, "rad");
 
 pub(super) fn coordinates(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<Coordinate>> {
     if let Some(load) = &spec.load {
@@ -70,9 +68,8 @@ pub(super) fn coordinates(spec: &RigSpec, table: &mut Parameters) -> Result<Vec<
 
 /// A joint with its stops and its spring.
 fn coordinate(joint: &JointSpec, table: &mut Parameters) -> Result<Coordinate> {
-    let mut add = |key: &str, value, bounds| {
-        table.add(format!("{}.{key}", dotted("joint", &joint.name)), value, bounds)
-    };
+    let block = dotted("joint", &joint.name);
+    let mut add = |key: &Key, value| table.add(&block, key, value);
     Ok(Coordinate {
         rest: joint.rest_angle,
         stops: Some(Stops {
@@ -82,8 +79,8 @@ fn coordinate(joint: &JointSpec, table: &mut Parameters) -> Result<Coordinate> {
             damping: joint.stop_damping,
         }),
         spring: Some([
-            add("stiffness", joint.stiffness, (0.0, 1e9, "N m/rad"))?,
-            add("spring_angle", joint.spring_angle, TURNED)?,
+            add(key!("joint", "stiffness"), joint.stiffness)?,
+            add(key!("joint", "spring_angle"), joint.spring_angle)?,
         ]),
         zero: None,
     })
@@ -157,14 +154,14 @@ pub(super) fn groups(
             },
         };
         let own = &group.muscle;
-        let mut add = |key: &str, value, bounds| table.add(format!("{block}.{key}"), value, bounds);
+        let mut add = |key: &Key, value| table.add(&block, key, value);
         units.push(Group {
             chamber,
             coordinate,
             joint,
-            scale: add("modulus_scale", own.modulus_scale, MODULUS_SCALE)?,
-            softening: add("softening", own.softening, SOFTENING)?,
-            temperature: add("temperature", own.temperature, TEMPERATURE)?,
+            scale: add(key!("muscle", "modulus_scale"), own.modulus_scale)?,
+            softening: add(key!("muscle", "softening"), own.softening)?,
+            temperature: add(key!("muscle", "temperature"), own.temperature)?,
             reference_temperature: group.muscle.reference_temperature,
             count: f64::from(group.muscle.count),
             rest_length: group.muscle.rest_length,
@@ -180,10 +177,11 @@ pub(super) fn groups(
 
 pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
     if let Some(load) = spec.load.as_ref().filter(|load| !load.is_frame()) {
+        let mut add = |key: &Key, value| table.add("load", key, value);
         return Ok(BodyUnit::Mass {
-            mass: table.add("load.mass".into(), load.mass, (1e-6, 1e6, "kg"))?,
-            viscous: table.add("load.viscous".into(), load.viscous, (0.0, 1e9, "N s/m"))?,
-            coulomb: table.add("load.coulomb".into(), load.coulomb, (0.0, 1e9, "N"))?,
+            mass: add(key!("load", "mass"), load.mass)?,
+            viscous: add(key!("load", "viscous"), load.viscous)?,
+            coulomb: add(key!("load", "coulomb"), load.coulomb)?,
             coulomb_speed: load.coulomb_speed,
             gravity: load.gravity,
         });
@@ -192,18 +190,15 @@ pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
     if arm.kind == "planar" {
         return planar(arm, table);
     }
+    let mut add = |key: &Key, value| table.add("arm", key, value);
     Ok(BodyUnit::OneLink {
-        inertia: table.add("arm.inertia".into(), arm.inertia, (0.0, 1e6, "kg m2"))?,
-        first_moment: table.add(
-            "arm.first_moment".into(),
-            arm.first_moment,
-            (-1e6, 1e6, "kg m"),
-        )?,
-        payload: table.add("arm.payload".into(), arm.payload, (0.0, 1e6, "kg"))?,
-        viscous: table.add("arm.viscous".into(), arm.viscous, (0.0, 1e6, "N m s/rad"))?,
-        coulomb: table.add("arm.coulomb".into(), arm.coulomb, (0.0, 1e6, "N m"))?,
-        base_angle: table.add("arm.base_angle".into(), arm.base_angle, TURNED)?,
-        centre_angle: table.add("arm.centre_angle".into(), arm.centre_angle, TURNED)?,
+        inertia: add(key!("arm", "inertia"), arm.inertia)?,
+        first_moment: add(key!("arm", "first_moment"), arm.first_moment)?,
+        payload: add(key!("arm", "payload"), arm.payload)?,
+        viscous: add(key!("arm", "viscous"), arm.viscous)?,
+        coulomb: add(key!("arm", "coulomb"), arm.coulomb)?,
+        base_angle: add(key!("arm", "base_angle"), arm.base_angle)?,
+        centre_angle: add(key!("arm", "centre_angle"), arm.centre_angle)?,
         length: arm.length,
         coulomb_speed: arm.coulomb_speed,
         gravity: arm.gravity,
@@ -212,21 +207,20 @@ pub(super) fn body(spec: &RigSpec, table: &mut Parameters) -> Result<BodyUnit> {
 
 fn planar(arm: &ArmSpec, table: &mut Parameters) -> Result<BodyUnit> {
     let mut unit = |link: &LinkSpec| -> Result<LinkUnit> {
-        let mut add = |key: &str, value, (low, high, unit)| {
-            table.add(format!("{}.{key}", dotted("link", &link.name)), value, (low, high, unit))
-        };
+        let block = dotted("link", &link.name);
+        let mut add = |key: &Key, value| table.add(&block, key, value);
         Ok(LinkUnit {
-            length: add("length", link.length, (0.0, 1e3, "m"))?,
-            mass: add("mass", link.mass, (0.0, 1e6, "kg"))?,
-            centre: add("centre", link.centre, (-1e3, 1e3, "m"))?,
-            inertia: add("inertia", link.inertia, (0.0, 1e6, "kg m2"))?,
-            payload: add("payload", link.payload, (0.0, 1e6, "kg"))?,
-            viscous: add("viscous", link.viscous, (0.0, 1e6, "N m s/rad"))?,
-            coulomb: add("coulomb", link.coulomb, (0.0, 1e6, "N m"))?,
+            length: add(key!("link", "length"), link.length)?,
+            mass: add(key!("link", "mass"), link.mass)?,
+            centre: add(key!("link", "centre"), link.centre)?,
+            inertia: add(key!("link", "inertia"), link.inertia)?,
+            payload: add(key!("link", "payload"), link.payload)?,
+            viscous: add(key!("link", "viscous"), link.viscous)?,
+            coulomb: add(key!("link", "coulomb"), link.coulomb)?,
             coulomb_speed: link.coulomb_speed,
         })
     };
     let links = arm.links.iter().map(&mut unit).collect::<Result<_>>()?;
-    let base_angle = table.add("arm.base_angle".into(), arm.base_angle, TURNED)?;
+    let base_angle = table.add("arm", key!("arm", "base_angle"), arm.base_angle)?;
     Ok(BodyUnit::Planar { gravity: arm.gravity, base_angle, links })
 }

@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
 from pamrs.diagnosis.evidence._predictive import bootstrapped
-from pamrs.diagnosis.fit import Problem, form_in
+from pamrs.diagnosis.fit import Problem, form_in, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -465,7 +465,7 @@ def _shared_out(
     """Share probabilities out between sets that are the same data, by the odds before any data."""
     for one in named:
         for effect in one.effects:
-            same = info_of(effect).same_data
+            same = same_data_in(one.fit.rig, effect)
             if same is None or not same_recordings(one, effect, seconds):
                 continue
             names = {same.effect if e == effect else e for e in one.effects}
@@ -487,7 +487,7 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
     """
-    same = info_of(effect).same_data
+    same = same_data_in(candidate.fit.rig, effect)
     if same is None:
         return False
     own: dict[str, float] = next(
@@ -599,8 +599,7 @@ def stands(candidate: Candidate, seconds: float) -> bool:
         )
         return abs(telling) * seconds < abs(size)
 
-    known = ((effect, info_of(effect).same_data) for effect in candidate.effects)
-    return any(at_rest(effect, same) for effect, same in known if same is not None)
+    return any(at_rest(e, same) for e in candidate.effects for same in info_of(e).same_data)
 
 
 def unlikely(candidate: Candidate, ranging: Ranges) -> float:

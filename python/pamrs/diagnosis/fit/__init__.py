@@ -5,15 +5,15 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `predicted_with_doubt`, `free_baseline`, `bin_width`, `Key`; `levenberg_marquardt`; `Start`,
 `starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
 `with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
-`Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `ACTS`, `acts_in`,
-`depends`, `fits`, `places_of` (where effects act); `holdable`, `without_passing`,
+`Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`,
+`depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`, `without_passing`,
 `known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
 parameters); `spread_over_pieces` (standard deviations that hold for coloured residuals).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.fit._acting import ACTS, acts_in, depends, fits, places_of
+from pamrs.diagnosis.fit._acting import acts_in, depends, fits, places_of, same_data_in
 from pamrs.diagnosis.fit._fitting import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
@@ -59,7 +59,6 @@ __all__ = [
     "LEAST_START",
     "FIT_BIN_TIME",
     "PIECE_TIME",
-    "ACTS",
     "CHOSEN",
     "Events",
     "Fit",
@@ -85,6 +84,7 @@ __all__ = [
     "places_of",
     "predicted_with_doubt",
     "residuals",
+    "same_data_in",
     "spread_over_pieces",
     "stacked",
     "starts_of",

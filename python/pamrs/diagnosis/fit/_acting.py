@@ -5,28 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
+from pamrs.effects import (
+    EFFECTS,
+    EffectInfo,
+    SameData,
+    id_of,
+    info_of,
+    is_effect,
+    place_of,
+    term_of,
+)
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
-from pamrs.rig.schema import kind_of, split_name
+from pamrs.rig.schema import ACTS, kind_of, split_name
 
-__all__ = ["ACTS", "acts_in", "core_names", "depends", "fits", "places_of"]
+__all__ = ["acts_in", "core_names", "depends", "fits", "places_of", "same_data_in"]
 
-ACTS: dict[str, tuple[str, ...]] = {
-    "supply": ("supply",),
-    "valve": ("supply", "chamber"),
-    "line": ("supply", "chamber"),
-    "chamber": ("chamber",),
-    "muscle": ("arm", "pull"),
-    "joint": ("arm",),
-    "arm": ("arm",),
-}
-"""Kinds of block of the cut rig in which the effects of a block of the rig act, unless they say
-others themselves.
-
-Of several tanks, chambers or joints an effect acts on every one, with the same parameters, where it
-has no place; with one (``leak_muscle@flexor``), on that block alone.
-"""
 _CHANNELS = {
     "supply": ("supply_pressure", "supply_command"),
     "valve": ("valve_command",),
@@ -45,7 +39,12 @@ def depends(block: Block, name: str) -> bool:
 
 
 def acts_in(effect: str, block: Block) -> bool:
-    """Whether an effect acts inside a block of the cut chain."""
+    """Whether an effect acts inside a block of the cut chain: that of its own block of the rig,
+    unless it says others.
+
+    Of several tanks, chambers or joints an effect acts on every one, with the same parameters,
+    where it has no place; with one (``leak_muscle@flexor``), on that block alone.
+    """
     info, at = info_of(effect), place_of(effect)
     kinds = info.acts_in or ACTS.get(info.block, ())
     there = any(kind in kinds for kind in (block.kind, *block.beside))
@@ -122,6 +121,16 @@ def fits(rig: Rig, effect: str) -> bool:
         blocks = (split_name(name) for name, given in rig.parameters.items() if given.tol > 0.0)
         if {f"{block}.{key}" for block, _, key in blocks}.intersection(info.stated_by):
             return False
+    return _acts_on(rig, info)
+
+
+def same_data_in(rig: Rig, effect: str) -> SameData | None:
+    """The other effect whose recordings an effect leaves in a rig."""
+    return next((s for s in info_of(effect).same_data if _acts_on(rig, EFFECTS[s.effect])), None)
+
+
+def _acts_on(rig: Rig, info: EffectInfo) -> bool:
+    """Whether a rig has what an effect acts on."""
     usual = info.at or ("joint" if info.block == "arm" else "chamber")
     return any(
         kind in ("", kind_of(block, table))

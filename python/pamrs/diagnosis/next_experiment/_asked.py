@@ -430,7 +430,7 @@ def same_data(ambiguity: list[list[str]]) -> str:
     """
     for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
         for effect in one:
-            same = info_of(effect).same_data if is_effect(effect) else None
-            if same is not None and other == one - {effect} | {same.effect}:
-                return same.told_by
+            for same in info_of(effect).same_data if is_effect(effect) else ():
+                if other == one - {effect} | {same.effect}:
+                    return same.told_by
     return ""

@@ -18,7 +18,7 @@ from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
-from pamrs.rig.schema import qualified
+from pamrs.rig.schema import keys_of, qualified
 from pamrs.simulation import default_step
 
 __all__ = [
@@ -170,32 +170,6 @@ def _not_recorded(names: Iterable[str]) -> str:
     return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
 
 
-_SUPPLY = (
-    "volume",
-    "time_constant",
-    "droop",
-    "dead_time",
-    "rise_limit",
-    "fall_limit",
-    "dead_band",
-)
-_VALVE = (
-    "discharge_area_max",
-    "fill_conductance",
-    "fill_critical_ratio",
-    "vent_conductance",
-    "vent_critical_ratio",
-    "null_voltage",
-    "natural_frequency",
-    "damping_ratio",
-    "opening_delay",
-    "closing_delay",
-    "carrier_frequency",
-    "carrier_phase",
-)
-_LINE = ("length", "diameter", "discharge_area", "inlet_volume")
-_WAVES = ("alpha",)  # of a tube that has segments
-_CHAMBER = ("dead_volume", "alpha_in", "alpha_out", "alpha", "heat_transfer_coefficient")
 _SHAPE = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness")  # gives a volume
 _PRESSURE = {
     "supply": "supply_pressure",
@@ -317,6 +291,16 @@ class _Map:
             dict.fromkeys(command for way in self.around(block) for command in way.command)
         )
 
+    def moved(self, block: str, *names: str) -> set[str]:
+        """What can carry a derivative of some blocks of the rig, zeros of gauges apart."""
+        tables = self.rig.tables(block)
+        return {
+            f"{qualified(block, name)}.{key.name}"
+            for name in names
+            for key in keys_of(block, tables[name])
+            if key.moves and not key.name.endswith("_zero")
+        }
+
     def zero(self, key: str, name: str) -> str:
         """Dotted name of the zero of a block's sensor, its own or the common one."""
         own = self.rig.tables("sensors")
@@ -356,10 +340,7 @@ class _Map:
         for way in self.around(block):
             for full in (way.name, *way.between):
                 kind, _, name = full.partition(".")
-                keys = _VALVE if kind == "valve" else _LINE
-                if kind == "line" and self.rig.tables("line")[name].get("segments"):
-                    keys = (*keys, *_WAVES)
-                names |= {f"{full}.{key}" for key in keys}
+                names |= self.moved(kind, name)
         return names
 
     def tubes_at(self, block: str) -> tuple[Tube, ...]:
@@ -436,9 +417,7 @@ class _Map:
             return Unjudged(full, covers, why)
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
-        names = {
-            f"{node}.{key}" for node in (full, *(nodes[1:] if unread else ())) for key in _SUPPLY
-        }
+        names = self.moved("supply", name, *(behind if unread else ()))
         for node in nodes:
             names |= self.of_ways(node) | self.zeros(self.nodes_at(node), ())
         return Block(
@@ -486,8 +465,8 @@ class _Map:
             return lacking
         names = (
             self.of_ways(full)
-            | {f"{full}.{key}" for key in _CHAMBER}
-            | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
+            | self.moved("chamber", name)
+            | self.moved("supply", *unread)
             | self.zeros(self.nodes_at(full), joints or [""])
             | self.of_motion(joints)
             | {
@@ -556,9 +535,7 @@ class _Map:
         if lacking := self.lacking(full, covers, (*drives, *self.angles)):
             return lacking
         names = (
-            self.of_ways(full)
-            | {f"{qualified('supply', supply)}.{key}" for supply in unread for key in _SUPPLY}
-            | self.zeros(self.nodes_at(full), ())
+            self.of_ways(full) | self.moved("supply", *unread) | self.zeros(self.nodes_at(full), ())
         )
         return Block(
             full,

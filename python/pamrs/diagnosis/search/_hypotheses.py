@@ -40,6 +40,7 @@ from pamrs.diagnosis.fit import (
     form_in,
     predicted_with_doubt,
     residuals,
+    same_data_in,
     two_at_a_time,
 )
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
@@ -77,7 +78,6 @@ from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
 from pamrs.effects import (
     CATALOGUE,
     EFFECTS,
-    EffectInfo,
     SameData,
     exclude,
     id_of,
@@ -905,15 +905,17 @@ def _with_same_data(
     others: list[Candidate | None] = []
     for single in singles:
         (effect,) = single.effects
-        same = info_of(effect).same_data
+        same = same_data_in(trial.nominal, effect)
         own = single if same is None else _in_shape(trial, start, single, same)
         found.append(own)
         if same is not None and same_recordings(own, effect, seconds):
             others += [_as_other(trial, start, own, same)] if wanted(same.effect, own) else []
-        twins = (
-            i for i in EFFECTS.values() if i.same_data is not None and i.same_data.effect == effect
-        )
-        others += [_as_twin(trial, start, own, twin) for twin in twins if wanted(twin.id, own)]
+        twins = ((twin, same_data_in(trial.nominal, twin)) for twin in CATALOGUE)
+        others += [
+            _as_twin(trial, start, own, twin, same)
+            for twin, same in twins
+            if same is not None and same.effect == effect and wanted(twin, own)
+        ]
     return _one_of_each([*found, *(c for c in others if c is not None)])
 
 
@@ -945,14 +947,12 @@ def _as_other(
 
 
 def _as_twin(
-    trial: Attempts, start: Candidate, single: Candidate, twin: EffectInfo
+    trial: Attempts, start: Candidate, single: Candidate, twin: str, same: SameData
 ) -> Candidate | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
-    same = twin.same_data
-    assert same is not None
     size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)
     if size <= 0.0:
         return None
-    free = {f"{twin.id}.{same.size}": size, f"{twin.id}.{same.without}": 0.0}
-    held = {f"{twin.id}.{name}": value for name, value in same.held}
-    return trial.fitted([Start(twin.id, free, held, (), False)], start.fit, trial.white)
+    free = {f"{twin}.{same.size}": size, f"{twin}.{same.without}": 0.0}
+    held = {f"{twin}.{name}": value for name, value in same.held}
+    return trial.fitted([Start(twin, free, held, (), False)], start.fit, trial.white)

@@ -20,6 +20,8 @@
 
 pub use super::one_link::{Spring, Stops};
 use crate::error::{check_range, Error, Result};
+use crate::key;
+use crate::keys::Key;
 use crate::scalar::{constant, Scalar};
 use nalgebra::{SMatrix, SVector};
 
@@ -98,7 +100,7 @@ impl<S: Scalar, const N: usize> PlanarArm<S, N> {
             let why = "an arm has at least one".into();
             return Err(Error::Length { name: "arm.links".into(), found: 0, expected: 1, why });
         }
-        check_range("arm.gravity", gravity, -1e3, 1e3, "m/s2")?;
+        key!("arm", "gravity").check("arm.gravity", gravity)?;
         for (k, link) in links.iter().enumerate() {
             link.check(k)?;
         }
@@ -342,14 +344,18 @@ impl<S: Scalar> Link<S> {
                 check_range(&format!("arm.links[{index}].{field}"), value, low, high, unit)
             })
         };
-        range("length", self.length.re(), 0.0, 1e3, "m")?;
-        range("mass", self.mass.re(), 0.0, 1e6, "kg")?;
-        range("centre", self.centre.re(), -1e3, 1e3, "m")?;
-        range("inertia", self.inertia.re(), 0.0, 1e6, "kg m2")?;
-        range("payload", self.payload.re(), 0.0, 1e6, "kg")?;
-        range("viscous", self.viscous.re(), 0.0, 1e6, "N m s/rad")?;
-        range("coulomb", self.coulomb.re(), 0.0, 1e6, "N m")?;
-        range("coulomb_speed", self.coulomb_speed, 1e-9, 1e3, "rad/s")?;
+        let number = |key: &Key, value: f64| {
+            (key.check(key.name, value))
+                .or_else(|_| key.check(&format!("arm.links[{index}].{}", key.name), value))
+        };
+        number(key!("link", "length"), self.length.re())?;
+        number(key!("link", "mass"), self.mass.re())?;
+        number(key!("link", "centre"), self.centre.re())?;
+        number(key!("link", "inertia"), self.inertia.re())?;
+        number(key!("link", "payload"), self.payload.re())?;
+        number(key!("link", "viscous"), self.viscous.re())?;
+        number(key!("link", "coulomb"), self.coulomb.re())?;
+        number(key!("link", "coulomb_speed"), self.coulomb_speed)?;
         range("spring.stiffness", self.spring.stiffness.re(), 0.0, 1e9, "N m/rad")?;
         range("spring.angle", self.spring.angle.re(), -100.0, 100.0, "rad")?;
         if let Some(stops) = &self.stops {

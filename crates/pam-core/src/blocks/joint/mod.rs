@@ -15,7 +15,8 @@ pub use self::polynomial::Polynomial;
 pub use self::pulley::Pulley;
 pub use self::spec::TransmissionSpec;
 pub use self::tendon::TendonJoint;
-use crate::error::{check_range, Error, Result};
+use crate::error::{Error, Result};
+use crate::key;
 use crate::scalar::{chained, constant, Scalar};
 
 /// A joint of any kind.
@@ -49,12 +50,12 @@ impl Joint {
                     tendon::Torque::Published
                 };
                 let [upper_axial, upper_offset, lower_axial, lower_offset] = [
-                    ("joint.upper_axial", spec.upper_axial),
-                    ("joint.upper_offset", spec.upper_offset),
-                    ("joint.lower_axial", spec.lower_axial),
-                    ("joint.lower_offset", spec.lower_offset),
+                    (key!("joint", "upper_axial"), spec.upper_axial),
+                    (key!("joint", "upper_offset"), spec.upper_offset),
+                    (key!("joint", "lower_axial"), spec.lower_axial),
+                    (key!("joint", "lower_offset"), spec.lower_offset),
                 ]
-                .map(|(name, value)| check_range(name, value, -10.0, 10.0, "m"));
+                .map(|(key, value)| key.check_all("joint", &[value]).map(|()| value));
                 let joint = TendonJoint::new(
                     upper_axial?,
                     upper_offset?,

@@ -3,7 +3,8 @@
 //! `d = sum_k c_k (theta - theta_0)^k`, k from 1; moment arm `sum_k k c_k (theta - theta_0)^(k-1)`.
 
 use super::point::JointPoint;
-use crate::error::{check_range, Error, Result};
+use crate::error::{Error, Result};
+use crate::key;
 use crate::scalar::{constant, Scalar};
 
 /// Highest degree.
@@ -31,9 +32,7 @@ impl Polynomial {
                 why: format!("from 1 to {HIGHEST_DEGREE}"),
             });
         }
-        for (k, value) in coefficients.iter().enumerate() {
-            check_range(&format!("joint.coefficients[{k}]"), *value, -100.0, 100.0, "m/rad^k")?;
-        }
+        key!("joint", "coefficients").check_all("joint", coefficients)?;
         Ok(Self { coefficients: coefficients.to_vec(), rest_angle })
     }
 

@@ -4,7 +4,8 @@
 //! antagonist).
 
 use super::point::JointPoint;
-use crate::error::{check_range, Result};
+use crate::error::Result;
+use crate::key;
 use crate::scalar::{constant, Scalar};
 
 /// A joint of constant moment arm.
@@ -20,7 +21,7 @@ impl Pulley {
     /// # Errors
     /// [`crate::Error::Parameter`] if the radius is not finite or above 10 m.
     pub fn new(radius: f64, rest_angle: f64) -> Result<Self> {
-        Ok(Self { radius: check_range("joint.radius", radius, -10.0, 10.0, "m")?, rest_angle })
+        Ok(Self { radius: key!("joint", "radius").check("joint.radius", radius)?, rest_angle })
     }
 
     /// Shortening and moment arm at a joint angle [rad].
