@@ -28,6 +28,7 @@ __all__ = [
     "measured_from",
     "parse_unit",
     "same_dimension",
+    "spellings",
     "to_si",
     "with_unit",
 ]
@@ -321,6 +322,19 @@ def same_dimension(first: str, second: str) -> bool:
     compound, same_angle = any(one[:-1]), one[-1] == two[-1]
     turns = one[:-1] == _HZ[:-1] and any(unit.endswith("Hz") for unit in (first, second))
     return same_angle or (compound and not turns)
+
+
+@lru_cache(maxsize=256)
+def spellings(unit: str) -> tuple[str, ...]:
+    """Known single words for units of the same dimension as a unit: ``"bar"``, ``"kPa"``, ...
+    of ``"Pa"``.
+
+    Parameters
+    ----------
+    unit : str
+        A unit.
+    """
+    return tuple(word for word in _known_names() if same_dimension(word, unit))
 
 
 def _checked(unit: str, dimension: str) -> Unit:

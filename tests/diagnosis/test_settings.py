@@ -97,8 +97,8 @@ def test_settings_are_few_and_each_says_what_it_is_and_where_it_comes_from() -> 
     assert 20 < len(every) <= 50
     for one in every:
         told = one.metadata
-        assert all(told[key] for key in ("unit", "reason", "origin")), one.name
-        assert len(told["reason"].split()) >= 2, one.name
+        assert all(told[key] for key in ("unit", "about", "origin")), one.name
+        assert len(told["about"].split()) >= 2, one.name
         assert told["least"] <= one.default <= told["most"], one.name
 
 

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[2]
 LAYERS = (
     ("errors",),
     ("units",),
+    ("declared",),
     (
         "channels",
         "comparison",

@@ -13,17 +13,9 @@ from typing import Any, Final
 
 from pamrs import __version__, report
 from pamrs._writing import write_atomically
+from pamrs.declared import DEFINITIONS, document, object_of, told
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.findings import (
-    DEFINITIONS,
-    VERDICTS,
-    Findings,
-    ModelFile,
-    Trace,
-    object_of,
-    to_plain,
-    told,
-)
+from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, to_plain
 from pamrs.report import text as words
 from pamrs.report.terminal import notebook, summary
 
@@ -244,20 +236,16 @@ def schema() -> dict[str, Any]:
     """
     definitions = dict(DEFINITIONS)
     found = object_of(Diagnosis, definitions)
-    return {
-        "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "$id": "urn:pamrs:schema:pamrs.diagnosis:2",
-        "title": SCHEMA,
-        **found,
-        ("description"): (
-            "Result of a diagnosis: which physics the simulation of a rig leaves out. All "
-            "quantities in SI; null where the data give no number."
-        ),
+    own = {
         "required": ["schema", *found["required"], "version"],
         "properties": {
             "schema": {"const": SCHEMA},
             **found["properties"],
             "version": {"description": "version of pamrs that wrote it", "type": "string"},
         },
-        "$defs": definitions,
     }
+    about = (
+        "Result of a diagnosis: which physics the simulation of a rig leaves out. All quantities "
+        "in SI; null where the data give no number."
+    )
+    return document(SCHEMA, about, found | own, definitions)

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pamrs._checks import checked_table
+from pamrs.declared import told
 from pamrs.errors import ParameterError
 
 __all__ = ["DiagnosisSettings"]
@@ -24,16 +25,16 @@ def _setting(
     default: float, unit: str, reason: str, origin: str, least: float = 0.0, most: float = math.inf
 ) -> Any:
     """One setting: default, SI unit (``count``: a whole number), why, from where, its range."""
-    told = {"unit": unit, "reason": reason, "origin": origin, "least": least, "most": most}
-    return dataclasses.field(default=default, metadata={**told, "required": False})
+    meta = told(reason, unit=unit, origin=origin, least=least, most=most, required=False)
+    return dataclasses.field(default=default, metadata=meta)
 
 
 @dataclasses.dataclass(frozen=True, kw_only=True)
 class DiagnosisSettings:
     """The numbers of a diagnosis that a user may change.
 
-    ``dataclasses.fields(DiagnosisSettings)`` gives unit, reason, origin and range (``least``,
-    ``most``) of each as its ``metadata``.
+    ``dataclasses.fields(DiagnosisSettings)`` gives reason (``about``), unit, origin and range
+    (``least``, ``most``) of each as its ``metadata``.
 
     Raises
     ------
@@ -408,18 +409,18 @@ class DiagnosisSettings:
 
 def _checked(field: dataclasses.Field[Any], value: Any) -> float:
     """The value if it is of the right kind and inside its range."""
-    told, whole = field.metadata, isinstance(field.default, int)
+    meta, whole = field.metadata, isinstance(field.default, int)
     number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if (
         not number
         or not math.isfinite(value)
         or (whole and value != int(value))
-        or not told["least"] <= value <= told["most"]
+        or not meta["least"] <= value <= meta["most"]
     ):
-        limit = f", at most {told['most']:g}" if math.isfinite(told["most"]) else ""
+        limit = f", at most {meta['most']:g}" if math.isfinite(meta["most"]) else ""
         raise ParameterError(
             f"DiagnosisSettings.{field.name} = {value!r} is not allowed: a "
-            f"{'whole' if whole else 'finite'} number, at least {told['least']:g}{limit} "
-            f"[{told['unit']}]"
+            f"{'whole' if whole else 'finite'} number, at least {meta['least']:g}{limit} "
+            f"[{meta['unit']}]"
         )
     return int(value) if whole else float(value)

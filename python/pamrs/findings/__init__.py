@@ -5,8 +5,7 @@ below reports and diagnosis, so that neither has to know the other to name what 
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
 `WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`channels_off` (of free runs); `to_plain` and `told`, by which they become JSON, `object_of`,
-`reference` and `DEFINITIONS`, by which a schema comes of them.
+`channels_off` (of free runs); `to_plain`, by which they become JSON.
 """
 
 from __future__ import annotations
@@ -49,13 +48,11 @@ from pamrs.findings._entries import (
     Where,
     WrongParameter,
 )
-from pamrs.findings._entry import Entry, to_plain, told
+from pamrs.findings._entry import Entry, to_plain
 from pamrs.findings._findings import Findings, channels_off
-from pamrs.findings._schema import DEFINITIONS, object_of, reference
 from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = [
-    "DEFINITIONS",
     "HEALTHY",
     "NOT_JUDGED",
     "VERDICTS",
@@ -95,8 +92,5 @@ __all__ = [
     "Where",
     "WrongParameter",
     "channels_off",
-    "object_of",
-    "reference",
     "to_plain",
-    "told",
 ]

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from pamrs.findings._entry import Entry, told
+from pamrs.declared import told
+from pamrs.findings._entry import Entry
 
 __all__ = [
     "BlockResidual",

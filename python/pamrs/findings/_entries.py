@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, Final
 
-from pamrs.findings._entry import Entry, told
+from pamrs.declared import told
+from pamrs.findings._entry import Entry
 
 __all__ = [
     "HEALTHY",

@@ -9,56 +9,7 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Entry", "told", "to_plain"]
-
-
-def told(
-    about: str = "",
-    *,
-    key: str = "",
-    json: bool = True,
-    optional: bool = False,
-    omit_empty: bool = False,
-    kind: str = "",
-    enum: Sequence[str] = (),
-    required: bool = True,
-    least_length: int = 0,
-) -> dict[str, Any]:
-    """Metadata of a field.
-
-    Parameters
-    ----------
-    about : str
-        What it is, for the JSON schema.
-    key : str
-        Its key, where that is not its name.
-    json : bool
-        Whether it is written to JSON.
-    optional : bool
-        Whether its key is absent where it is None.
-    omit_empty : bool
-        Whether JSON leaves it out where it is None or empty.
-    kind : str
-        What its type does not say: ``probability``, ``pair``, ``pair_or_null`` and ``pairs`` of
-        numbers, ``events``.
-    enum : sequence of str
-        Allowed values.
-    required : bool
-        Whether a reader can rely on it.
-    least_length : int
-        Fewest characters.
-    """
-    return {
-        "about": about,
-        "key": key,
-        "json": json,
-        "optional": optional,
-        "omit_empty": omit_empty,
-        "kind": kind,
-        "enum": tuple(enum),
-        "required": required and not optional and not omit_empty,
-        "least_length": least_length,
-    }
+__all__ = ["Entry", "to_plain"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from pamrs.declared import told
 from pamrs.findings._details import (
     BlockResidual,
     ConditionMap,
@@ -30,7 +31,6 @@ from pamrs.findings._entries import (
     Where,
     WrongParameter,
 )
-from pamrs.findings._entry import told
 from pamrs.findings._trace import ModelFile, Trace
 
 __all__ = ["Findings", "channels_off"]

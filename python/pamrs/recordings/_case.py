@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,8 +14,20 @@ import numpy as np
 
 from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
 from pamrs.channels import channel_of
+from pamrs.declared import accepts, unknown_key
 from pamrs.effects import find_parameter
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
+from pamrs.recordings._case_keys import (
+    DIALECT,
+    ENTRY,
+    ERRORS,
+    FORMAT,
+    LOG,
+    OF_A_LOG,
+    ROLES,
+    SCHEMA,
+    TOP,
+)
 from pamrs.recordings._doubts import ambient_of, limits_of
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
@@ -27,15 +38,9 @@ from pamrs.units import to_si
 
 __all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
-SCHEMA: Final = "pamrs.case/1"
-_ROLES: Final = ("fit", "held_out")
-_TOP: Final = ("schema", "name", "description", "rig", "source", "recording")
-_FORMAT: Final = ("columns", "delimiter", "header", "thousands", "sample_time", "decimal")
-_LOG: Final = ("channels", "time", "split", "pieces")
-_DIALECT: Final = ("delimiter", "decimal", "thousands", "header")
-_OPTIONS: Final = ("name", "sample_time", "start", "stop", *_LOG)
-_ENTRY: Final = ("file", "name", "role", "start", "stop", "parameters", *_FORMAT, *_LOG)
-_ERRORS: Final = ("same", "proportional", "none", "own")
+_OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
+#: Keys with messages of their own.
+_ELSEWHERE: Final = ("file", "role", "parameters")
 _RIG: Final = "rig.toml"
 _TURN: Final = 2.0 * np.pi
 _GIVE_BOTH: Final = (
@@ -143,7 +148,7 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
         raise CaseError(f"{file}: {_LIES_OUTSIDE}")
     document = _document(file, given)
     problems: list[str] = []
-    _unknown(problems, "", document, _TOP)
+    problems += [unknown_key("", key, TOP) for key in document if key not in TOP]
     if document.get("schema") != SCHEMA:
         problems.append(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
     name = _text(problems, document, "name", resolved(home).name)
@@ -204,16 +209,6 @@ def _document(file: Path, given: Path) -> dict[str, Any]:
         raise CaseError(f"{file}: not valid TOML: {error}") from error
 
 
-def _unknown(
-    problems: list[str], prefix: str, given: Iterable[str], allowed: tuple[str, ...]
-) -> None:
-    for key in given:
-        if key not in allowed:
-            near = difflib.get_close_matches(key, allowed, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(allowed)}"
-            problems.append(f"unknown key {prefix + key!r}; {hint}")
-
-
 def _text(problems: list[str], document: Mapping[str, Any], key: str, default: str) -> str:
     value = document.get(key, default)
     if isinstance(value, str):
@@ -266,12 +261,12 @@ def _recordings(
     for index, entry in enumerate(entries):
         label = f"recording[{index}]."
         before = len(problems)
-        _unknown(problems, label, entry, _ENTRY)
+        problems += [unknown_key(label, key, ENTRY) for key in entry if key not in ENTRY]
         name = entry.get("file")
         if not isinstance(name, str) or not name:
             problems.append(f"{label}file = {name!r} is not allowed: a file name is needed")
         role = entry.get("role", "fit")
-        if role not in _ROLES:
+        if role not in ROLES:
             problems.append(f"{label}role = {role!r} is not allowed: 'fit' or 'held_out'")
         _formats(problems, label, entry)
         own = _own_values(problems, label, entry.get("parameters", {}), rig)
@@ -284,7 +279,7 @@ def _recordings(
                 f"{label}file = {name!r}: there is no file {os.path.normpath(file)}{advice}"
             )
             continue
-        options = {key: entry[key] for key in _FORMAT if key in entry}
+        options = {key: entry[key] for key in FORMAT if key in entry}
         ambient = None if rig is None else ambient_of(rig)
         try:
             if "channels" in entry:
@@ -381,8 +376,8 @@ def _own_value(name: str, entry: Any, rig: Rig | None) -> OwnValue:
         raise ParameterError(
             f"{entry!r} is not allowed: a table with value, unit and maybe error is needed"
         )
-    if error is not None and error not in _ERRORS:
-        raise ParameterError(f"error = {error!r} is not allowed: {', '.join(_ERRORS)}")
+    if error is not None and error not in ERRORS:
+        raise ParameterError(f"error = {error!r} is not allowed: {', '.join(ERRORS)}")
     if rig is None:  # said already
         return OwnValue(float(value), float(value))
     known = _known(rig, name)
@@ -428,7 +423,7 @@ def _from_log(
     """The recordings of an entry that says where its channels are; a file is read once."""
     names = entry.get("columns")
     form = TextFormat(
-        **{key: entry[key] for key in _DIALECT if key in entry},
+        **{key: entry[key] for key in DIALECT if key in entry},
         columns=None if names is None else tuple(names),
     )
     key = (os.path.realpath(file), form)
@@ -439,46 +434,13 @@ def _from_log(
 
 
 def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
-    def texts(value: object) -> bool:
-        return isinstance(value, list) and all(isinstance(item, str) for item in value)
-
-    def mapping(value: object) -> bool:
-        return isinstance(value, Mapping) and all(isinstance(item, str) for item in value.values())
-
-    def number(value: object) -> bool:
-        return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-    rules: dict[str, tuple[Any, str]] = {
-        "name": (lambda v: isinstance(v, str) and v != "", "a text"),
-        "columns": (
-            lambda v: texts(v) or mapping(v),
-            "a list of headings, or a table from headings to headings",
-        ),
-        "delimiter": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
-        "header": (lambda v: isinstance(v, bool), "true or false"),
-        "thousands": (
-            lambda v: isinstance(v, str) or mapping(v),
-            "a mark, or a table from channels to marks",
-        ),
-        "sample_time": (
-            number,
-            "a number of seconds",
-        ),
-        "decimal": (lambda v: isinstance(v, str) and len(v) == 1, "one character"),
-        "start": (number, "a number of seconds"),
-        "stop": (number, "a number of seconds"),
-        "pieces": (
-            lambda v: isinstance(v, list) and len(v) > 0,
-            "a list of numbers or texts of parts",
-        ),
-    }
-    if "channels" in entry:
-        rules["columns"] = (texts, "a list of names, one for each column")
-        rules["thousands"] = (lambda v: isinstance(v, str), "a mark")
-    else:
+    """Values of a kind that their keys do not have."""
+    rules = ENTRY | OF_A_LOG if "channels" in entry else ENTRY
+    if "channels" not in entry:
         problems += [
-            f"{label}{key} goes with channels, which is missing" for key in _LOG if key in entry
+            f"{label}{key} goes with channels, which is missing" for key in LOG if key in entry
         ]
-    for key, (accepts, needed) in rules.items():
-        if key in entry and not accepts(entry[key]):
-            problems.append(f"{label}{key} = {entry[key]!r} is not allowed: {needed} is needed")
+    for key, rule in rules.items():
+        if key in entry and key not in _ELSEWHERE and not accepts(rule.schema, entry[key]):
+            needed = f"{rule.needed} is needed"
+            problems.append(f"{label}{key} = {entry[key]!r} is not allowed: {needed}")

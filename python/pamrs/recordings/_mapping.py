@@ -6,22 +6,20 @@ import difflib
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import CHANNELS, channel_of
+from pamrs.declared import unknown_key
 from pamrs.errors import ParameterError, RecordingError, joined
+from pamrs.recordings._case_keys import CHANNEL, CLOCK, CONSTANT
 from pamrs.recordings._doubts import unit_trouble
-from pamrs.recordings.calibration import KEYS, Calibration, is_finite, read_calibration
+from pamrs.recordings.calibration import Calibration, is_finite, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["Clock", "Source", "read_clock", "read_sources"]
-
-_ENTRY: Final = ("column", "unit", *KEYS, "time", "hold", "assumed")
-_CONSTANT: Final = ("value", "unit", "assumed")
-_CLOCK: Final = ("column", "unit", "offset")
 
 Array = NDArray[np.float64]
 
@@ -148,7 +146,8 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
         problems.append(f'{label} = {entry!r} is not allowed: {{ column = "...", unit = "..." }}')
         return None
     constant = "value" in entry
-    _strange(problems, label, entry, _CONSTANT if constant else _ENTRY)
+    allowed = CONSTANT if constant else CHANNEL
+    problems += [unknown_key(f"{label}.", key, allowed) for key in entry if key not in allowed]
     for key in ("unit",) if constant else ("column", "unit"):
         if not isinstance(entry.get(key), str) or not entry.get(key):
             problems.append(f"{label}.{key} = {entry.get(key)!r} is not allowed: a text is needed")
@@ -219,7 +218,7 @@ def _clock(problems: list[str], label: str, entry: Any) -> Clock:
             "unit and offset"
         )
         return Clock()
-    _strange(problems, label, entry, _CLOCK)
+    problems += [unknown_key(f"{label}.", key, CLOCK) for key in entry if key not in CLOCK]
     column, unit, offset = entry.get("column"), entry.get("unit"), entry.get("offset", 0.0)
     for key, value in (("column", column), ("unit", unit)):
         if value is not None and not (isinstance(value, str) and value):
@@ -234,13 +233,3 @@ def _clock(problems: list[str], label: str, entry: Any) -> Clock:
         except ParameterError as error:
             problems.append(f"{label}.unit: {error}")
     return Clock(column, unit, float(offset))
-
-
-def _strange(
-    problems: list[str], label: str, entry: Mapping[str, Any], allowed: tuple[str, ...]
-) -> None:
-    for key in entry:
-        if key not in allowed:
-            near = difflib.get_close_matches(str(key), allowed, n=1)
-            hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(allowed)}"
-            problems.append(f"unknown key '{label}.{key}'; {hint}")

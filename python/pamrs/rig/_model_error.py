@@ -18,7 +18,7 @@ from pamrs.rig.schema import qualified, tables_of
 if TYPE_CHECKING:
     from pamrs.rig._reader import Reader
 
-__all__ = ["ERROR_BLOCKS", "ERROR_CHANNELS", "error_lines", "read_model_error"]
+__all__ = ["ERROR_BLOCKS", "ERROR_CHANNELS", "STATED", "error_lines", "read_model_error"]
 
 #: Kinds of block whose error can be stated, as a share.
 ERROR_BLOCKS: Final = (
@@ -32,7 +32,9 @@ ERROR_CHANNELS: Final = {
     "joint_angle": "joint",
     "length": "load",
 }
-_TEXT: Final = re.compile(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*")
+#: A number and its unit, as a pattern.
+STATED: Final = r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(\S.*?)\s*"
+_TEXT: Final = re.compile(STATED)
 
 
 def read_model_error(reader: Reader, raw: Any, model: Mapping[str, Any]) -> dict[str, Any]:

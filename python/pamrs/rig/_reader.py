@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from pamrs._files import MOST_NAME, parse_toml, shown
+from pamrs.declared import unknown_key
 from pamrs.errors import ParameterError, RigError, joined
 from pamrs.rig._checks import block_problems
 from pamrs.rig._model_error import read_model_error
@@ -109,11 +110,7 @@ class Reader:
     def unknown_keys(self, prefix: str, given: Iterable[str], allowed: Iterable[str]) -> None:
         """Note every key that is not allowed, with what is near to it."""
         names = list(allowed)
-        for name in given:
-            if name not in names:
-                near = difflib.get_close_matches(name, names, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(names)}"
-                self.problem(f"unknown key {prefix + name!r}; {hint}")
+        self.problems += [unknown_key(prefix, name, names) for name in given if name not in names]
 
     # ------------------------------------------------------------------ document
 
