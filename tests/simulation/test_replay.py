@@ -91,9 +91,16 @@ discharge_area = {{ value = 0.5, unit = "mm2" }}
         replay(rig, cut, temperatures=room)["muscle_pressure.a"],
         replay(rig, cut)["muscle_pressure.a"],
     )
-    for wrong in ({"c": 300.0}, {"a": 0.0}, {"a": float("nan")}):
-        with pytest.raises(ParameterError, match="energy_balance"):
-            replay(rig, cut, temperatures=wrong)
+    for name, wrong, said in (
+        ("c", 300.0, "gas = 'energy_balance' is needed"),
+        ("a", 0.0, "initial.temperature.a = 0 is not allowed: .* K"),
+        ("a", float("nan"), "initial.temperature.a = NaN is not allowed"),
+    ):
+        with pytest.raises(ParameterError, match=said):
+            replay(rig, cut, temperatures={name: wrong})
+    warm = pamrs.simulate(rig, sample_time=0.01, duration=0.1, initial={"temperature.b": 350.0})
+    assert warm["temperature.b"][0] == pytest.approx(350.0)
+    assert warm["temperature.a"][0] == pytest.approx(293.15)
 
 
 def test_what_a_replay_needs_is_named(tmp_path: Path) -> None:

@@ -40,7 +40,14 @@ _DIMENSIONS = {
 }
 #: Signals that a rig cannot do without, each with an example.
 _NEEDED = {"valve_command": "5 V, 8 V @ 1 s", "length": "300 mm"}
-_INITIAL = {"Pa": "pressure", "rad": "angle", "rad/s": "angular speed", "m": "length", "m/s": "m/s"}
+_INITIAL = {
+    "Pa": "pressure",
+    "K": "temperature",
+    "rad": "angle",
+    "rad/s": "angular speed",
+    "m": "length",
+    "m/s": "m/s",
+}
 
 
 def simulate_command(

@@ -48,6 +48,7 @@ _INITIAL = {
     "joint_rate": "joint",
     "length": "load",
     "length_rate": "load",
+    "temperature": "chamber",
 }
 #: States along a tube that carries waves, and how many there are less than segments.
 _BETWEEN = {"segment_pressure": 1, "segment_flow": 0}
@@ -295,6 +296,8 @@ def initial_names(rig: Rig) -> list[str]:
 def _having(rig: Rig, state: str) -> list[str]:
     """What of a rig has a state: names of blocks, behind that of a tube the number of a segment."""
     tables = rig.tables(_INITIAL[state])
+    if state == "temperature":
+        return [name for name, table in tables.items() if table["gas"] == "energy_balance"]
     if state not in _BETWEEN:
         return list(tables)
     return [
@@ -327,6 +330,10 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
         if not rig.tables(_INITIAL[channel]):
             raise ParameterError(
                 f"initial has {name!r}, but the rig {rig.name!r} has no [{_INITIAL[channel]}]"
+            )
+        if channel == "temperature" and block not in known:
+            raise ParameterError(
+                f"initial has {name!r}: a chamber with gas = 'energy_balance' is needed"
             )
         if channel in _BETWEEN and not known:
             raise ParameterError(

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted, recorded_as
-from pamrs.errors import ParameterError, RecordingError
+from pamrs.errors import RecordingError
 from pamrs.simulation._driving import has_frame, regulators_of, sensor_zero
 from pamrs.simulation._simulation import Simulation, simulate
-from pamrs.simulation._simulator import Simulator
 
 if TYPE_CHECKING:
     from pamrs.recordings import Recording
@@ -70,8 +69,7 @@ def replay(
     RecordingError
         If an input that the rig needs is not in the recording.
     ParameterError
-        As :func:`pamrs.simulate`; a temperature that is not above zero, or of a chamber whose gas
-        has none of its own.
+        As :func:`pamrs.simulate`.
     """
     rig = recording.rig_there(rig)
     drive = _drive(rig, recording)
@@ -87,63 +85,12 @@ def replay(
                 initial[full] = float(recording.channels[full][recording.mask[full]][0]) - _zero(
                     rig, channel, name
                 )
-    if temperatures:
-        simulator = Simulator(rig, sample_time=recording.sample_time, initial=initial)
-        _begin_at(simulator, temperatures)
-        return _run_from(simulator, drive, len(recording), record)
+    for name, kelvin in (temperatures or {}).items():
+        initial[dotted("temperature", name)] = kelvin
     if not drive:
         drive["duration"] = float(recording.time[-1])
     step = recording.sample_time
     return simulate(rig, sample_time=step, initial=initial, record=record, **drive)
-
-
-def _begin_at(simulator: Simulator, temperatures: Mapping[str, float]) -> None:
-    """Give gases the temperatures at which they begin [K]: their masses at the pressures that they
-    have.
-    """
-    chambers = simulator.rig.tables("chamber")
-    for name, wanted in temperatures.items():
-        if chambers.get(name, {}).get("gas") != "energy_balance" or not wanted > 0.0:
-            raise ParameterError(
-                f"temperatures has {name!r} = {wanted!r}: a chamber with gas = 'energy_balance' "
-                "and a temperature above 0 K are needed"
-            )
-    first, state = simulator.observe(), simulator.state
-    masses = {name: first[dotted("air_mass", name)] for name in chambers}
-    room, begun = float(simulator.rig.tables("gas")[""]["temperature"]), state.copy()
-    for name, wanted in temperatures.items():
-        # chambers that begin alike have their masses in the order of the rig file
-        alike = [other for other in chambers if masses[other] == masses[name]]
-        place = np.flatnonzero(state == masses[name])[alike.index(name)]
-        begun[place] *= room / wanted
-    simulator.restore(begun)
-
-
-def _run_from(
-    simulator: Simulator, drive: Mapping[str, Any], rows: int, record: Sequence[str] | None
-) -> Simulation:
-    """A run of so many rows under signals, as :func:`pamrs.simulate` has them, from where a
-    simulator stands.
-    """
-
-    def each(signals: Any, way: slice) -> Any:
-        own = signals.items() if isinstance(signals, dict) else None
-        return {name: v[way] for name, v in own} if own is not None else signals[way]
-
-    # a command holds until the next row; what is prescribed is reached there
-    held = ("valve_command", "supply_command")
-    first = simulator.observe()
-    then = simulator.run(
-        samples=None if drive else rows - 1,
-        **{k: each(v, slice(None, -1) if k in held else slice(1, None)) for k, v in drive.items()},
-    )
-    kept = then if record is None else record
-    channels = {name: np.concatenate([[first[name]], then[name]]) for name in kept}
-    commands = {
-        dotted(kind, name): values for kind in held for name, values in drive.get(kind, {}).items()
-    }
-    time = np.asarray(np.arange(rows) * simulator.sample_time, dtype=np.float64)
-    return Simulation({"time": time, **commands, **channels}, simulator.rig, simulator.events)
 
 
 def _drive(rig: Rig, recording: Recording) -> dict[str, Any]:

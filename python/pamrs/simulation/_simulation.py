@@ -625,9 +625,10 @@ def simulate(
     initial : mapping of str to float, optional
         Initial ``muscle_pressure``, ``supply_pressure``, ``line_pressure``, ``segment_pressure``
         [Pa, gauge], ``segment_flow`` [kg/s], ``joint_angle`` [rad], ``joint_rate`` [rad/s], or with
-        a linear load ``length`` [m], ``length_rate`` [m/s]; of a block with a name,
-        ``muscle_pressure.flexor``. What is left out is at rest: pressures as the rig file has them,
-        joint at its rest angle, muscle at its rest length.
+        a linear load ``length`` [m], ``length_rate`` [m/s]; ``temperature`` of the gas of a chamber
+        with an energy balance [K]; of a block with a name, ``muscle_pressure.flexor``. What is left
+        out is at rest: pressures as the rig file has them, gases as warm as the room, joint at its
+        rest angle, muscle at its rest length.
     duration : float, optional
         Simulated time [s], where no signal has a length.
     supply_command : array_like, shape (n,), or mapping of str to array_like, optional

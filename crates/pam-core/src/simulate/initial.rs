@@ -1,16 +1,24 @@
 //! Where a simulation begins.
 
+use crate::description::{dotted, ChamberSpec};
 use crate::error::check_range;
 use crate::plant::Rig;
 use crate::simulate::drive::LEAST_PRESSURE;
 use crate::{Error, Result};
 
+/// Temperatures that a gas may begin at [K].
+const COLDEST: f64 = 1.0;
+const HOTTEST: f64 = 1e4;
+
 /// Initial state as a user states it, by the names of [`crate::plant::Names::initial`]: gauge
-/// pressures [Pa], angles [rad], rates [rad/s], length [m]; true values, not sensor readings.
+/// pressures [Pa], angles [rad], rates [rad/s], length [m]; `temperature` of the gas of a chamber
+/// with an energy balance [K]; true values, not sensor readings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Initial {
     values: Vec<f64>,
     given: Vec<bool>,
+    /// Gases that begin at another temperature than that of the room [K].
+    pub(super) temperatures: Vec<(usize, f64)>,
 }
 
 impl Initial {
@@ -37,7 +45,7 @@ impl Initial {
             }
         };
         let values: Vec<f64> = rig.names.initial.iter().map(|(_, place)| of(*place)).collect();
-        Self { given: vec![false; values.len()], values }
+        Self { given: vec![false; values.len()], values, temperatures: Vec::new() }
     }
 
     /// The same with one value more, by its name.
@@ -46,6 +54,12 @@ impl Initial {
     /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an
     /// impossible value.
     pub fn with(mut self, rig: &Rig, name: &str, value: f64) -> Result<Self> {
+        if let Some(gas) = gas_of(rig, name) {
+            let full = format!("initial.{name}");
+            let kelvin = check_range(&full, value, COLDEST, HOTTEST, "K")?;
+            self.temperatures.push((gas, kelvin));
+            return Ok(self);
+        }
         let Some(k) = rig.names.initial.iter().position(|(n, _)| n == name) else {
             let names: Vec<_> = rig.names.initial.iter().map(|(n, _)| n.as_str()).collect();
             return Err(Error::Model(format!(
@@ -116,4 +130,12 @@ impl Initial {
         }
         state
     }
+}
+
+/// The gas of a chamber with an energy balance that a name is the temperature of.
+fn gas_of(rig: &Rig, name: &str) -> Option<usize> {
+    let chambers = rig.spec().chambers.iter().enumerate();
+    let named = |(_, chamber): &(usize, &ChamberSpec)| dotted("temperature", &chamber.name) == name;
+    let (gas, _) = chambers.into_iter().find(named)?;
+    rig.wiring.gases[gas].has_energy().then_some(gas)
 }

@@ -60,6 +60,9 @@ impl Progress {
             state[rig.layout.mass(gas)] = plant.initial_mass(gas, &state);
         }
         plant.start_effects(&mut state);
+        for (gas, kelvin) in &initial.temperatures {
+            state[rig.layout.mass(*gas)] *= rig.spec().gas.temperature / kelvin;
+        }
         let memory = plant.fresh_memory();
         let mut flags = Vec::new();
         for (k, coordinate) in rig.wiring.coordinates.iter().enumerate() {
