@@ -325,7 +325,7 @@ pub const BLOCKS: &[Block] = &[
         acts_in: &["supply", "chamber"],
         keys: &[
             Key::choice("kind", &["tube", "orifice"], "tube"),
-            Key::new("length", "m", 0.001, 1000.0).only(TUBE).moves(),
+            Key::new("length", "m", 0.0001, 1000.0).only(TUBE).moves(),
             Key::new("diameter", "m", 0.0001, 0.2).only(TUBE).moves(),
             Key::new("discharge_area", "m2", 1e-12, 0.1).only(&["orifice"]).moves(),
             Key::new("inlet_volume", "m3", 0.0, 1.0).or(0.0).moves(),
@@ -338,7 +338,7 @@ pub const BLOCKS: &[Block] = &[
         name: "chamber",
         acts_in: &["chamber"],
         keys: &[
-            Key::new("dead_volume", "m3", 1e-10, 100.0).moves(),
+            Key::new("dead_volume", "m3", 1e-10, 1000.0).moves(),
             Key::new("initial_pressure", "Pa", -1e5, 1e8).or(0.0),
             Key::choice("gas", &["coefficients", "energy_balance"], "coefficients"),
             Key::new("alpha_in", "1", 0.3, 3.0).or(1.4).only(COEFFICIENTS).moves(),
@@ -360,7 +360,7 @@ pub const BLOCKS: &[Block] = &[
             Key::new("rest_length", "m", 0.001, 10.0),
             Key::new("rest_diameter", "m", 0.0001, 1.0),
             Key::new("braid_angle", "rad", 45.0 * DEGREE, 89.0 * DEGREE),
-            Key::new("wall_thickness", "m", 1e-6, 0.1),
+            Key::new("wall_thickness", "m", 1e-9, 0.1),
             Key::new("modulus_slope", "1", -1e6, 1e6).list().only(POLYNOMIAL),
             Key::new("modulus_offset", "Pa", -1e11, 1e11).list().only(POLYNOMIAL),
             Key::new("c10", "Pa", -1e11, 1e11).only(&["mooney_rivlin"]),
