@@ -170,7 +170,6 @@ def _not_recorded(names: Iterable[str]) -> str:
     return f"{', '.join(named)} {'is' if few else 'are'} not in every recording"
 
 
-_SHAPE = ("rest_length", "rest_diameter", "braid_angle", "wall_thickness")  # gives a volume
 _PRESSURE = {
     "supply": "supply_pressure",
     "line": "line_pressure",
@@ -468,13 +467,6 @@ class _Map:
             | self.moved("chamber", name)
             | self.moved("supply", *unread)
             | self.zeros(self.nodes_at(full), joints or [""])
-            | self.of_motion(joints)
-            | {
-                f"{qualified('muscle', m)}.{key}"
-                for m, chamber in self.pulling.items()
-                if chamber == name
-                for key in _SHAPE
-            }
         )
         step = _GAS_STEP if fed else _SEALED_STEP
         window = _CHAMBER_WINDOW if fed else None
