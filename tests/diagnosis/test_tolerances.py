@@ -14,7 +14,14 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.noise import noise_levels
-from pamrs.diagnosis.prepare import Prepared, available_blocks, begun_alike, predicted, prepare
+from pamrs.diagnosis.prepare import (
+    Prepared,
+    available_blocks,
+    begun_alike,
+    predicted,
+    prepare,
+    residual,
+)
 from pamrs.simulation import core_rig
 from tests.diagnosis.healthy import healthy_case
 
@@ -83,6 +90,7 @@ def test_a_joint_on_its_stop_begins_at_rest_whatever_its_first_samples_say() -> 
 
     def begun(prepared: Prepared) -> tuple[bool, float]:
         block = problem.blocks[0]
+        residual(block, problem.core, prepared, [])  # keeps the starts that it finds
         found = begun_alike([block], problem.core, prepared, tolerances)
         starts = found.starts(block.window, block.drives)
         return bool(found.at_rest), float(found.begun("joint_angle", starts)[1][0])

@@ -88,7 +88,7 @@ ENTRY: Final[dict[str, Rule]] = {
         "between groups of digits",
     ),
     "sample_time": Rule(NUMBER, "a number of seconds", "spacing of the samples [s]"),
-    "decimal": Rule(_CHARACTER, "one character", "the decimal mark"),
+    "decimal": Rule({"enum": [".", ","]}, "'.' or ','", "the decimal mark"),
     "channels": Rule({}, "a table", "where each channel is in the log"),
     "time": Rule({}, "a series, or a table", "the series with the times"),
     "split": Rule({}, "'clock' or a table", "where one recording ends and the next begins"),

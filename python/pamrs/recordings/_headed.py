@@ -82,6 +82,15 @@ def load_recording(
         raise RecordingError(
             f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
         )
+    if decimal not in (".", ","):
+        raise RecordingError(
+            f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
+        )
+    marks = {thousands} if isinstance(thousands, str) else set((thousands or {}).values())
+    if decimal in marks:
+        raise RecordingError(
+            f"{source}: thousands = {decimal!r} is not allowed: it is the decimal mark"
+        )
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     if not header and not isinstance(columns, Sequence):
@@ -149,7 +158,8 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
         match = _HEADING.match(heading)
         name = match["name"] if match else heading
         channel = channel_of(name)
-        if match is None or channel not in CHANNELS or name.endswith("."):
+        known = channel in CHANNELS and (channel != "time" or name == channel)
+        if match is None or not known or name.endswith("."):
             near = difflib.get_close_matches(channel.lower(), CHANNELS, n=1, cutoff=0.6)
             hint = f"did you mean {near[0]!r}?" if near else f"known are {', '.join(CHANNELS)}"
             problems.append(

@@ -84,6 +84,8 @@ def dialect_of(
         if point == "," and decimal is None and "," not in sample:
             continue
         rows = [[cell.strip() for cell in row] for row in split_rows(sample, mark)]
+        if not rows:
+            continue
         cells = [cell for row in rows for cell in row if cell.lower() not in NO_VALUE]
         good = sum(is_useful(cell, point, thousands) for cell in cells)
         usual = usual_width([len(row) for row in rows])

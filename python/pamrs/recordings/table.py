@@ -191,6 +191,13 @@ class Table:
             If too many are none: the column is written in another way, or is another one.
         """
         values, strange = self.read(index, thousands, decimal)
+        if thousands is None and decimal == "," and self.doubtful(index, decimal):
+            pointed = [cell for cell in map(str, self.cells(index)) if "." in cell]
+            if pointed:
+                raise RecordingError(
+                    f"{source}: column {label!r}: {pointed[0]!r} has a point beside decimal = ',': "
+                    "give thousands = '.' if it parts thousands, decimal = '.' if it does not"
+                )
         if not strange:
             return values, ""
         cells = [self.cell(index, row) for row in strange]
@@ -238,7 +245,7 @@ def _matrix(body: Lines, decimal: str, width: int) -> _Matrix:
         lines = body.lines[start : start + _BLOCK]
         stop = start + len(lines)
         parsed = _parsed(lines, body.delimiter, decimal, wanted if whole else None)
-        if parsed is not None:
+        if parsed is not None and parsed.shape[1] == len(wanted):
             values[wanted, start:stop] = parsed.T
             continue
         columns = list(zip(*map(body.parted, lines), strict=True))
@@ -259,8 +266,10 @@ def _parsed(
     """Rows of nothing but numbers, as NumPy reads them; None where a cell is none, or may be read
     in two ways.
     """
+    text = "\n".join(lines)
+    if "_" in text:  # no digits of a number, whatever Python says
+        return None
     if decimal != ".":
-        text = "\n".join(lines)
         if "." in text:  # points may part thousands
             return None
         lines = text.replace(decimal, ".").split("\n")
@@ -280,12 +289,14 @@ def _numbers_of_cells(
         plain = [cell.replace(decimal, ".") for cell in plain]
     strange: list[int] = []
     try:
+        if any("_" in cell for cell in plain):
+            raise ValueError("an underscore is no part of a number")
         values = np.array(plain, dtype=np.float64)
     except ValueError:
         values = np.full(len(plain), math.nan)
         for row, cell in enumerate(plain):
             try:
-                values[row] = float(cell)
+                values[row] = float(cell.replace("_", "?"))
             except ValueError:
                 if cell.strip().lower() not in NO_VALUE:
                     strange.append(row)
@@ -398,7 +409,13 @@ def lines_of(text: str, delimiter: str, source: str, comments: tuple[str, ...] =
         )
         reader = csv.reader(kept, delimiter=delimiter)
         rows = ((reader.line_num, row) for row in reader)
-        return _joined((number, row) for number, row in rows if any(map(str.strip, row)))
+        try:
+            return _joined((number, row) for number, row in rows if any(map(str.strip, row)))
+        except csv.Error as error:
+            raise RecordingError(
+                f"{source}: a quote that is opened in row {reader.line_num + 1} or before is not "
+                f"closed ({error})"
+            ) from error
     blank = f"{delimiter} \t"
     places = [
         number
@@ -428,7 +445,10 @@ def split_rows(text: str, delimiter: str) -> list[list[str]]:
     if delimiter == " ":
         return [line.split() for line in text.splitlines()]
     if '"' in text:
-        return list(csv.reader(text.splitlines(), delimiter=delimiter))
+        try:
+            return list(csv.reader(text.splitlines(), delimiter=delimiter))
+        except csv.Error as error:
+            raise RecordingError(f"a quote that is opened is not closed ({error})") from error
     return [line.split(delimiter) for line in text.splitlines()]
 
 

@@ -56,6 +56,7 @@ _LEAST_STEP = 4e-4
 _LEAST_STEP_SHARE = 0.2  # the same of a stiff rig, as a share of the step of its nominal model
 # [tolerances] shift of a parameter to whose value the core has no sensitivities
 _SHIFT_TOLERANCES = 0.01
+_UNKNOWN_SHARE = 1e-5  # the same of one without a tolerance, as a share of its value
 # the same in a fit to its end: one that stopped early looked like physics (decision 22)
 FINAL_STEP_SHARE = 1e-5
 FIT_BIN_TIME = 0.02  # [s] bins of residuals for fits: faster than any effect of the catalogue shows
@@ -270,15 +271,22 @@ def _steps(rig: Rig, cores: Mapping[str, _core.Rig], names: Sequence[str]) -> di
     """By how much each parameter is shifted to whose value the core has no sensitivities."""
     told, known = {n for core in cores.values() for n in core.parameter_names}, rig.parameters
     return {
-        name: _SHIFT_TOLERANCES * known[name].tol * (-1.0 if _at_end(known[name]) else 1.0)
+        name: _shift(known[name]) * (-1.0 if _at_end(known[name]) else 1.0)
         for name in names
         if name in known and name not in told
     }
 
 
+def _shift(known: Parameter) -> float:
+    """How far: a share of its tolerance; of one that is unknown, of its value."""
+    if math.isfinite(known.tol):
+        return _SHIFT_TOLERANCES * known.tol
+    return _UNKNOWN_SHARE * abs(known.value) if known.value else _UNKNOWN_SHARE
+
+
 def _at_end(known: Parameter) -> bool:
     """Whether a parameter cannot be shifted upwards."""
-    return known.value + _SHIFT_TOLERANCES * known.tol > known.upper
+    return known.value + _shift(known) > known.upper
 
 
 def two_at_a_time(function: Callable[[Item], Found], items: Iterable[Item]) -> list[Found]:

@@ -97,7 +97,7 @@ def begun_alike(
     prepared = replace(prepared, temperatures=began) if began else prepared
     moving = [block for block in blocks if block.mechanical and block.window is not None]
     rests = [block.channel for block in moving if _rests(block, core, prepared, tolerances or {})]
-    return replace(prepared, at_rest=frozenset(rests)) if rests else prepared
+    return replace(prepared, at_rest=frozenset(rests), _begun={}) if rests else prepared
 
 
 def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> bool:

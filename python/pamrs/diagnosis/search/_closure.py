@@ -12,15 +12,15 @@ was made far from it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis.evidence import autocorrelation_of
-from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked, with_priors
-from pamrs.diagnosis.noise import correlation_time
+from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
+from pamrs.diagnosis.noise import NoiseLevel, correlation_time
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
 from pamrs.errors import DiagnosisError, SimulationError
@@ -85,6 +85,7 @@ def find_closure(
     inflation: dict[str, float],
     blocks: list[Block],
     say: Callable[[str], None],
+    noise_level: Mapping[Key, NoiseLevel] | None = None,
 ) -> Fit | None:
     """Fit a sparse closure where blocks keep an excess.
 
@@ -112,6 +113,8 @@ def find_closure(
         Blocks of the problem that keep an excess: ``supply``, ``chamber``, ``arm``.
     say : callable
         Receives progress.
+    noise_level : mapping, optional
+        Noise levels: residuals weigh no more than noise of the drives allows.
 
     Returns
     -------
@@ -136,7 +139,7 @@ def find_closure(
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
-    autocorrelation = autocorrelation_of(problem, found, {})
+    autocorrelation = autocorrelation_of(problem, found, noise_level or {})
     candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
     second = _select(
         _Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values

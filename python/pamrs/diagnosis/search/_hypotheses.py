@@ -624,7 +624,13 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
         return group
     group = replace(group, sought=True)
     closed = find_closure(
-        trial.inner, trial.nominal, start.fit, refit.autocorrelation, suspects, say
+        trial.inner,
+        trial.nominal,
+        start.fit,
+        refit.autocorrelation,
+        suspects,
+        say,
+        trial.noise_level,
     )
     if closed is None:
         return group

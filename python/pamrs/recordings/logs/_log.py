@@ -158,7 +158,9 @@ def table_of(log: Log) -> Table:
             header.append(f"{series.name} [{series.unit}]" if series.unit else series.name)
             texts = [series.labels[int(at)] for at in series.values] if series.labels else None
             cells.append(series.values if texts is None else texts)
-    return Table(header, cells, log.remarks)
+    other = [name for name, s in log.series.items() if len(s.values) != usual]
+    left = [f"{_few(other)}: not {usual} values as the others have, left out"] if other else []
+    return Table(header, cells, [*log.remarks, *left])
 
 
 def _few(names: Any, most: int = 12) -> str:
