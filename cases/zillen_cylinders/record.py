@@ -245,10 +245,9 @@ def load_friction_record(
     file = Path(path)
     source = str(file)
     table = read_table(file, delimiter=" ", header=False)
-    if len(table.cells) != len(columns):
+    if table.width != len(columns):
         raise RecordingError(
-            f"{source}: columns lists {len(columns)} names, but there are {len(table.cells)} "
-            "columns"
+            f"{source}: columns lists {len(columns)} names, but there are {table.width} columns"
         )
     values: dict[str, Array] = {}
     for index, heading in enumerate(columns):

@@ -203,8 +203,9 @@ def test_a_thick_bladder_fills_the_braid(kind: str) -> None:
 def test_slender_muscle_is_a_cylinder(arguments: dict[str, Any], e: float) -> None:
     """The ends take a share of the length that falls as D/L, and so does what they change."""
     gaps = []
+    short = min(arguments["rest_length"], 0.3)  # a muscle is at most 10 m long
     for stretch in (2.0, 8.0, 32.0):
-        muscle = pamrs.Muscle(**{**arguments, "rest_length": stretch * arguments["rest_length"]})
+        muscle = pamrs.Muscle(**{**arguments, "rest_length": stretch * short})
         cylinder = muscle.replace(geometry="cylinder")
         gaps.append(
             [
