@@ -87,7 +87,7 @@ def load_recording(
             f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
         )
     marks = {thousands} if isinstance(thousands, str) else set((thousands or {}).values())
-    if decimal in marks:
+    if decimal == "," and decimal in marks:  # a column whose points part thousands has no fractions
         raise RecordingError(
             f"{source}: thousands = {decimal!r} is not allowed: it is the decimal mark"
         )
