@@ -28,7 +28,7 @@ def test_a_decimal_comma_between_commas_is_no_number(tmp_path: Path) -> None:
 
 def test_points_beside_a_decimal_comma_are_asked(tmp_path: Path) -> None:
     file = written(tmp_path, "time [s];muscle_pressure [kPa]", ["0,0;980", "1,0;1.520", "2,0;990"])
-    with pytest.raises(RecordingError, match=r"'1\.520' has a point although decimal = ','"):
+    with pytest.raises(RecordingError, match=r"'1\.520' has a point and decimal is ','"):
         load_recording(file, delimiter=";", decimal=",")
     read = load_recording(file, delimiter=";", decimal=",", thousands={"muscle_pressure": "."})
     assert np.allclose(read.channels["muscle_pressure"], [980e3, 1520e3, 990e3])

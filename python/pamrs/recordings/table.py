@@ -195,7 +195,7 @@ class Table:
             pointed = [cell for cell in map(str, self.cells(index)) if "." in cell]
             if pointed:
                 raise RecordingError(
-                    f"{source}: column {label!r}: {pointed[0]!r} has a point although decimal = ',': "
+                    f"{source}: column {label!r}: {pointed[0]!r} has a point and decimal is ',': "
                     "give thousands = '.' if it parts thousands, decimal = '.' if it does not"
                 )
         if not strange:
