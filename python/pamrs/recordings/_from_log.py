@@ -8,12 +8,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.recordings._case_keys import ROLES
 from pamrs.recordings._clock import Array
 from pamrs.recordings._doubts import made_gauge
 from pamrs.recordings._mapping import Clock, Source, read_clock, read_sources
@@ -25,8 +26,6 @@ from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_
 from pamrs.units import same_dimension, to_si
 
 __all__ = ["Clocks", "check_asked", "completed", "load_recordings", "recordings_of"]
-
-_ROLES: Final = ("fit", "held_out")
 
 
 def load_recordings(
@@ -116,7 +115,7 @@ def check_asked(source: str, role: str, sample_time: float | None) -> None:
     RecordingError
         Naming the value and what is allowed.
     """
-    if role not in _ROLES:
+    if role not in ROLES:
         raise RecordingError(f"{source}: role = {role!r} is not allowed: 'fit' or 'held_out'")
     if sample_time is not None and not (math.isfinite(sample_time) and sample_time > 0.0):
         raise RecordingError(

@@ -108,6 +108,8 @@ def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolera
     window is freed of is linear in where it starts.
     """
     names = [n for n in core.parameter_names if n in block.parameters and n in tolerances]
+    if not names:
+        return False
     tol = np.array([tolerances[n] for n in names])
     left = []
     for channels in (frozenset[str](), frozenset({block.channel})):
@@ -116,7 +118,7 @@ def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolera
             found = residual(block, core, there, names)
         except SimulationError:
             return False
-        if not names or found.jacobian is None or not found.starts or found.starts[0][0] > 0:
+        if found.jacobian is None or not found.starts or found.starts[0][0] > 0:
             return False
         last = found.starts[0][1]
         slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
