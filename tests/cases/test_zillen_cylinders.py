@@ -12,7 +12,7 @@ from cases.zillen_cylinders.compare import compare_friction_laws
 from cases.zillen_cylinders.figure import plot_cylinders
 from cases.zillen_cylinders.laws import fit_cylinder_friction, mean_of_series
 from cases.zillen_cylinders.record import FrictionRecord, load_friction_folder, load_friction_record
-from cases.zillen_cylinders.strokes import find_strokes, onset_at_rest, pair_strokes
+from cases.zillen_cylinders.strokes import onset_at_rest, pair_strokes
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit.levels import fit_levels
 from tests.tables import rows_of
@@ -126,15 +126,6 @@ def test_known_friction_and_breakaway_are_recovered():
     assert np.allclose(fit.predict(fit.pressures), fit.best_fit)
 
 
-def test_signed_prediction_over_velocity():
-    fit = fit_cylinder_friction(runs())
-    assert np.allclose(
-        fit.predict(2e5, [-0.1, 0.0, 0.1]), fit.predict(2e5) * np.array([-1.0, 0.0, 1.0])
-    )
-    with pytest.raises(ParameterError, match="pressure: a value is not finite"):
-        fit.predict([1e5, np.nan])
-
-
 def test_standard_errors_tell_the_truth():
     slopes, held_out = [], []
     for seed in range(30):
@@ -167,36 +158,6 @@ def test_held_out_pressures_are_predicted_with_their_error():
     assert max(abs(item.relative_error) for item in crossed) < 0.1
 
 
-def test_a_held_out_run_does_not_touch_the_fit():
-    records = runs(seed=4)
-    spoilt = [*records[:1], run(2e5, seed=4, between=0.5), *records[2:]]
-    options = {"fit_on": (1e5, 4e5, 7e5)}
-    one, other = (fit_cylinder_friction(found, **options) for found in (records, spoilt))
-    assert {k: v.value for k, v in one.params.items()} == {
-        k: v.value for k, v in other.params.items()
-    }
-    assert one.held_out()[0].level.friction != other.held_out()[0].level.friction
-
-
-def test_area_that_changes_with_the_position_does_not_become_friction():
-    straight, tilted = (fit_cylinder_friction(runs(seed=5, tilt=tilt)) for tilt in (0.0, 0.08))
-    assert np.allclose(straight.best_fit, tilted.best_fit, rtol=0.01)
-
-
-def test_position_that_falls_against_the_gas():
-    fit = fit_cylinder_friction(runs(seed=6, sign=-1))
-    assert fit.params["f1"].value == pytest.approx(F1, rel=0.1)
-    assert fit.params["breakaway_ratio"].value == pytest.approx(RATIO, rel=0.03)
-    level = fit.levels[0]
-    assert level.speed_against == pytest.approx(0.02, rel=0.01)
-    assert level.speed_giving == pytest.approx(0.03, rel=0.01)
-
-
-def test_no_breakaway_is_no_breakaway():
-    fit = fit_cylinder_friction(runs(seed=7, breakaway=1.0))
-    assert fit.params["breakaway_ratio"].value == pytest.approx(1.0, abs=0.05)
-
-
 def test_a_pause_of_the_logger_hides_the_breakaway():
     whole = run(3e5)
     rows = np.r_[0:15, 22 : len(whole)]
@@ -213,14 +174,6 @@ def test_a_pause_of_the_logger_hides_the_breakaway():
     assert onset.ratio == pytest.approx(RATIO, rel=0.05)
 
 
-def test_a_record_that_begins_in_motion_has_no_breakaway_from_rest():
-    whole = run(3e5)
-    parts = [values[16:] for values in (whole.time, whole.position, whole.pressure, whole.force)]
-    onset = onset_at_rest(pair_strokes(FrictionRecord.from_arrays(*parts)), AREA)
-    assert onset is not None
-    assert onset.status == "in motion"
-
-
 def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
     together = [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES]
     with pytest.raises(RecordingError, match="speed and pressure have a correlation of 1.00"):
@@ -233,21 +186,6 @@ def test_speed_and_pressure_are_told_apart_only_if_they_vary_apart():
     assert abs(fit.params["fv"].value) < 3.0 * fit.params["fv"].stderr
     with pytest.raises(ParameterError, match="velocity is needed"):
         fit.predict(1e5)
-
-
-def test_report_says_what_the_runs_do_not_tell():
-    text = fit_cylinder_friction(
-        [run(p, speeds=(0.02 + 2e-8 * p, 0.03)) for p in PRESSURES], fit_on=(1e5, 7e5)
-    ).fit_report()
-    for words in (
-        "the law cannot be tested",
-        "not separable from the area",
-        "f1 = ",
-        "N/bar",
-        "predicted 4.00 bar",
-        "breakaway",
-    ):
-        assert words in text
 
 
 def test_figure(tmp_path):
@@ -263,62 +201,6 @@ def test_figure(tmp_path):
 # ------------------------------------------------------------------------- bad input
 
 
-def test_rows_that_cannot_be_used_are_flagged():
-    whole = run(3e5)
-    force, time = whole.force.copy(), whole.time.copy()
-    force[100:103] = np.nan
-    time[200] = time[199]
-    record = FrictionRecord.from_arrays(time, whole.position, whole.pressure, force)
-    assert [record.reason[i] for i in (100, 102, 200)] == [
-        "not a number",
-        "not a number",
-        "time does not advance",
-    ]
-    assert "3 rows of" in " ".join(record.issues)
-    assert pair_strokes(record).friction(AREA).mean() == pytest.approx(
-        pair_strokes(whole).friction(AREA).mean(), rel=1e-3
-    )
-
-
-@pytest.mark.parametrize(
-    ("spoil", "message"),
-    [
-        (
-            lambda r: (r.time, r.position * 1e3, r.pressure, r.force),
-            r"position = .* m is outside -5 to 5 m; right unit\?",
-        ),
-        (
-            lambda r: (r.time, r.position, r.pressure * 1e3, r.force),
-            r"pressure = .* Pa is outside .*; right unit\?",
-        ),
-        (
-            lambda r: (r.time[:10], r.position[:10], r.pressure[:10], r.force[:10]),
-            "10 usable rows of 10; 20 at least",
-        ),
-        (lambda r: (r.time[1:], r.position, r.pressure, r.force), "the same number is needed"),
-    ],
-)
-def test_impossible_columns_are_named(spoil, message):
-    with pytest.raises(RecordingError, match=message):
-        FrictionRecord.from_arrays(*spoil(run(3e5)))
-
-
-def test_motion_without_reversal_or_with_too_few_strokes():
-    whole = run(3e5)
-    one_way = FrictionRecord.from_arrays(
-        *(values[:150] for values in (whole.time, whole.position, whole.pressure, whole.force))
-    )
-    with pytest.raises(RecordingError, match="the motion never reverses"):
-        find_strokes(one_way)
-    still = FrictionRecord.from_arrays(
-        whole.time, np.zeros(len(whole)), whole.pressure, whole.force
-    )
-    with pytest.raises(RecordingError, match="the position does not change"):
-        find_strokes(still)
-    with pytest.raises(RecordingError, match="2 complete pairs of strokes; 3 at least"):
-        pair_strokes(run(3e5, cycles=2))
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     rows_of(__file__, "what_the_runs_do_not_determine_is_named"),
@@ -326,28 +208,6 @@ def test_motion_without_reversal_or_with_too_few_strokes():
 def test_what_the_runs_do_not_determine_is_named(options, message):
     with pytest.raises(RecordingError, match=message):
         fit_cylinder_friction(runs(), **options)
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        (
-            {"fit_on": (3e5,)},
-            "fit_on: no run at 300 kPa; there are runs at 100, 200, 400, 500, 700 kPa",
-        ),
-        ({"law": "cubic"}, "law = 'cubic' is not allowed: constant"),
-        ({"area": -1.0}, "area = -1.0 m2 is not allowed"),
-        ({"margin": 0.6}, "margin = 0.6 is not allowed: 0 to 0.45"),
-    ],
-)
-def test_impossible_arguments_are_named(options, message):
-    with pytest.raises(ParameterError, match=message):
-        fit_cylinder_friction(runs(), **options)
-
-
-def test_a_single_pressure_with_its_area_gives_a_constant():
-    fit = fit_cylinder_friction(runs(), fit_on=(4e5,), law="constant", area=AREA)
-    assert fit.params["f0"].value == pytest.approx(F0 + F1 * 4e5, rel=0.05)
 
 
 # ----------------------------------------------------------------------------- files
@@ -453,8 +313,3 @@ def test_pressure_is_not_named_where_speed_falls_with_it():
     assert found.probabilities["stribeck"] > 0.03
     assert "not settled" in found.statement()
     assert "speed goes with pressure" in found.statement()
-
-
-def test_two_pressures_compare_nothing():
-    with pytest.raises(RecordingError, match="at least 3 are needed"):
-        compare_friction_laws([run(p) for p in (1e5, 4e5)])

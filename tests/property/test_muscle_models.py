@@ -165,20 +165,6 @@ def test_replace_changes_only_what_it_is_told(arguments: dict[str, Any]) -> None
     assert muscle.parameters["rest_length"] == arguments["rest_length"]
 
 
-@pytest.mark.parametrize("geometry", GEOMETRIES)
-@pytest.mark.parametrize("model", MODELS)
-def test_compiled_table_holds_every_model(model: str, geometry: str) -> None:
-    muscle = made(model=model, geometry=geometry, friction_coefficient=0.1)
-    low, high = muscle.contraction_range
-    e = np.linspace(max(low, 0.0) + 1e-3, high - 1e-3, 57)
-    blocked = abs(float(muscle.force(5e5, 0.0)))
-    for direction in (None, -1.0, 0.3, 1.0):
-        exact = muscle.force(5e5, e, direction=direction)
-        np.testing.assert_allclose(
-            muscle.force_table(5e5, e, direction=direction), exact, rtol=0.0, atol=1e-6 * blocked
-        )
-
-
 # --- Virtual work and stored
 # energy ------------------------------------------------------------------------------
 
@@ -474,6 +460,9 @@ def test_impossible_contraction_is_refused_by_every_method(e: float) -> None:
         muscle.elastic_basis,
         muscle.circumferential_strain,
         muscle.braid_taut,
+        muscle.radius,
+        muscle.thickness,
+        muscle.air_volume,
     )
     for method in methods:
         with pytest.raises(pamrs.ParameterError, match="contraction|length"):

@@ -18,14 +18,9 @@ from scipy.interpolate import CubicSpline
 import pamrs
 from pamrs.simulation import core_rig
 from tests.property.networks import (
-    HIGH,
-    LOW,
-    MUSCLE,
-    TENDON,
     Blocks,
     networks,
     rig_of,
-    transmissions,
 )
 from tests.reference.planar import Link, PlanarArm
 from tests.runs import Run
@@ -34,7 +29,6 @@ Array = NDArray[np.float64]
 
 RT = 287.05 * 293.15
 GRAVITY = 9.80665
-ALL = ("antagonists", "two_joints", "hanging")
 SOME = settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
 
 
@@ -129,52 +123,6 @@ def test_muscles_and_joints_have_the_same_power(drawn: tuple[Blocks, Run]) -> No
     np.testing.assert_allclose(
         got["muscle_work"][50::50], np.cumsum(each), rtol=0.0, atol=1e-6 * whole
     )
-
-
-@SOME
-@given(transmissions(), st.floats(1e4, 6e5), st.integers(1, 6), st.data())
-def test_a_joint_alone_loses_no_power(
-    model: dict[str, Any], pressure: float, count: int, data: st.DataObject
-) -> None:
-    """tau = n F dd/dtheta with the slope of the shortening itself, for every kind but
-    `published`.
-    """
-    angle, h = data.draw(st.floats(LOW + 0.01, HIGH - 0.01)), 1e-3
-    joint, muscle = joint_of(model), pamrs.Muscle(**MUSCLE)
-    d = joint.shortening(angle + h * np.array([-2.0, -1.0, 1.0, 2.0]))
-    slope = float(d[0] - 8.0 * d[1] + 8.0 * d[2] - d[3]) / (12.0 * h)
-    assert float(joint.moment_arm(angle)) == pytest.approx(slope, rel=1e-7, abs=1e-10)
-    force = count * float(
-        muscle.force(pressure, float(joint.shortening(angle)) / MUSCLE["rest_length"])
-    )
-    torque = float(joint.torque(muscle, pressure, angle, count=count))
-    assert torque == pytest.approx(force * float(joint.moment_arm(angle)), rel=1e-13)
-
-
-def test_the_published_torque_loses_power() -> None:
-    """What is printed in (3.6)-(3.8) is the exception, and the books show it: the joint gets less
-    than the muscle gives.
-    """
-    arm = {"inertia": 0.05, "length": 0.3, "payload": 1.0, "viscous": 0.3}
-    stops = {"min_angle": LOW, "max_angle": HIGH}
-    works = {}
-    for kind in ("tendon", "published"):
-        blocks: Blocks = {
-            "gas": {},
-            "chamber": {"dead_volume": 5e-5, "initial_pressure": 3e5},
-            "muscle": MUSCLE,
-            "joint": {**TENDON, "kind": kind, "rest_angle": LOW, **stops},
-            "arm": arm,
-        }
-        run = Run(rig_of(blocks), 2e-4, 501, {"joint_angle": 0.9})
-        got = run.core()
-        assert not touches(got)
-        torque_work = CubicSpline(run.time, got["joint_torque"] * got["joint_rate"]).integrate(
-            0.0, run.time[-1]
-        )
-        works[kind] = float(torque_work) / float(got["muscle_work"][-1])
-    assert works["tendon"] == pytest.approx(1.0, abs=1e-8)
-    assert works["published"] < 0.98
 
 
 # ------------------------------------------------------------------ energy

@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import library, rigs
+from pamrs import rigs
 from pamrs.comparison import judge, markdown, table, to_csv, verdicts
 from pamrs.errors import ParameterError
-from pamrs.rig import Joint
 from reproduction import CHAPTERS, chapter3, chapter5, elbow
 from reproduction.page import Picture, Section, page
 from reproduction.statements import symbols
@@ -187,21 +186,6 @@ def geometry(rotation):
     return upper - AXIAL, lever * np.cos(theta_f), lever / np.cos(theta_f)
 
 
-def test_rig_has_the_librarys_muscle_and_the_printed_tendon():
-    rig = rigs.named("elbow")
-    assert rig.muscle.replace(count=1).parameters == library.entry("elbow_0625in").muscle.parameters
-    assert rig.model["muscle"]["count"] == 6
-    contraction, _, _ = geometry(0.0)
-    assert contraction == pytest.approx(
-        0.0, abs=1e-8
-    )  # the rest angle is that of a tendon of 3.04 in
-    arm = rig.model["arm"]
-    mass = 7.0 * 20.0 / 33.0
-    assert arm["first_moment"] == pytest.approx(mass * 0.508 / 2.0, rel=1e-3)
-    assert arm["inertia"] == pytest.approx(mass * 0.508**2 / 3.0, rel=1e-3)
-    assert arm["payload"] == pytest.approx(100.0 * 0.45359237)
-
-
 def test_torque_laws_are_the_printed_equations_and_power():
     rotation = np.radians(np.linspace(0.0, 110.0, 56))
     contraction, printed, conserving = geometry(rotation)
@@ -218,130 +202,6 @@ def test_torque_laws_are_the_printed_equations_and_power():
     work = np.trapezoid(elbow.elbow_torque(fine), fine)
     pull = 6.0 * rigs.named("elbow").muscle.force(150.0 * elbow.PSI, travel / (7.785 * 0.0254))
     assert work == pytest.approx(np.trapezoid(pull, travel), rel=1e-7)
-
-
-def test_range_is_where_the_torque_is_enough():
-    first, last = elbow.torque_range(elbow.elbow_torque, 200.0 * elbow.FOOT_POUND)
-    np.testing.assert_allclose(
-        elbow.elbow_torque([first, last]) / elbow.FOOT_POUND, 200.0, rtol=1e-9
-    )
-    assert np.all(elbow.elbow_torque(np.linspace(first, last, 99)[1:-1]) > 200.0 * elbow.FOOT_POUND)
-    assert np.isnan(elbow.torque_range(elbow.elbow_torque, 1e4)).all()
-    assert elbow.torque_range(lambda x: np.ones_like(x), 0.5, last=1.0) == (0.0, 1.0)
-
-
-@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
-def test_muscle_of_chapter_3_has_gaylords_blocked_force_and_the_free_contraction(share):
-    muscle = elbow.mooney_rivlin(share)
-    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(
-        879.8, abs=0.1
-    )
-    assert abs(float(muscle.force(150.0 * elbow.PSI, 0.37))) < 1e-6
-    assert muscle.parameters["c01"] == pytest.approx(
-        share * (muscle.parameters["c01"] + muscle.parameters["c10"])
-    )
-    with pytest.raises(ParameterError, match="share = 1.5"):
-        elbow.mooney_rivlin(1.5)
-
-
-def test_steeper_braid_has_force_and_diameter_of_table_3_2():
-    muscle = elbow.steeper_braid()
-    assert float(muscle.force(150.0 * elbow.PSI, 0.0)) / 4.4482216152605 == pytest.approx(
-        820.0, rel=0.02
-    )
-    assert abs(float(muscle.force(150.0 * elbow.PSI, 0.37))) < 1e-6
-    assert 2.0 * float(muscle.replace(geometry="cylinder").radius(0.37)) / 0.0254 == pytest.approx(
-        1.75, rel=0.01
-    )
-
-
-def test_payload_torque():
-    assert float(elbow.payload_torque(100.0, math.pi / 2)) / elbow.FOOT_POUND == pytest.approx(
-        100.0 * 20.0 / 12.0, rel=1e-12
-    )
-    assert float(
-        elbow.payload_torque(380.0, math.pi / 6, 0.1778)
-    ) / elbow.FOOT_POUND == pytest.approx(0.5 * 380.0 * 7.0 / 12.0, rel=1e-12)
-
-
-def test_static_curve_balances_and_has_the_slope_of_its_points():
-    curve = elbow.static_curve(135.0, law="printed")
-    arm = rigs.named("elbow").model["arm"]
-    weight = elbow.payload_torque(135.0, elbow.rest_angle() + curve.rotation)
-    weight = weight + arm["first_moment"] * arm["gravity"] * np.sin(
-        elbow.rest_angle() + curve.rotation
-    )
-    torque = [
-        float(elbow.elbow_torque(r, law="printed", psi=p))
-        for r, p in zip(curve.rotation, curve.psi, strict=True)
-    ]
-    np.testing.assert_allclose(torque, weight, rtol=1e-9)
-    assert curve.psi[-1] == pytest.approx(150.0, rel=1e-9)
-    between = np.diff(curve.rotation) / np.diff(curve.psi)
-    assert np.all(np.diff(curve.psi) > 0.0)
-    np.testing.assert_allclose(curve.slope[1:-1], 0.5 * (between[1:] + between[:-1]), rtol=2e-3)
-
-
-def test_slow_simulation_follows_the_static_curve():
-    curve = elbow.static_curve(135.0)
-    slow = elbow.triangle(frequency=0.005)
-    rising, falling = elbow.at_same_pressure(
-        slow, slow["joint_angle"] - elbow.rest_angle(), curve.psi[20:-5]
-    )
-    np.testing.assert_allclose(
-        0.5 * (rising + falling), curve.rotation[20:-5], atol=math.radians(1.0)
-    )
-
-
-def test_hysteresis_turns_the_loop_the_published_way():
-    loops = {}
-    for hysteresis in (False, True):
-        result = elbow.triangle(hysteresis=hysteresis)
-        rising, falling = elbow.at_same_pressure(
-            result, result["joint_angle"], np.linspace(45.0, 140.0, 20)
-        )
-        loops[hysteresis] = float(np.degrees(falling - rising).mean())
-    assert 0.0 < loops[False] < 2.0 < loops[True]
-
-
-def test_step_and_the_valve_that_gives_a_peak():
-    ours = elbow.step()
-    result, rotation = ours.simulation, ours.simulation["joint_angle"] - elbow.rest_angle()
-    assert ours.area == pytest.approx(8.4e-6)
-    assert ours.peak == result["joint_rate"].max()
-    assert float(np.interp(ours.arrival, result.time, rotation)) == pytest.approx(
-        math.radians(90.0), abs=1e-6
-    )
-    assert rotation[result.time < ours.arrival].max() < math.radians(90.0)
-    assert ours.mean == pytest.approx(math.radians(90.0) / ours.arrival)
-    area = elbow.valve_for_peak(math.radians(200.0))
-    assert elbow.step(area).peak == pytest.approx(math.radians(200.0), rel=1e-3)
-    assert math.isnan(elbow.step(3e-7, seconds=2.0).arrival)
-    with pytest.raises(ParameterError, match="no valve from 0.1 to 100 mm2"):
-        elbow.valve_for_peak(100.0)
-    peaks = [item.peak for item in chapter3.step_by_area()]
-    assert np.all(np.diff(peaks) > 0.0)
-
-
-def test_ramp_is_cut_off_at_what_was_reached():
-    result = elbow.ramp_and_hold()
-    psi = result["muscle_pressure"] / elbow.PSI
-    assert psi[200] == pytest.approx(75.0)
-    assert psi[-1] == psi[400] == pytest.approx(145.0)
-    rest = float(result["joint_angle"][-1]) - elbow.rest_angle()
-    assert rest == pytest.approx(elbow.rotation_reached(100.0, 145.0), abs=math.radians(0.1))
-    joint = Joint.from_model(result.rig.model["joint"])
-    pull = result["joint_torque"] / joint.torque_arm(result["joint_angle"])
-    np.testing.assert_allclose(pull[10:], result["muscle_force"][10:], rtol=1e-9)
-
-
-def test_bad_arguments():
-    with pytest.raises(
-        ParameterError, match="law = 'other' is not allowed: one of conserving, printed"
-    ):
-        elbow.arm_rig(law="other")
-    with pytest.raises(ParameterError, match="arm.payload"):
-        elbow.arm_rig(pounds=-1.0)
 
 
 def test_another_braid_angle_is_that_of_every_experiment_inside_it_only():

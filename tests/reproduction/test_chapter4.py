@@ -14,7 +14,7 @@ from pamrs.control import PID, closed_loop
 from pamrs.control.metrics import evaluate
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
-from reproduction import chapter4, lift, lift_diagnosis
+from reproduction import chapter4, lift
 from reproduction.chapter4_statements import SERIES, statements
 from reproduction.elbow import PSI
 from reproduction.lift import GAINS, PAYLOADS, VARIANTS, Lifts
@@ -44,16 +44,6 @@ def verdicts(**changed):
     """Verdict of every statement for runs that all lag by 0.3 s, but for some."""
     runs = dict.fromkeys(GAINS, made()) | changed
     return {row.fact: row.verdict for row in statements("group", runs)}
-
-
-def test_reference_is_three_segments_of_5_s_in_a_record_of_25_s():
-    assert PATH.duration == 25.0
-    assert {name: span for name, span in PATH.phases.items() if name != "rest"} == {
-        "lift": (5.0, 10.0),
-        "hold": (10.0, 15.0),
-        "return": (15.0, 20.0),
-    }
-    assert math.degrees(float(PATH(12.0).angle)) == pytest.approx(80.0)
 
 
 def test_overshoot_swing_and_delay_are_read_off_the_angle():
@@ -141,34 +131,6 @@ def test_every_trial_changes_what_the_arm_does(few):
     assert np.abs(one - other).max() > 1e-4
 
 
-def test_a_map_has_the_metrics_of_its_loops_in_both_units():
-    name = "muscle damping 3000 N s/m"
-    found = lift.fuzzy_map([0.3, 0.6], [0.4, 0.8], name, PAYLOADS[1:2])
-    run = lift.lifts([name], {"fuzzy": (0.0, 0.3, 0.6, 0.8)}, payloads=PAYLOADS[1:2])[name]["fuzzy"]
-    assert found.nu[0, 0, 1] == pytest.approx(float(run.metrics.squared_error[0]), rel=1e-3)
-    for unit in ("rad", "deg"):
-        omega = evaluate(run.time, run.reference, run.angle, rate=run.rate, unit=unit).curvature
-        assert found.omega[unit][0, 0, 1] == pytest.approx(float(omega[0]), rel=1e-9)
-        assert found.j[unit].min() >= 1.0
-        i, k = np.unravel_index(int(found.j[unit][0].argmin()), (2, 2))
-        assert found.best(found.j[unit]) == [((0.3, 0.6)[i], (0.4, 0.8)[k])]
-
-
-def test_records_for_the_diagnosis_have_what_is_measured():
-    name = chapter4.DAMPED
-    truth, model = (
-        lift.plant(VARIANTS[name], PAYLOADS[1], seed=None),
-        lift.assumed(VARIANTS[name]).with_parameters({"arm.payload": PAYLOADS[1]}),
-    )
-    one, again = (lift_diagnosis.recorded(truth, model, PATH, "fit", 3, 1.0) for _ in range(2))
-    assert {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"} <= set(
-        one.channels
-    )
-    np.testing.assert_array_equal(one.channels["joint_angle"], again.channels["joint_angle"])
-    # the effect is in the plant alone: nothing else of it differs
-    assert truth.without_effect("muscle_rate_damping").model == model.model
-
-
 def test_page_has_every_plant_and_no_picture_is_missing():
     text = (DOCS / "chapter4.md").read_text(encoding="utf-8")
     assert "`make reproduce`" in text.splitlines()[2]
@@ -214,14 +176,6 @@ def test_the_printed_muscle_lets_go_at_its_free_contraction():
     assert once == pytest.approx(0.8 * float(muscle.force(0.0, 0.2, -1.0)), rel=1e-12)
 
 
-def test_gains_by_payload_are_those_of_each_payload_alone():
-    both = {"PID": (0.0, (1.4, 0.5), (2.5, 1.5))}
-    together = lift.lifts(gains=both, payloads=PAYLOADS[:2], duration=8.0)["as printed"]["PID"]
-    for k, gains in enumerate(((0.0, 1.4, 2.5), (0.0, 0.5, 1.5))):
-        one = lift.lifts(gains={"PID": gains}, payloads=PAYLOADS[k : k + 1], duration=8.0)
-        np.testing.assert_array_equal(together.angle[k], one["as printed"]["PID"].angle[0])
-
-
 def test_the_predicted_pressure_holds_the_arm():
     run = made()
     wanted = lift.predicted(run, PAYLOADS[1:3])
@@ -232,20 +186,6 @@ def test_the_predicted_pressure_holds_the_arm():
     weight = (arm["first_moment"] + arm["payload"] * arm["length"]) * arm["gravity"]
     assert float(torque) == pytest.approx(weight * math.sin(math.radians(lift.HIGH)), rel=1e-6)
     assert np.all(wanted[1] > wanted[0])
-
-
-@pytest.mark.slow
-def test_lines_of_gains_are_loops_with_the_gains_of_each_payload():
-    best = [(0.5, 1.5), (1.4, 2.5)]
-    line = lift.derivative_line([0.0, 0.1], best)
-    gains = {"PID": (0.0, (0.5, 1.4), (1.5, 2.5))}
-    run = lift.lifts(gains=gains, payloads=PAYLOADS[:2])["as printed"]["PID"]
-    np.testing.assert_allclose(line.nu[:, 0, 0], run.metrics.squared_error, rtol=1e-3)
-    assert np.all(line.nu[:, 1, 0] != line.nu[:, 0, 0])
-    fuzzy = lift.rate_line([0.3, 0.6], [(0.45, 0.65)])
-    one = lift.lifts(gains={"fuzzy": (0.0, 0.45, 0.6, 0.65)}, payloads=PAYLOADS[:1])
-    metrics = one["as printed"]["fuzzy"].metrics
-    assert fuzzy.nu[0, 1, 0] == pytest.approx(float(metrics.squared_error[0]), rel=1e-3)
 
 
 def test_an_error_too_small_for_a_figure_decides_nothing():

@@ -13,8 +13,7 @@ import pytest
 from pamrs.comparison import table, to_csv
 from pamrs.control import AdaptiveSliding, Neural
 from pamrs.errors import ParameterError
-from reproduction import CHAPTERS, chapter5, tracking
-from reproduction.chapter5_comparison import orders
+from reproduction import chapter5
 from reproduction.tracking import (
     KINDS,
     PERIOD,
@@ -25,7 +24,7 @@ from reproduction.tracking import (
     plant,
     waves,
 )
-from reproduction.tracking_runs import EFFECTS, MIDDLE, SHORT, STARTS, WRONG, Plan
+from reproduction.tracking_runs import EFFECTS, MIDDLE, SHORT, WRONG, Plan
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 #: Shorter still than the short plan: a few samples of everything.
@@ -66,14 +65,6 @@ def test_a_track_reads_known_errors():
     assert approach.rms()[0] == pytest.approx(1.0)
     assert approach.largest(0.0)[0] == pytest.approx(30.0)
     assert np.all(np.diff(approach.cumulative()[0, 2000:]) < 0.0)
-
-
-def test_ripple_is_what_is_fast():
-    time = PERIOD * np.arange(8001)
-    fast, slow = track(np.sin(2 * math.pi * 5.0 * time)), track(np.sin(2 * math.pi * 0.25 * time))
-    assert fast.ripple()[0] == pytest.approx(math.sqrt(0.5), rel=0.02)
-    assert slow.ripple()[0] < 0.01
-    assert fast.rms()[0] == pytest.approx(slow.rms()[0], rel=0.02)
 
 
 def test_share_by_angle_tells_an_angle_from_a_drift():
@@ -123,36 +114,6 @@ def test_what_was_learnt_is_what_the_next_run_starts_from(kind):
     assert changed, "it goes on learning"
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_one_plant_has_one_row_of_what_it_learnt(kind):
-    first = follow(kind, [plant(25.0)], arm_model([25.0]), waves(0.1))
-    assert all(values.shape[0] == 1 for values in first.learnt.values())
-    assert bool(first.learnt) == (kind in ("adaptive sliding", "neural"))
-    again = follow(kind, [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=first.learnt)
-    assert {name: values.shape for name, values in again.learnt.items()} == {
-        name: v.shape for name, v in first.learnt.items()
-    }
-
-
-def test_what_was_learnt_needs_a_row_for_each_plant():
-    weights = follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1)).learnt
-    one = {name: values[0] for name, values in weights.items()}
-    with pytest.raises(
-        ParameterError,
-        match=r"learnt\['H'\] has the shape \(22,\); one row for each of 1 plants is needed",
-    ):
-        follow("neural", [plant(25.0)], arm_model([25.0]), waves(0.1), learnt=one)
-    with pytest.raises(ParameterError, match="one row for each of 2 plants"):
-        follow("neural", [plant(25.0)] * 2, arm_model([25.0] * 2), waves(0.1), learnt=weights)
-
-
-def test_the_source_does_not_run_empty():
-    run = follow("cascaded PID", [plant(50.0)], arm_model([50.0]), waves(5.0))
-    assert not run.failed.any()
-    assert run.pressure.max() > 1e5
-    assert plant(50.0).parameter("supply.volume").value == tracking.SOURCE_VOLUME
-
-
 # ------------------------------------------------------------------- statements
 
 
@@ -183,31 +144,8 @@ def test_what_is_known_beforehand_comes_out(rows):
     assert np.all(exact < large)
 
 
-def test_orders_are_ratios_of_the_runs():
-    found = orders(TINY, 1)
-    wave = {kind: TINY.compared(kind, "compound").rms()[1] for kind in KINDS}
-    assert found["compound: sliding over cascaded PID"] == wave["sliding"] / wave["cascaded PID"]
-    assert found["compound: neural over sliding"] == wave["neural"] / wave["sliding"]
-    assert len(found) == 7
-    assert found != orders(TINY, 0)
-
-
-def test_runs_are_kept_and_networks_begin_with_nothing():
-    assert TINY.learning() is TINY.learning()
-    zero = TINY.learning()
-    assert all(not np.any(zero.noted[name][0]) for name in ("H", "C", "G"))
-    assert [payload for _, payload in STARTS] == [0.0, 15.0, 25.0, 50.0]
-    prepared = TINY.prepared()
-    assert np.array_equal(prepared.noted["G"][0][1], zero.noted["G"][-1][1]), "what 15 lb taught"
-
-
 def test_compensation_of_a_known_hysteresis_helps():
     assert SHORT.compensated(True).rms()[0] < 0.8 * SHORT.compensated(False).rms()[0]
-
-
-def test_the_chapter_is_there():
-    assert "ch5" in CHAPTERS
-    assert len(chapter5.chosen()) == len({name for name, _, _ in chapter5.chosen()}) > 5
 
 
 def test_page_in_the_documentation_is_of_the_full_plan(rows):

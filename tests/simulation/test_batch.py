@@ -10,8 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 import pamrs
 from pamrs.simulation import core_rig
@@ -113,50 +111,6 @@ def test_lanes_hold_the_rigs_that_simulate_batch_runs_in_them() -> None:
         np.testing.assert_array_equal(values, [one[channel][0] for one in each], err_msg=channel)
 
 
-@settings(max_examples=15, deadline=None)
-@given(
-    payload=st.lists(st.floats(0.0, 25.0), min_size=1, max_size=20),
-    angle=st.floats(0.3, 1.8),
-    rate=st.floats(-12.0, 12.0),
-    stiffness=st.sampled_from([5.0, 50.0, 5e3]),
-    levels=st.lists(st.floats(0.0, 10.0), min_size=1, max_size=6),
-    calls=st.lists(st.integers(1, 9), min_size=1, max_size=12),
-)
-def test_any_plant_is_its_simulator_however_the_run_is_cut(
-    payload: list[float],
-    angle: float,
-    rate: float,
-    stiffness: float,
-    levels: list[float],
-    calls: list[int],
-) -> None:
-    base = pamrs.rigs.shoulder().with_parameters({"joint.stop_stiffness": stiffness})
-    rigs = [base.with_parameters({"arm.payload": mass}) for mass in payload]
-    start = {"joint_angle": angle, "joint_rate": rate}
-    whole = pamrs.Batch(rigs, sample_time=0.005, initial=start)
-    cut = pamrs.Batch(rigs, sample_time=0.005, initial=start, threads=1)
-    k, one = len(rigs) // 2, pamrs.Simulator(rigs[len(rigs) // 2], sample_time=0.005, initial=start)
-    found, wanted, bits = [], [], []
-    for call, samples in enumerate(calls):
-        command = levels[call % len(levels)]
-        run = whole.control(lambda _, held=command: held, samples * 0.005)
-        for _ in range(samples):
-            last = cut.step(command)
-        cut.restore(cut.state)
-        bits.append([(run[name][:, -1], last[name]) for name in last])
-        if whole.status[k] is not None:
-            break
-        for _ in range(samples):
-            wanted.append(one.step(command)["joint_angle"])
-        found.extend(run["joint_angle"][k, 1:])
-    same(whole.state, cut.state)
-    for pairs in bits:
-        for left, right in pairs:
-            np.testing.assert_array_equal(left, right)
-    if found:
-        agree(whole, found, wanted)
-
-
 def test_what_has_a_memory_is_kept_apart() -> None:
     friction = {"friction_constant": 2.0, "friction_pressure": 2e-5, "presliding": 1e-3}
     rig = (
@@ -183,24 +137,6 @@ def test_a_clock_that_is_off_is_read_only_where_somebody_looks() -> None:
     for _ in range(20):
         last = one.step(5.5)
     np.testing.assert_array_equal(run["muscle_pressure"][:, -1], [last["muscle_pressure"]] * 2)
-
-
-def test_threads_and_company_change_no_bit() -> None:
-    n = 130
-    start = {"muscle_pressure": 1e5 + 1e3 * np.arange(n)}
-    states = []
-    for threads in (1, 2, 3):
-        batch = shoulders(n, initial=start, threads=threads)
-        for k in range(30):
-            batch.step(commands(n, k))
-        states.append(batch.state)
-    same(states[0], states[1])
-    same(states[0], states[2])
-    few = shoulders(2, initial={"muscle_pressure": start["muscle_pressure"][[77, 129]]})
-    for k in range(30):
-        few.step(commands(n, k)[[77, 129]])
-    for mine, row in enumerate((77, 129)):
-        np.testing.assert_array_equal(few.state["rows"][mine], states[0]["rows"][row])
 
 
 def test_a_sweep_over_payloads_is_the_rigs_one_by_one() -> None:

@@ -115,24 +115,3 @@ def test_lanes_know_slack_muscles(lane: str) -> None:
 def test_a_load_that_cannot_be_is_named(load: float) -> None:
     with pytest.raises(pamrs.PamrsError, match="buckling_load"):
         pamrs.rigs.recruitment().with_parameters({"muscle.pair_1.buckling_load": load})
-
-
-def test_a_batch_of_such_rigs_is_the_same_runs() -> None:
-    rig = pamrs.rigs.recruitment()
-    count = 200
-    commands = {pair: np.full(count, volts) for pair, volts in zip(PAIRS, (6, 4, 4), strict=True)}
-    payloads = np.array([0.0, 10.0])
-    batch = pamrs.simulate_batch(
-        rig,
-        sample_time=0.01,
-        valve_command=commands,
-        parameters={"arm.payload": payloads},
-        record=["joint_angle.shoulder"],
-    )
-    for row, payload in enumerate(payloads):
-        alone = pamrs.simulate(
-            rig.with_parameters({"arm.payload": float(payload)}),
-            sample_time=0.01,
-            valve_command=commands,
-        )
-        assert np.array_equal(batch["joint_angle.shoulder"][row], alone["joint_angle.shoulder"])

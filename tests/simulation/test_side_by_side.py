@@ -16,15 +16,6 @@ from tests.tables import rows_of
 
 SAMPLE = 0.005
 ROWS = 101
-#: Packaged rigs that run in lanes, without drives that only plants by themselves take.
-LANES = (
-    "shoulder",
-    "elbow",
-    "recruitment",
-    "regulated_joint",
-    "hanging_mass",
-    "throttled_supply",
-)
 
 
 def driven(rig: pamrs.Rig, rows: int = ROWS) -> dict[str, object]:
@@ -60,36 +51,6 @@ def test_every_packaged_rig_is_what_simulate_gives(name):
     for channel in channels:
         assert apart(many[channel][1], one[channel]) < 1e-14, channel
         np.testing.assert_array_equal(many[channel][0], many[channel][2])
-
-
-@pytest.mark.parametrize("name", LANES)
-def test_a_run_in_a_lane_is_the_run_by_the_equations_of_the_blocks(name):
-    rig = pamrs.rigs.named(name)
-    core = core_rig(rig)
-    wave = np.sin(8.0 * SAMPLE * np.arange(ROWS))
-    valves = list(rig.tables("valve").values())
-    signals = {
-        channel: valves[k]["null_voltage"] + 0.6 * valves[k]["half_range"] * wave
-        if k < len(valves)
-        else 4e5 + 1e5 * wave
-        for k, channel in enumerate(core.inputs)
-    }
-    found, seen = core.simulate(ROWS, signals, SAMPLE, 1e-3, {})
-    wanted, events = core.simulate(ROWS, signals, SAMPLE, 1e-3, {}, stepwise=True)
-    assert list(found) == list(wanted)
-    for channel, values in wanted.items():
-        assert apart(found[channel], values) < 2e-9, channel
-    assert [event[1:] for event in seen] == [event[1:] for event in events]
-    for one, other in zip(seen, events, strict=True):
-        assert one[0] == pytest.approx(other[0], abs=1e-7)
-
-
-def test_a_light_mass_hangs_in_lanes_as_by_itself():
-    rig = pamrs.rigs.hanging_mass().with_parameters({"load.mass": 2.0})
-    core, command = core_rig(rig), 5.0 + np.sin(8.0 * SAMPLE * np.arange(ROWS))
-    many = pamrs.simulate_batch(rig, command, sample_time=SAMPLE, n=3, record=["length"])
-    wanted, _ = core.simulate(ROWS, {core.inputs[0]: command}, SAMPLE, 1e-3, {}, stepwise=True)
-    assert apart(many["length"][0], wanted["length"]) < 2e-9
 
 
 def test_rigs_with_effects_run_too():
@@ -152,26 +113,6 @@ def test_each_plant_may_have_its_own_commands():
     for k in (0, 8):
         alone = pamrs.simulate(rig, commands[k], sample_time=SAMPLE)
         assert apart(run["joint_angle"][k], alone["joint_angle"][::4]) < 1e-9
-
-
-def test_a_plant_far_beyond_its_stops_is_still_the_one_that_simulate_gives():
-    """Further than the curves of the lanes go: such plants run again by themselves."""
-    soft = {"joint.stop_stiffness": 5.0, "joint.stop_damping": 0.0}
-    rig = pamrs.rigs.shoulder().with_parameters(soft)
-    payload = np.array([0.0, 20.0])
-    run = pamrs.simulate_batch(
-        rig,
-        np.full(401, 10.0),
-        sample_time=SAMPLE,
-        parameters={"arm.payload": payload},
-        record=["joint_angle"],
-        reduce={"far": ("max", "joint_angle")},
-    )
-    for k, mass in enumerate(payload):
-        alone = rig.with_parameters({"arm.payload": mass})
-        wanted = pamrs.simulate(alone, np.full(401, 10.0), sample_time=SAMPLE)["joint_angle"]
-        assert apart(run["joint_angle"][k], wanted) < 1e-8
-    assert np.degrees(run.reduced["far"][0]) > 150.0
 
 
 def test_a_plant_that_leaves_the_model_ends_as_it_would_alone():

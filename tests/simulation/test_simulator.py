@@ -32,15 +32,6 @@ def simulator(**changes: float) -> pamrs.Simulator:
     return pamrs.Simulator(rig(), sample_time=0.005, **changes)
 
 
-def test_steps_are_the_run() -> None:
-    whole = pamrs.simulate(rig(), COMMAND, sample_time=0.005)
-    one = simulator()
-    rows = [one.observe(), *(one.step(u) for u in COMMAND[:-1])]
-    for name in rows[0]:
-        np.testing.assert_array_equal([row[name] for row in rows], whole[name], err_msg=name)
-    assert one.time == pytest.approx(0.005 * (len(COMMAND) - 1))
-
-
 def test_a_restart_is_exact_to_the_last_bit() -> None:
     first = simulator()
     first.run(COMMAND[:150])
