@@ -118,42 +118,6 @@ def test_it_prints_and_writes_what_the_function_gives(capsys, table, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.json", "out.png"]
 
 
-def test_what_is_not_determinable_is_null(capsys, table, tmp_path):
-    text = table.read_text(encoding="utf-8").splitlines()
-    two = tmp_path / "two.csv"
-    two.write_text(
-        "\n".join([text[0], *(line for line in text[1:] if line.split(",")[1] in ("200", "400"))])
-        + "\n",
-        encoding="utf-8",
-    )
-    code, out, _ = run(capsys, two, *OPTIONS, "--json", tmp_path / "two.json")
-    assert code == 0
-    assert "its significance cannot be tested" in out
-    found = json.loads((tmp_path / "two.json").read_text(encoding="utf-8"))["fit"]
-    assert found["slope_pvalue"] is None
-    assert found["redchi"] is None
-    assert found["presliding"] is None
-
-
-def test_a_recording_of_a_bench_is_read(capsys, tmp_path):
-    measured = rows(300, 1.0)
-    path = tmp_path / "bench.csv"
-    columns = np.column_stack([0.1 * np.arange(len(measured)), measured[:, :3]])
-    np.savetxt(
-        path,
-        columns,
-        delimiter=",",
-        header="time [s],length [mm],pressure [kPa],force [N]",
-        comments="",
-        fmt="%.10g",
-    )
-    code, out, _ = run(capsys, path, *OPTIONS)
-    assert code == 0
-    assert printed(out, "c0")[0] == pytest.approx(C0, rel=0.03)
-    assert printed(out, "c1")[0] == pytest.approx(C1 * 1e6, rel=0.03)
-    assert "have no direction of motion: not used here" in out
-
-
 def test_the_muscle_may_be_named_or_given_in_full(capsys, table):
     alone = run(capsys, table, *OPTIONS)[1]
     assert run(capsys, table, "--muscle", "pam_a_1in")[1] == alone
@@ -212,32 +176,6 @@ def test_missing_files_and_folders_are_named(capsys, table):
     code, _, err = run(capsys, table, *OPTIONS, "--png", "no_folder/x.png")
     assert code == 2
     assert "folder no_folder does not exist" in err
-
-
-def test_isometric_loops_without_a_direction_are_fitted_and_drawn(capsys, tmp_path):
-    muscle = frictional()
-    t = np.arange(0.0, 120.0, 0.02)
-    p = 3.5e5 - 2.8e5 * np.cos(2 * np.pi * t / 20.0)
-    way = np.where(np.sin(2 * np.pi * t / 20.0) > 0.0, -1.0, 1.0)
-    e = np.repeat([0.05, 0.1, 0.15], len(t) // 3)
-    rng = np.random.default_rng(4)
-    force = muscle.force(p, e, direction=way) + 2.0 * rng.normal(size=len(t))
-    length = REST * (1.0 - e) * 1e3 + 0.02 * rng.normal(size=len(t))
-    table, picture, result = (tmp_path / name for name in ("iso.csv", "iso.png", "iso.json"))
-    np.savetxt(
-        table,
-        np.column_stack([t, length, p / 1e5, force]),
-        delimiter=",",
-        header="time [s],length [mm],muscle_pressure [bar],force [N]",
-        comments="",
-        fmt="%.8g",
-    )
-    code, out, err = run(capsys, table, *OPTIONS, "--png", picture, "--json", result)
-    assert code == 0, err
-    assert printed(out, "c0")[0] == pytest.approx(C0, rel=0.03)
-    assert "rising pressure counts as contracting" in out
-    assert json.loads(result.read_text(encoding="utf-8"))["fit"]["isometric"] is True
-    assert picture.read_bytes().startswith(b"\x89PNG")
 
 
 DESCRIBED = """schema = "pamrs.force_map/1"

@@ -81,13 +81,6 @@ def test_a_muscle_is_shown_with_the_origin_of_each_number(capsys, name):
     assert out.splitlines()[-1].startswith(f"{agree} agree")
 
 
-def test_friction_is_shown_per_megapascal(capsys):
-    assert line_of(run(capsys, "library", "ch2_075in")[1], "friction_pressure_slope")[1:3] == [
-        "-0.145",
-        "1/MPa",
-    ]
-
-
 @pytest.mark.parametrize("name", library.names())
 def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
     path = tmp_path / "out.toml"
@@ -153,12 +146,6 @@ def test_size_prints_and_writes_what_the_function_gives(capsys, tmp_path):
     assert document["best"] == expected.best
 
 
-def test_size_compares_the_whole_library_by_default(capsys):
-    code, out, _ = run(capsys, "size", *POINTS)
-    assert code == 0
-    assert out.splitlines()[3].split() == library.names()
-
-
 def test_the_valve_is_an_area_or_a_conductance(capsys):
     def fill_time(*options):
         code, out, _ = run(capsys, "size", *POINTS, "elbow_0625in", *options)
@@ -171,13 +158,6 @@ def test_the_valve_is_an_area_or_a_conductance(capsys):
     area = Filling.from_sonic_conductance(2e-8).area
     assert fill_time("--valve", "2 l/(s bar)") == pytest.approx(usual * 8.4e-6 / area, rel=1e-3)
     assert fill_time("--supply", "20 bar") < usual
-
-
-def test_positions_may_be_contractions(capsys):
-    length = library.elbow_0625in().parameters["rest_length"]
-    by_contraction = run(capsys, "size", "--point", "10 %:5 kN", "elbow_0625in")[1]
-    by_stroke = run(capsys, "size", "--point", f"{100 * length:.15g} mm:5 kN", "elbow_0625in")[1]
-    assert by_contraction.splitlines()[1:] == by_stroke.splitlines()[1:]
 
 
 def test_a_rig_file_is_a_candidate_at_a_pressure(capsys, tmp_path):
@@ -221,9 +201,3 @@ def test_wrong_words_to_size_write_nothing(capsys, tmp_path, monkeypatch, words,
     monkeypatch.chdir(tmp_path)
     assert_refused(capsys, ["size", *words, "--json", "size.json"], parts)
     assert list(Path().iterdir()) == []
-
-
-def test_size_needs_the_folder_of_its_output(capsys):
-    assert_refused(
-        capsys, ["size", *POINTS, "--json", "no_folder/x.json"], ["folder no_folder does not exist"]
-    )

@@ -16,7 +16,6 @@ from gymnasium.utils.env_checker import check_env  # noqa: E402
 from pamrs.control import RigController, RigModel, closed_loop  # noqa: E402
 from pamrs.control import gym as gym_module  # noqa: E402
 from pamrs.control.trajectories import lift_hold_return  # noqa: E402
-from tests.control.helpers import with_regulator  # noqa: E402
 
 #: A plant that leaves the range of its model within a sample.
 BREAKING = {"joint_angle": 0.5, "joint_rate": -500.0}
@@ -37,29 +36,6 @@ def test_the_space_has_physical_bounds():
     assert low[2] == pytest.approx(-101325.0)
     assert high[0] == pytest.approx(math.radians(120) + 0.2)
     assert env.action_space.shape == (1,)
-
-
-def test_a_step_is_the_simulators():
-    env = gym_module.ShoulderEnv(trajectory=SHORT, effort=0.5)
-    env.reset(seed=1)
-    simulator = pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.02)
-    last = 0.0
-    for k, opening in enumerate((0.4, 1.0, -0.5, 3.0)):
-        seen, reward, terminated, truncated, info = env.step(np.array([opening], dtype=np.float32))
-        opening = float(np.clip(np.float32(opening), -1.0, 1.0))
-        sample = simulator.step(5.0 + 5.0 * opening)
-        assert seen[:3] == pytest.approx(
-            [sample[n] for n in ("joint_angle", "joint_rate", "muscle_pressure")], rel=1e-6
-        )
-        wanted = SHORT(0.02 * (k + 1))
-        assert seen[3:] == pytest.approx([wanted.angle, wanted.rate, opening], rel=1e-6)
-        assert reward == pytest.approx(
-            -((wanted.angle - sample["joint_angle"]) ** 2) - 0.5 * (opening - last) ** 2
-        )
-        assert info["valve_command"] == pytest.approx(5.0 + 5.0 * opening)
-        assert not terminated
-        assert not truncated
-        last = opening
 
 
 def test_it_is_truncated_at_the_end_and_not_before():
@@ -218,26 +194,6 @@ def test_a_step_of_two_joints_is_the_simulators():
         assert info["error"] == pytest.approx(error)
         assert info["commands"] == pytest.approx(5.0 + 5.0 * action)
         last = action
-
-
-@pytest.mark.parametrize("name", ["shoulder", "throttled_supply"])
-def test_a_regulator_in_front_of_a_valve_is_no_action(name):
-    """In front of it, or behind a line and its volume: it holds what it begins with."""
-    rig = with_regulator(pamrs.rigs.named(name))
-    for env in (of(rig, SHORT), gym_module.RigVectorEnv(2, rig, SHORT)):
-        assert env.action_space.shape[-1] == 1
-        env.reset(seed=1)
-    env = of(rig, SHORT)
-    assert env.inputs == ("valve_command",)
-    env.reset()
-    simulator = pamrs.Simulator(rig, sample_time=0.02)
-    for _ in range(5):
-        seen, *_, info = env.step(np.ones(1, dtype=np.float32))
-        sample = simulator.step(10.0)
-        assert seen[0] == pytest.approx(sample["joint_angle"], rel=1e-6)
-        assert info["valve_command"] == 10.0
-    begins = rig.tables("supply")[""]["initial_pressure"]
-    assert sample["supply_pressure"] == pytest.approx(begins, rel=1e-3)
 
 
 def fed_by_a_chamber(pressure):

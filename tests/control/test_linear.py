@@ -11,7 +11,6 @@ import pamrs
 from pamrs.control._at_rest import resting, without_dry_friction
 from pamrs.control.linear import equilibrium, linearise
 from pamrs.effects import EFFECTS
-from pamrs.errors import ParameterError
 from pamrs.simulation import core_rig
 from tests.tables import rows_of
 
@@ -315,12 +314,6 @@ def test_the_core_counts_a_load_by_its_length():
     assert a[3, 2] == pytest.approx(-by_length / mass, rel=1e-2)
     assert b[0, 0] < 0.0 < b[1, 0]
     assert c.tolist() == np.eye(4).tolist()
-
-
-def test_the_core_names_a_side_that_it_does_not_know():
-    rig, given = settled("shoulder")
-    with pytest.raises(ParameterError, match='side = "left".*"fill"'):
-        core_rig(rig).linearise(equilibrium(rig, **given), "left")
 
 
 def test_a_lag_of_no_time_is_refused_by_the_core():

@@ -63,17 +63,6 @@ def test_it_follows_and_its_metrics_are_those_of_its_rows(rig):
     assert slower.lag > found.lag > 0.1
 
 
-def test_a_restarted_loop_is_the_whole_one(rig):
-    whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005)
-    simulator, controller = pamrs.Simulator(rig, sample_time=0.005), SmallPid()
-    first = closed_loop(simulator, controller, LIFT, 1.5)
-    other = SmallPid()
-    other.restore(controller.state)
-    second = closed_loop(simulator, other, LIFT, 1.5, start=1.5, reset=False)
-    assert (np.concatenate([first.angle, second.angle[1:]]) == whole.angle).all()
-    assert (np.concatenate([first.command[:-1], second.command]) == whole.command).all()
-
-
 def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):
     sensors = Sensors(noise={"joint_angle": 2e-3}, delay=0.02, seed=4)
     whole = closed_loop(rig, SmallPid(), LIFT, 3.0, sample_time=0.005, sensors=sensors)

@@ -13,7 +13,6 @@ from pamrs.control import (
     Cascade,
     CoContraction,
     Demand,
-    Feedforward,
     Parallel,
     PlanarArmModel,
     PressureLoop,
@@ -523,16 +522,6 @@ def test_an_iso_valve_follows_as_its_equivalent_area(kind):
     assert errors[1] < 1.15 * FOUND["shoulder", kind][0]
 
 
-def test_the_controllers_of_one_muscle_follow_with_an_iso_valve_too():
-    each = []
-    for rig in (pamrs.rigs.shoulder(), SAME_VALVE):
-        arm, air = ArmModel.from_rig(rig), AirModel(rig)
-        forward = Feedforward(arm, air, 20.0, period=PERIOD)
-        cascade = Cascade(Sliding(arm, period=PERIOD), PressureLoop(period=PERIOD))
-        each.append([rms(closed_loop(rig, one, LIFT, 10.0))[0][0] for one in (forward, cascade)])
-    assert each[1] == pytest.approx(each[0], rel=0.02)
-
-
 def test_a_free_exhaust_and_a_narrow_inlet_are_both_inverted():
     """What is left of the error is the lag of the pressure, that of kM and of no valve; a model
     with one area for both paths is off by what it does not know.
@@ -573,24 +562,6 @@ def test_muscles_that_are_left_out_stay_without_air():
     assert rms(run)[0][0] < 1.0
     c1, _ = model.arm.torque.at(1.0)
     assert 3.0 * c1 == pytest.approx(RigModel(rig).arm.torque.at(1.0)[0], rel=1e-12)
-
-
-def test_a_batch_of_pairs_runs_as_each_alone():
-    slopes = np.array([6.0, 9.0, 12.0])
-    rigs = [PAIR.with_parameters({"arm.payload": mass}) for mass in (0.3, 0.5, 0.7)]
-    together = sweep(
-        rigs,
-        RigController(PAIR_MODEL, law_of(PAIR_MODEL, slope=slopes), stiffness=20.0),
-        TURN,
-        3.0,
-        initial={"joint_angle.elbow": np.full(3, math.radians(30.0))},
-    )
-    for k, rig in enumerate(rigs):
-        law = law_of(PAIR_MODEL, slope=float(slopes[k]))
-        alone = closed_loop(
-            rig, RigController(PAIR_MODEL, law, stiffness=20.0), TURN, 3.0, initial=PAIR_START
-        )
-        assert together.final[k] == pytest.approx(alone.error[-1], abs=1e-6)
 
 
 # ---------------------------------------------------------------- refused

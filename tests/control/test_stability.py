@@ -48,65 +48,6 @@ def test_equilibrium_stands_still(rig):
     assert run["joint_torque"][0] == pytest.approx(weight, rel=1e-8)
 
 
-def test_the_linear_rig_has_the_equations_coefficients(rig):
-    model = linearise(rig, ANGLE)
-    assert model.states == ("muscle_pressure", "joint_angle", "joint_rate")
-    table, inertia = arm(rig)
-    p, th, w = range(3)
-    # friction: viscous, and Coulomb's slope at rest
-    assert model.a[w, w] == pytest.approx(
-        -(table["viscous"] + table["coulomb"] / table["coulomb_speed"]) / inertia, rel=1e-12
-    )
-    assert model.a[th] == pytest.approx([0.0, 0.0, 1.0], abs=0.0)
-    # torque over pressure and angle, from the channels of held states
-    point = equilibrium(rig, ANGLE)
-
-    def torque(**change):
-        moved = {name: value + change.get(name, 0.0) for name, value in point.items()}
-        return pamrs.Simulator(rig, sample_time=0.001, initial=moved).observe()["joint_torque"]
-
-    by_pressure = (torque(muscle_pressure=50.0) - torque(muscle_pressure=-50.0)) / 100.0
-    by_angle = (torque(joint_angle=1e-5) - torque(joint_angle=-1e-5)) / 2e-5
-    weight = (
-        (table["first_moment"] + table["payload"] * table["length"])
-        * table["gravity"]
-        * math.cos(ANGLE)
-    )
-    assert model.a[w, p] == pytest.approx(by_pressure / inertia, rel=1e-6)
-    assert model.a[w, th] == pytest.approx((by_angle - weight) / inertia, rel=1e-5)
-    # filling is faster than venting: the mass flow goes with the upstream pressure, both choked or
-    # nearly
-    fill, vent = (linearise(rig, ANGLE, side=side).b[p, 0] for side in ("fill", "vent"))
-    assert fill > 2 * vent > 0.0
-    assert model.b[p, 0] == pytest.approx(0.5 * (fill + vent), rel=1e-12)
-    gas, valve, chamber = (rig.tables(b)[""] for b in ("gas", "valve", "chamber"))
-    area = (
-        valve["discharge_area_max"] * 0.2 / (0.25 * valve["half_range"])
-    )  # the table's first slope
-    r, t = gas["gas_constant"], gas["temperature"]
-    choked = math.sqrt(1.4 / (r * t)) * (2 / 2.4) ** (2.4 / 0.8)
-    flow = area * choked * (13.8e5 + 101325.0)
-    volume = model.point["air_volume"]
-    assert fill == pytest.approx(chamber["alpha_in"] * r * t * flow / volume, rel=1e-4)
-    driven = model.driven_by("muscle_pressure")
-    assert driven.b[:, 0] == pytest.approx([0.0, model.a[w, p]], abs=1e-9)
-    assert np.linalg.eigvals(driven.a).real.max() < 0.0
-
-
-def test_the_linear_rig_moves_as_the_core_does(rig):
-    model = linearise(rig, ANGLE, side="fill")
-    time = np.arange(301) * 1e-3
-    command = 5.0 + 2e-3 * np.sin(30.0 * time) ** 2
-    run = pamrs.simulate(rig, command, sample_time=1e-3, initial=equilibrium(rig, ANGLE))
-    phi, gamma = model.sampled(1e-3)
-    x = np.zeros((301, 3))
-    for k in range(300):
-        x[k + 1] = phi @ x[k] + gamma[:, 0] * (command[k] - 5.0)
-    for k, name in enumerate(model.states):
-        moved = run[name] - run[name][0]
-        assert moved == pytest.approx(x[:, k], abs=2e-3 * np.abs(x[:, k]).max()), name
-
-
 def test_python_control_gets_the_names(rig):
     control = pytest.importorskip("control")
     system = linearise(rig, ANGLE).system()

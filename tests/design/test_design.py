@@ -17,14 +17,13 @@ from pamrs.design import (
     Genetic,
     JointDesign,
     JointProblem,
-    compare_methods,
     least_pressure,
     minimum_pressure,
     optimise,
     pareto_front,
     search,
 )
-from pamrs.design._genetic import child, decode, redraw_one
+from pamrs.design._genetic import redraw_one
 from pamrs.design._problem import _areas
 from reproduction.joints import CASES, facts_of_geometry
 from tests.tables import rows_of
@@ -253,21 +252,6 @@ def test_impossible_designs_are_named(designs):
 # ---------------------------------------------------------------------- searches
 
 
-def test_a_child_is_the_head_of_one_parent_and_the_tail_of_the_other():
-    first, second = [0] * 24, [1] * 24
-    random.seed(3)
-    cuts, starts = set(), set()
-    for _ in range(400):
-        genes = list(child(first, second))
-        changes = [index for index in range(1, 24) if genes[index] != genes[index - 1]]
-        assert len(changes) == 1
-        cuts.add(changes[0])
-        starts.add(genes[0])
-    assert cuts == set(range(1, 24))
-    assert starts == {0, 1}
-    assert (first, second) == ([0] * 24, [1] * 24)
-
-
 def test_mutation_changes_one_variable_only():
     random.seed(4)
     changed = 0
@@ -278,10 +262,6 @@ def test_mutation_changes_one_variable_only():
         changed += bool(touched)
     assert 70 <= changed <= 130
     assert redraw_one([0] * 48, 12, 0.0) == [0] * 48
-
-
-def test_genes_are_binary_numbers():
-    assert decode([0, 0, 0, 1, 1, 1, 1, 0, 0], 3) == pytest.approx([0.0, 1.0, 4.0 / 7.0])
 
 
 def test_the_published_numbers_of_designs():
@@ -405,20 +385,6 @@ def test_impossible_settings_are_named(options):
         Genetic(**options)
 
 
-def test_a_joint_with_one_free_length_is_found_by_every_method():
-    fixed = {name: (value, value) for name, value in zip(LENGTHS, GOOD, strict=True)}
-    task = problem(torque=900.0, points=36, bounds={**fixed, "lower_axial": (0.015, 0.045)})
-    grid = np.array(
-        [[GOOD[0], GOOD[1], value, GOOD[3]] for value in np.linspace(0.015, 0.045, 3001)]
-    )
-    fitness = task.evaluate(grid).fitness
-    best = grid[int(np.argmin(fitness)), 2]
-    for method, within in (("ga", 5e-4), ("de", 2e-5), ("cma", 2e-5)):
-        found = optimise(task, method, evaluations=600, seed=2)
-        assert found.lengths[[0, 1, 3]] == pytest.approx([GOOD[0], GOOD[1], GOOD[3]])
-        assert found.lengths[2] == pytest.approx(best, abs=within)
-
-
 def test_a_long_tendon_on_a_constant_force_is_a_pulley():
     # muscle ends far away, force nearly constant over a short range: torque = F (arm), arm is about
     # the lower link's lever
@@ -436,20 +402,6 @@ def test_a_long_tendon_on_a_constant_force_is_a_pulley():
     lever = task.torque / (6.0 * float(task.muscle.force(task.pressure, 0.0)))
     assert found.lengths[2] == pytest.approx(lever, rel=0.03)
     assert found.met(2e-3)
-
-
-def test_methods_are_compared_at_equal_evaluations():
-    table = compare_methods(problem(points=22), seeds=range(3), evaluations=200)
-    assert table.methods == METHODS
-    assert np.all(table.evaluations == 200)
-    for row, values in zip(table.rows(), table.fitness, strict=True):
-        assert row["median"] == np.median(values)
-        assert row["best"] == values.min()
-        assert row["worst"] == values.max()
-        assert row["runs"] == 3
-    assert all(name in table.table() for name in METHODS)
-    with pytest.raises(ParameterError, match="seeds"):
-        compare_methods(problem(), seeds=())
 
 
 # ---------------------------------------------------------------- pressure, size

@@ -8,22 +8,18 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import pytest
 
 import pamrs
 from pamrs import cli
-from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import known_parameters, with_effects_of, with_known, without_passing
 from pamrs.diagnosis.fit._held import _HELD_SHARE
-from pamrs.diagnosis.result import schema
 from tests.diagnosis import again
 
 SHOULDER = pamrs.rigs.shoulder()
 LEAKING = SHOULDER.with_effect("leak_muscle", {"conductance": 1e-9}, std={"conductance": 1e-11})
 BOTH = LEAKING.with_effect("muscle_hysteresis")
-FIT = DiagnosisSettings()
 
 
 @pytest.fixture(scope="module")
@@ -60,24 +56,6 @@ def test_what_is_missing_beside_a_held_effect_is_named(found) -> None:
     assert isinstance(found.rig, pamrs.Rig)
     assert [entry["id"] for entry in found.rig.effects] == ["leak_muscle", "muscle_hysteresis"]
     assert found.rig.effect_std["leak_muscle"]["conductance"] == pytest.approx(fitted.std)
-
-
-def test_a_diagnosis_has_the_keys_of_schema_2(found) -> None:
-    content = json.loads(found.to_json())
-    jsonschema.validate(content, schema())
-    assert content["schema"] == "pamrs.diagnosis/2"
-    (named,) = [t for t in content["budget"] if t["kind"] == "effect"]
-    assert (named["id"], named["at"]) == ("muscle_hysteresis", "")
-    told = found.effects[0].parameters["friction_constant"].value
-    assert named["parameters"]["friction_constant"]["value"] == told
-    (run,) = content["free_run"]
-    assert run["recording"] == "again"
-    angle = run["channels"]["joint_angle"]
-    assert angle["after"] < 0.5 * angle["before"]
-    assert content["settings"] == found.settings.to_dict() == {}
-    assert content["version"] == pamrs.__version__
-    for kept in content["unexplained"]:
-        assert kept["share"] is None or kept["interval"][0] <= kept["share"] <= kept["interval"][1]
 
 
 @pytest.mark.slow

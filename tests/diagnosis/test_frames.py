@@ -174,25 +174,6 @@ def test_every_experiment_is_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path:
         )
 
 
-def test_the_file_is_played_from_the_command_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (experiment,) = library(BENCH, OWN, only={"slow_strokes"})
-    protocol = protocol_of(experiment)
-    assert protocol is not None
-    file, out = tmp_path / "next.csv", tmp_path / "out.csv"
-    file.write_text(protocol.to_csv(), encoding="utf-8")
-    assert file.read_text(encoding="utf-8").startswith("time [s],pressure_command [Pa],length [m]")
-    assert cli.main(["simulate", "bench", "--input", str(file), "--output", str(out)]) == 0
-    header, *rows = out.read_text(encoding="utf-8").splitlines()
-    column = [name.partition(" ")[0] for name in header.split(",")].index("muscle_force")
-    force = np.array([float(row.split(",")[column]) for row in rows])
-    # no friction is modelled: the loop is closed, and longer muscles pull more
-    length = protocol.commands["length"]
-    assert force[np.argmax(length)] > force[np.argmin(length)]
-    assert "rms difference" not in capsys.readouterr().out  # nothing was measured
-
-
 def test_a_shut_valve_keeps_the_air_while_the_length_moves() -> None:
     (experiment,) = library(VALVED, OWN, sample_time=0.01, only={"sealed_strokes"})
     run = experiment.simulate(VALVED)

@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import (
@@ -35,9 +34,9 @@ from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import term_of
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.experiments import Experiment, library
-from pamrs.recordings import Recording, load_recording
+from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
-from pamrs.simulation import core_rig, replay
+from pamrs.simulation import core_rig
 from tests.diagnosis import again, test_places
 
 SETTINGS = DiagnosisSettings()
@@ -128,44 +127,6 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
     # the bound that is stated is one
     assert float(np.mean(bits)) > outcome.bits - 0.02
     assert outcome.bits == pytest.approx(proposed.expected_information_bits, abs=1e-3)
-
-
-@pytest.mark.parametrize("rig", [SHOULDER, REGULATED], ids=["valve", "regulator"])
-def test_the_commands_are_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path, capsys) -> None:
-    effects = ("muscle_hysteresis", "muscle_creep")
-    hypotheses = [(name, rig.with_effect(name), 0.5) for name in effects]
-    pool = library(rig, OWN, sample_time=0.01, highest=4e5, only={"staircase"})
-    found = propose(rig, hypotheses, experiments=pool)
-    assert found.protocol is not None
-    assert found.curves is not None
-    file = tmp_path / "next.csv"
-    file.write_text(found.protocol.to_csv(), encoding="utf-8")
-    assert file.read_text(encoding="utf-8").startswith(f"time [s],{pool[0].channel} [")
-    played = replay(hypotheses[0][1], load_recording(file))
-    assert np.allclose(played["joint_angle"], found.curves.predicted[effects[0]], atol=1e-6)
-    model, out = rig.to_toml(tmp_path / "rig.toml"), tmp_path / "out.csv"
-    words = ["simulate", str(model), "--input", str(file), "--output", str(out)]
-    assert cli.main(words) == 0, capsys.readouterr().err
-    assert len(out.read_text(encoding="utf-8").splitlines()) == pool[0].rows + 1
-
-
-def test_experiments_stay_inside_what_the_stand_allows(tmp_path) -> None:
-    rig = limited(SHOULDER, 'max_pressure = { value = 2.6, unit = "bar" }', tmp_path)
-    assert rig.limits == {"max_pressure": pytest.approx(2.6e5)}
-    valve = rig.model["valve"]
-    pool = library(rig, OWN, sample_time=0.01)
-    assert len(pool) > 6
-    for experiment in pool:
-        run = experiment.simulate(rig)
-        assert run["muscle_pressure"].max() <= 2.6e5
-        assert run["supply_pressure"].max() <= 1.02 * rig.model["supply"]["initial_pressure"]
-        assert experiment.command is not None
-        reach = np.abs(experiment.command - valve["null_voltage"]).max()
-        assert reach <= valve["half_range"] + 1e-9
-    # the supply cannot be turned up
-    weak = SHOULDER.with_parameters({"supply.initial_pressure": 3e5})
-    made = library(weak, OWN, sample_time=0.01, only={"holds_both_sides"})
-    assert all(e.initial["supply_pressure"] <= 3e5 for e in made)
 
 
 def test_a_regulator_is_set_no_higher_than_is_known_to_be_allowed(tmp_path) -> None:

@@ -188,14 +188,6 @@ def test_a_copy_is_left_out_of_the_proof_and_said() -> None:
     assert without_copies([one, two]) == ([one, two], [])
 
 
-def test_one_that_is_listed_twice_is_kept_once() -> None:
-    one, two = run(), run("steps", seed=2)
-    kept, said = without_copies([one, two, one])
-    assert [r.name for r in kept] == [one.name, two.name]
-    assert len(said) == 1
-    assert "it says nothing more and was left out" in said[0]
-
-
 def joined(name: str, *parts: Recording, role: str = "held_out") -> Recording:
     """Recordings one after the other."""
     names = parts[0].channels

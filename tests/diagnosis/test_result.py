@@ -21,7 +21,6 @@ from pamrs.findings import (
     FreeRunError,
     NextExperiment,
     PairExperiment,
-    Where,
 )
 from pamrs.report import render_html
 from pamrs.report import text as words
@@ -54,32 +53,6 @@ def test_schema_is_closed() -> None:
 def test_the_committed_schema_is_made_from_the_types() -> None:
     assert is_current(), "python -m pamrs.diagnosis.schema writes it"
     assert json.loads(FILE.read_text(encoding="utf-8")) == schema()
-
-
-def test_entries_have_attributes_and_keys() -> None:
-    found = synthetic.diagnosis()
-    effect = found.effects[0]
-    assert effect.id == effect["id"] == effect.get("id") == "heat_transfer"
-    assert found.where["text"] == found.where.text
-    assert list(found.fit) == ["channels", "held_out", "gap_closed"]
-    # a key that has no value is absent, as in JSON
-    chosen = EffectParameterFound(1.0, None, "1")
-    assert dict(chosen) == {"value": 1.0, "std": None, "unit": "1"} == chosen
-    assert chosen.get("identifiable", True)
-    assert "interval" not in chosen
-    with pytest.raises(KeyError):
-        _ = chosen["interval"]
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        chosen.value = 2.0  # type: ignore[misc]
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        found.verdict = "none"  # type: ignore[misc]
-    assert Where() == {
-        "block": None,
-        "channel": None,
-        "intervals": [],
-        "conditions": [],
-        "text": "",
-    }
 
 
 def test_not_finite_becomes_null() -> None:
@@ -167,17 +140,6 @@ def test_summary_says_how_the_whole_rig_runs_and_what_is_only_closest() -> None:
     assert "Whole rig from its commands alone, random: joint_angle 5.73 to 0.573 deg" in summary
     assert "not named, but closest: heat transfer" in summary
     assert summary.isascii()
-
-
-def test_headlines() -> None:
-    assert "chamber" in synthetic.diagnosis().headline
-    assert synthetic.nothing().headline.startswith("Nothing is missing")
-    assert (
-        "discharge area" in synthetic.diagnosis(verdict="parameters", effects=[], where={}).headline
-    )
-    assert "outside the catalogue" in synthetic.diagnosis(verdict="unlisted", effects=[]).headline
-    rivals = synthetic.diagnosis(ambiguity=[["leak_muscle"], ["leak_muscle", "heat_transfer"]])
-    assert "tell muscle leak (0.02) from muscle leak + heat transfer (0.01)" in rivals.headline
 
 
 ARM = {"blocks": ["arm"], "ambiguity": [], "wrong_parameters": [], "effects": []}
@@ -307,14 +269,6 @@ def test_bad_input_is_refused() -> None:
         Diagnosis("case", "maybe")
     with pytest.raises(ValueError, match="before"):
         Trace("r", "fit", "force", "N", np.arange(3.0), np.arange(3.0), np.arange(4.0))
-
-
-def test_trace_fills_residuals() -> None:
-    t = Trace("r", "fit", "force", "N", np.arange(3.0), np.ones(3), np.zeros(3))
-    assert t.residual_before is not None
-    assert np.array_equal(t.residual_before, np.ones(3))
-    assert t.after is not None
-    assert np.all(np.isnan(t.after))
 
 
 @pytest.mark.parametrize(

@@ -88,17 +88,6 @@ def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None
     assert case_ambiguity(judged) == []
 
 
-def test_a_second_effect_in_another_block_lowers_nothing() -> None:
-    gas = {"leak_muscle": 0.92, "heat_transfer": 0.05, "unlisted": 0.03}
-    judged, _ = said(
-        group("chamber", gas), group("arm", {"muscle_hysteresis": 0.92, "unlisted": 0.08})
-    )
-    assert judged[0].probabilities["leak_muscle"] == pytest.approx(0.92)
-    # each is settled, although the two together are less so
-    assert case_ambiguity(judged) == []
-    assert {n for j in judged for n in j.named} == {"leak_muscle", "muscle_hysteresis"}
-
-
 def test_an_effect_of_two_groups_is_judged_once() -> None:
     gas = {"pressure_lag": 0.5, "input_path_lag": 0.45, "unlisted": 0.05}
     judged, _ = said(group("chamber", gas), group("arm", {"pressure_lag": 0.9, "unlisted": 0.1}))

@@ -70,13 +70,6 @@ def test_exact_loops_give_the_coefficients_back():
     assert np.allclose(force, muscle().force(pressure, contraction), rtol=1e-3, atol=0.5)
 
 
-def test_it_shows_itself_in_one_line():
-    assert (
-        repr(fit_friction(**loops()))
-        == "FrictionFit(c_F = max(0.16 - 0.145/MPa P, 0.01), 6 levels)"
-    )
-
-
 def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
     given = loops(levels=np.append(1e3, LEVELS), noise=3.0)
     slack = given["pressure"] < 2e3

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import cli, load_rig, rigs
+from pamrs import cli, load_rig
 from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
@@ -133,14 +133,6 @@ def test_page_compares_models(data, muscle, fit):
 def test_every_kind_of_fit_has_a_page(data, muscle, options):
     page = pages.render_html(fit_muscle(data, muscle, **options))
     assert page.count("<svg") == (3 if options.get("model") == "gaylord" else 4)
-
-
-def test_one_pressure_alone_has_a_page(data, muscle):
-    one = fit_muscle(data, muscle, moduli="per_level", levels=[3])
-    words = words_of(pages.render_html(one))
-    assert (
-        "Leaving one pressure out is not possible: two pressure levels at least are needed" in words
-    )
 
 
 def test_text_from_files_is_escaped(muscle):
@@ -293,20 +285,6 @@ def test_command_predicts_left_out_pressures_and_compares(capsys, table):
         assert model in out
 
 
-def test_command_takes_the_muscle_of_a_rig(capsys, table, tmp_path):
-    rig = tmp_path / "bench.toml"
-    assert run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--rig", rig)[0] == 0
-    code, out, _ = run(capsys, table, "--muscle", rig)
-    assert code == 0
-    assert "kothera, order 2" in out
-
-
-def test_command_per_level(capsys, table):
-    code, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--per-level")
-    assert code == 0
-    assert "free at each level" in out
-
-
 def write(path, data):
     """A table of a map."""
     columns = [
@@ -414,43 +392,6 @@ def test_friction_that_cannot_be_fitted_is_said_or_refused(capsys, loops, tmp_pa
     assert "--friction" in err
 
 
-def test_loops_without_friction_get_none(capsys, muscle, tmp_path):
-    e, p, d = (
-        grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 8), LEVELS, [-1.0, 1.0])
-    )
-    force = muscle.force(p, e) + 1e-3 * np.random.default_rng(2).normal(size=e.size)
-    path = write(
-        tmp_path / "still.csv",
-        ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d),
-    )
-    code, out, _ = run(capsys, path, *SIZES, "--model", "kothera", "--order", 2)
-    assert code == 0
-    assert "friction: none, no pressure's c_F is above 0.01" in out
-
-
-def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):
-    shoulder = rigs.shoulder()
-    source = shoulder.to_toml(tmp_path / "shoulder.toml")
-    real = shoulder.muscle
-    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), LEVELS))
-    stiffer = real.replace(
-        modulus_offset=[1.1 * value for value in real.parameters["modulus_offset"]]
-    )
-    path = write(
-        tmp_path / "map.csv",
-        ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276),
-    )
-    code, _, err = run(capsys, path, "--muscle", source, "--rig", tmp_path / "fitted.toml")
-    assert code == 0
-    assert "cannot be simulated" not in err
-    fitted = load_rig(tmp_path / "fitted.toml")
-    assert fitted.blocks == shoulder.blocks
-    for block in ("joint", "arm"):
-        assert fitted.model[block] == pytest.approx(shoulder.model[block])
-    assert fitted.model["muscle"]["count"] == 6
-    np.testing.assert_allclose(fitted.muscle.force(p, e), stiffer.force(p, e), rtol=1e-6, atol=1e-3)
-
-
 def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
     options = ["--model", "kothera", "--order", 2]
     note = "tolerance of braid_angle is not used: not free (--free braid_angle)"
@@ -461,18 +402,6 @@ def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
     assert "is not used" not in out
     assert load_rig(rig).parameter("muscle.braid_angle").tol > 0.0
     assert note in run(capsys, table, "--muscle", rig)[1]
-
-
-def test_what_cannot_be_left_out_is_said_once(capsys, table):
-    _, out, _ = run(
-        capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--levels", "100kPa,600kPa"
-    )
-    assert (
-        "leave one pressure out: not possible, without 100 kPa the other levels do not "
-        "determine the fit"
-    ) in out
-    assert out.count("leave one pressure out") == 1
-    assert "leave-one-pressure-out" not in out
 
 
 def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
@@ -512,30 +441,6 @@ def test_wrong_input_is_one_line(capsys, table, tmp_path, words, parts):
     assert "Traceback" not in err
     for part in parts:
         assert part in line
-
-
-def test_nothing_is_written_when_the_fit_fails(capsys, table, tmp_path):
-    assert (
-        run(
-            capsys,
-            table,
-            *SIZES,
-            "--order",
-            2,
-            "--levels",
-            "100kPa",
-            "--report",
-            tmp_path / "x.html",
-        )[0]
-        == 2
-    )
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_table_is_named(capsys):
-    code, _, err = run(capsys, "no_such.csv", *SIZES)
-    assert code == 2
-    assert "no_such.csv: cannot be read" in err
 
 
 def test_a_description_needs_no_geometry(capsys, table):
