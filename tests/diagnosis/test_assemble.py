@@ -53,6 +53,7 @@ def recorded(
     return whole(name, role, 0.005, channels)
 
 
+@pytest.mark.slow
 def test_an_effect_of_two_blocks_is_named_once() -> None:
     rig = pamrs.rigs.shoulder()
     late = rig.with_effect("pressure_lag", {"time_constant": 0.02})

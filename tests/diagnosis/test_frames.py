@@ -26,7 +26,7 @@ from pamrs.experiments._maker import _FILLING_TIME
 from pamrs.recordings import load_recording
 from pamrs.simulation import reading, replay
 from tests.diagnosis import frames
-from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, RIGS, VALVED
+from tests.diagnosis.frames import BENCH, PAIR, REGULATED, REST, VALVED
 
 OWN = DiagnosisSettings()
 HOME = Path(__file__).parents[2]
@@ -35,6 +35,11 @@ OPEN = {
     "muscle_creep": {"stiffness": 300.0},
 }
 """Effects that small strokes at one speed do not tell apart."""
+FRAMES = pytest.mark.parametrize(
+    "rig",
+    [BENCH, PAIR, *(pytest.param(rig, marks=pytest.mark.slow) for rig in (VALVED, REGULATED))],
+    ids=lambda rig: rig.name,
+)
 
 
 def after(effect: str, *moved: np.ndarray) -> pamrs.Diagnosis:
@@ -49,9 +54,8 @@ def strokes() -> Callable[[str], pamrs.Diagnosis]:
     return cache(lambda e: pamrs.diagnose(frames.case(BENCH.with_effect(e, OPEN[e]))))
 
 
-@pytest.mark.parametrize(
-    "effect", ["muscle_hysteresis", pytest.param("muscle_creep", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("effect", OPEN)
 def test_what_small_strokes_leave_open_is_settled_by_what_is_proposed(effect, strokes) -> None:
     first = strokes(effect)
     names = {name for names in first.ambiguity for name in names}
@@ -83,7 +87,7 @@ def test_small_strokes_once_more_settle_nothing(effect, strokes) -> None:
     assert repeated.probabilities[effect] < 0.65
 
 
-@pytest.mark.parametrize("rig", RIGS, ids=lambda rig: rig.name)
+@FRAMES
 def test_experiments_keep_to_what_a_frame_can_do(rig: pamrs.Rig) -> None:
     pool = {e.name: e for e in library(rig, OWN, sample_time=0.01)}
     assert {"slow_strokes", "strokes_at_speeds", "nested_strokes", "length_steps"} <= set(pool)
@@ -154,11 +158,7 @@ def test_a_stand_that_cannot_move_gets_no_strokes() -> None:
     assert all(np.ptp(e.commands["length"]) == 0.0 for e in found)
 
 
-@pytest.mark.parametrize(
-    "rig",
-    [BENCH, PAIR, *(pytest.param(rig, marks=pytest.mark.slow) for rig in (VALVED, REGULATED))],
-    ids=lambda rig: rig.name,
-)
+@FRAMES
 def test_every_experiment_is_a_file_that_the_rig_plays(rig: pamrs.Rig, tmp_path: Path) -> None:
     file = tmp_path / "next.csv"
     for experiment in library(rig, OWN, sample_time=0.01):

@@ -126,6 +126,7 @@ def test_a_tube_that_was_at_rest_loses_nothing(
     assert kept.unsettled == {}
 
 
+@pytest.mark.slow
 def test_a_diagnosis_of_what_begins_in_a_flow_finds_nothing() -> None:
     recordings = [
         opened(RIG, role, seed, pressure, 0.1, 3.0)

@@ -82,20 +82,19 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
     jsonschema.validate(json.loads(found.to_json()), schema())
 
 
+FAILING = {
+    _hypotheses: ("freed", "inclusion", "beside_wrong", "considered"),
+    _conclude: ("budget", "free_run"),
+    pamrs.diagnosis: ("next_to_record",),
+    _assemble: ("describe",),
+}
+"""Steps by their module."""
+
+
 @pytest.mark.usefixtures("lenient")
-@pytest.mark.parametrize(
-    ("module", "names"),
-    [
-        (_hypotheses, ("freed", "inclusion", "beside_wrong", "considered")),
-        (_conclude, ("budget", "free_run")),
-        (pamrs.diagnosis, ("next_to_record",)),
-        (_assemble, ("describe",)),
-    ],
-)
-def test_steps_that_fail_cost_themselves(
-    module: Any, names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    for name in names:
+def test_steps_that_fail_cost_themselves(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    names = [(module, name) for module, own in FAILING.items() for name in own]
+    for module, name in names:
         monkeypatch.setattr(module, name, broken)
     found = pamrs.diagnose(leaking())
     assert found.effects[0].id == "leak_muscle"

@@ -138,6 +138,7 @@ def test_a_line_at_the_regulator_does_not_tell_what_is_drawn() -> None:
     assert pamrs.diagnose(pamrs.Case("case", rig, recordings, Path())).verdict == "none"
 
 
+@pytest.mark.slow
 def test_a_leak_of_the_bottle_is_named() -> None:
     found = diagnosed(leaking(3e-11))
     assert found.verdict == "effects"

@@ -109,6 +109,7 @@ def test_sensitivities_of_the_inlet_are_those_of_differences() -> None:
         np.testing.assert_allclose(slope[:, 0], wanted, atol=2e-2 * size)
 
 
+@pytest.mark.slow
 def test_a_small_leak_behind_the_line_is_named() -> None:
     """From one gauge to the other it is some pascals: only what it adds up to tells it."""
     true = RIG.with_effect("leak_muscle")

@@ -13,7 +13,7 @@ from trial.bench import Bench
 from trial.cases import _truths, make
 from trial.concealed import store
 from trial.design import PAIRS, ROUND, Spec, possible, specs
-from trial.effects import TYPES, Effects, Setting, draw
+from trial.effects import Effects, Setting, draw
 from trial.effects.chamber import Leak
 from trial.effects.sensors import PressureLag
 from trial.effects.valve import InputLag
@@ -23,14 +23,14 @@ from trial.inserted import truth_of
 from trial.labs import Lab, noise_of, table
 from trial.marks import covered, mark
 from trial.pair.bench import PairBench
-from trial.pair.course import FIT, FREE, HELD, PairDriver, pair_course
+from trial.pair.course import FIT, FREE, HELD, PairDriver
 from trial.pair.places import BOTH, PLACES, SIDES, Placed, has_place
 from trial.pair.plant import PairPlant, pair_parameters
 from trial.pair.recording import CHANNELS, PairPath
 from trial.plant import Plant
 from trial.pooled import page, pooled
 from trial.rig_kinds import PAIR, RIGS, nominal, nominal_pair, stated
-from trial.selfcheck import against_fine, against_lsoda
+from trial.selfcheck import against_lsoda
 from trial.tables import markdown, scores, to_json
 
 MODEL, TOLERANCE = stated(PAIR)
@@ -82,18 +82,6 @@ def test_every_course_is_that_of_the_package(name, tmp_path):
     assert errors["joint_angle.elbow"] < 5.0e-5
 
 
-def test_courses_excite_both_sides():
-    rng = np.random.default_rng(2)
-    co = pair_course(RIG, "co_contraction", 30.0, 0.01, rng)
-    assert np.ptp(co.level) > 1.0e5
-    holds = [pair_course(RIG, "sealed_holds", 36.0, 0.01, rng).sealed for _ in range(4)]
-    alone = np.concatenate(holds)
-    assert (alone[:, 0] & alone[:, 1]).any()
-    assert (alone[:, 0] ^ alone[:, 1]).any()
-    dither = pair_course(RIG, "multisine", 10.0, 0.01, rng).dither
-    assert abs(np.corrcoef(dither.T)[0, 1]) < 0.5
-
-
 def test_the_driver_holds_a_reference_at_a_level():
     plant = nominal_pair()
     pressures = plant.holding(1.0, 2.0e5)
@@ -108,13 +96,6 @@ def test_the_driver_holds_a_reference_at_a_level():
     driver.reset()
     off = np.degrees(course.reference - record.clean[:, 3])[600:]
     assert np.sqrt((off**2).mean()) < 8.0
-
-
-def test_rest_is_an_equilibrium():
-    plant = nominal_pair()
-    y = plant.rest(8.0e5)
-    assert y[:2] == pytest.approx([p + PAR.ambient for p in PAR.initial])
-    assert plant.derivative(y, (0.0, 0.0)) == pytest.approx([0.0] * 5 + [1.0], abs=1.0e-6)
 
 
 def test_two_equal_sides_mirror_each_other():
@@ -186,32 +167,6 @@ def test_a_late_gauge_reads_its_own_side():
     flexor, extensor, _, _ = plant.reading(y)
     assert flexor == pytest.approx(y[0] - PAR.ambient)
     assert extensor < y[1] - PAR.ambient - 1.0e3
-
-
-def test_integrator_is_accurate():
-    assert against_fine(nominal_pair(), 3.0) < 1.0e-7
-    rng = np.random.default_rng(3)
-    names = {"heat_transfer": "flexor", "muscle_hysteresis": BOTH, "payload_swing": ""}
-    effects = [Placed(draw(name, 1.0, rng), at) for name, at in names.items()]
-    effects.append(Placed(draw("compressor_cut_in", 1.0, rng)))
-    assert against_lsoda(PairPlant(PAR, effects), 1.0) < 1.0e-5
-
-
-@pytest.fixture(scope="module")
-def short():
-    """A bench, and what it records without an effect."""
-    bench = bench_of(spec_of("multisine", duration=1.5))
-    return bench, bench.run(())[0]
-
-
-@pytest.mark.parametrize("name", TYPES)
-def test_effect_of_no_size_changes_nothing(name, short):
-    at = BOTH if has_place(name, TYPES[name].block) else ""
-    effect = Placed(draw(name, 1.0, np.random.default_rng(5), Setting(1, 6.0)), at)
-    assert PairPlant(PAR, (effect.scaled(0.0),)).size == 6
-    bench, plain = short
-    little = bench.run((effect.scaled(1.0e-6),))[0]
-    assert np.abs((little.clean - plain.clean) / bench.floor).max() < 0.1
 
 
 # ---------------------------------------------------------------- families of later plans
@@ -341,14 +296,6 @@ def test_truths_at_both_sides_are_those_that_are_alike():
     assert told["flexor"]["stiffness"] == drawn.stiffness / 2.0
     assert told["extensor"]["stiffness"] == drawn.stiffness
     assert told[BOTH] == {"time_constant": drawn.time_constant[0]}
-
-
-@pytest.mark.parametrize("missing", ["supply_pressure", "command"])
-def test_channels_that_nobody_logged(missing):
-    spec = spec_of("multisine", duration=1.0, lab=Lab(100, 12, missing=missing))
-    head = make(spec).files["multisine.csv"].splitlines()[0]
-    assert missing not in head
-    assert "muscle_pressure.flexor [bar]" in head
 
 
 def test_wrong_parameters_of_named_blocks():

@@ -11,11 +11,11 @@ import pytest
 from pamrs.effects import CATALOGUE
 from trial.__main__ import main
 from trial.concealed import Spec, generate, make_case
-from trial.effects import LISTED, TYPES, UNLISTED, Effects, Setting, Start, draw
+from trial.effects import LISTED, TYPES, UNLISTED, Effects, Setting, draw
 from trial.effects.arm import PayloadSwing
 from trial.excitation import Excitation
 from trial.plant import Plant
-from trial.recording import ANGLE_STEP, CommandPath, Noise, follow, prepare, reach, run
+from trial.recording import ANGLE_STEP, Noise, follow, prepare, reach, run
 from trial.rigfile import default_rig, read_rig, to_parameters
 from trial.selfcheck import against_fine, against_lsoda
 
@@ -180,23 +180,6 @@ def test_pressure_at_the_manifold_leads_the_muscle():
     assert venting < shut - 1.0e3
     # the hose makes the flow smaller
     assert abs(plant.derivative(y, -0.5)[0]) < abs(BARE.derivative(y, -0.5)[0])
-
-
-def test_delay_shifts_the_command():
-    lag = replace(effect_of("input_path_lag"), pure=0.0125, lag=0.0)
-    path = CommandPath(Plant(PAR, Effects(lag)))
-    sent = [path.spans(5.0 + (0.5 if i == 0 else 0.0), 0.005 * i) for i in range(5)]
-    opened = [(i, x, span) for i, spans in enumerate(sent) for x, span in spans if abs(x) > 0.05]
-    assert opened[0][0] == 2
-    assert opened[0][2] == pytest.approx(0.0025)
-    assert sum(span for _, _, span in opened) == pytest.approx(0.005)
-
-
-def test_memory_starts_where_the_arm_is():
-    at = Start(1.0e5, 14.0e5, 0.3, 0.012, 20.0)
-    for name in TYPES:
-        effect = effect_of(name)
-        assert len(effect.start(at)) == len(effect.sizes())
 
 
 RECORDINGS = (("multisine", "fit"), ("open_cycles", "fit"), ("angle_steps", "held_out"))
