@@ -51,7 +51,7 @@ def aim_of(name, time):
 
 @ALL
 def test_a_batch_of_plants_is_its_plants(name):
-    n, count = 3, fewer(name, 200)
+    n, count = 3, fewer(name, 60)
     batch, single = CONTROLLERS[name](1.0), [CONTROLLERS[name](1.0) for _ in range(n)]
     for k, sample in enumerate(samples(count, shape=(n,))):
         sample = told(name, sample)
@@ -80,7 +80,7 @@ def agrees(answer, each):
 
 @ALL
 def test_a_sweep_of_gains_is_its_gains(name):
-    factors, count = np.array([0.5, 1.0, 1.7]), fewer(name, 150)
+    factors, count = np.array([0.5, 1.0, 1.7]), fewer(name, 50)
     batch, single = CONTROLLERS[name](factors), [CONTROLLERS[name](float(x)) for x in factors]
     for k, sample in enumerate(samples(count, seed=3)):
         sample = singles(told(name, sample))
@@ -97,27 +97,27 @@ def test_a_controller_goes_on_from_a_pickle_and_from_its_state_bit_for_bit(name,
     controller = CONTROLLERS[name](1.0)
     rows = [
         singles(told(name, sample)) if shape == () else told(name, sample)
-        for sample in samples(160, seed=5, shape=shape)
+        for sample in samples(60, seed=5, shape=shape)
     ]
 
     def play(one, numbers):
         answers = [one.update(k * PERIOD, rows[k], aim_of(name, k * PERIOD)) for k in numbers]
         return [list(commands(answer).values()) for answer in answers]
 
-    first = play(controller, range(80))
+    first = play(controller, range(30))
     kept, state, fresh = (
         pickle.dumps(controller),
         copy.deepcopy(controller.state),
         CONTROLLERS[name](1.0),
     )
-    rest = play(controller, range(80, 160))
-    assert np.array_equal(play(pickle.loads(kept), range(80, 160)), rest)
+    rest = play(controller, range(30, 60))
+    assert np.array_equal(play(pickle.loads(kept), range(30, 60)), rest)
     fresh.restore(state)
-    assert np.array_equal(play(fresh, range(80, 160)), rest)
+    assert np.array_equal(play(fresh, range(30, 60)), rest)
     controller.restore(state)
-    assert np.array_equal(play(controller, range(80, 160)), rest)
+    assert np.array_equal(play(controller, range(30, 60)), rest)
     controller.reset()
-    assert np.array_equal(play(controller, range(80)), first)
+    assert np.array_equal(play(controller, range(30)), first)
     if shape == () and not name.startswith("rig arm "):  # several joints are arrays, as a batch is
         json.dumps(state)  # plain numbers, lists and mappings
     with pytest.raises(ParameterError, match="state"):

@@ -49,7 +49,7 @@ def test_every_packaged_rig_is_compared() -> None:
 @pytest.mark.parametrize("name", RUNS)
 def test_packaged_rigs(name: str) -> None:
     run = RUNS[name]
-    want, got = run.reference(), run.core(2e-5)
+    want, got = run.reference(1e-10), run.core(2e-5)
     assert not stops(got)
     assert set(BOOKS) < set(want)
     moved = [
@@ -112,7 +112,7 @@ def test_what_falls_on_a_stop(run: Run, block: str) -> None:
     assert not beyond(misses(got, run.reference(1e-10)), STOPPED)
 
 
-@pytest.mark.parametrize("examples", [12, pytest.param(40, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("examples", [6, pytest.param(40, marks=pytest.mark.slow)])
 def test_networks(examples: int) -> None:
     # A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
     # take.

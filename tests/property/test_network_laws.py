@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 RT = 287.05 * 293.15
 GRAVITY = 9.80665
-SOME = settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
+SOME = settings(max_examples=25, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 def finer(run: Run, parts: int) -> Run:

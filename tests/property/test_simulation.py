@@ -35,7 +35,7 @@ def touches_stop(plant: Plant, angle: np.ndarray) -> bool:
 
 # A failing example is not shrunk: the reference is too slow for the hundreds of runs that would
 # take.
-@settings(FEW, max_examples=25, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(FEW, max_examples=10, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 @given(
     rig_overrides(),
     commands(ROWS),

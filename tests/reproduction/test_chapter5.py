@@ -122,6 +122,7 @@ def rows():
     return chapter5.facts(plan=TINY, search=False)
 
 
+@pytest.mark.slow
 def test_every_group_has_statements_with_a_source(rows):
     assert {row.group for row in rows} == set(chapter5.say.groups.values())
     assert all(row.where.strip() for row in rows)
@@ -129,6 +130,7 @@ def test_every_group_has_statements_with_a_source(rows):
     assert "nan" not in table(rows) + to_csv(rows) + " ".join(chapter5.in_short(rows))
 
 
+@pytest.mark.slow
 def test_what_is_known_beforehand_comes_out(rows):
     by = {row.fact: row for row in rows}
     assert by["inertia with 50 lb over that without"].verdict == "agree"
@@ -144,10 +146,12 @@ def test_what_is_known_beforehand_comes_out(rows):
     assert np.all(exact < large)
 
 
+@pytest.mark.slow
 def test_compensation_of_a_known_hysteresis_helps():
     assert SHORT.compensated(True).rms()[0] < 0.8 * SHORT.compensated(False).rms()[0]
 
 
+@pytest.mark.slow
 def test_page_in_the_documentation_is_of_the_full_plan(rows):
     lines = (DOCS / "chapter5" / "facts.csv").read_text(encoding="utf-8").splitlines()
     stored = {(row["group"], row["fact"]): row for row in csv.DictReader(lines)}
