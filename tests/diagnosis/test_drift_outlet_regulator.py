@@ -55,6 +55,7 @@ def test_dead_time_and_slew_limits_of_a_regulator_are_found_without_a_guess() ->
     best = max(found.probabilities, key=lambda key: found.probabilities[key])
     # a late clock of the pressures is the same data as a dead time
     assert best == f"{DELAY}+{SLEW}"
+    assert found.probabilities[best] > 0.6, found
     sizes = {name: p.value for e in found.effects for name, p in e.parameters.items()}
     assert sizes["delay"] == pytest.approx(0.024, abs=1e-3)
     assert sizes["rise_limit"] == pytest.approx(73e5, rel=0.05)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
@@ -127,13 +128,25 @@ def test_noise_stays_inside_its_limit_and_the_scatter_is_that_of_the_noise() -> 
         assert together.limit < min(e.limit for e in each)
 
 
+@pytest.mark.parametrize("scatter", [0.05, 0.4, 1.5])
+def test_noise_exceeds_its_limit_as_seldom_however_it_scatters(scatter: float) -> None:
+    core, one = core_rig(RIG), recorded(1)
+    problem = Problem(available_blocks(RIG, tuple(NOISE)), [one], core, SETTINGS)
+    found, levels = residuals(problem, RIG), noise_levels(problem, core)
+    levels = {key: replace(level, scatter=scatter) for key, level in levels.items()}
+    for block in problem.blocks:
+        told = excess(block, [one], found, levels, SETTINGS)
+        seldom = t(SETTINGS.noise_replicates - 1).sf(
+            np.log(told.limit / SETTINGS.noise_margin) / told.scatter
+        )
+        assert seldom == pytest.approx(SETTINGS.noise_chance)
+
+
 def named(
     effects: tuple[str, ...], ratio: float, values: dict[str, float], scatter: float = 0.05
 ) -> Candidate:
     """A set of effects that leaves so many times the noise level."""
-    left = {
-        "arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, min(2.5, 1.1 * np.exp(2.6 * scatter)), scatter)
-    }
+    left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, 1.1 * np.exp(2.6 * scatter), scatter)}
     fit = Fit(effects, RIG, values, {}, np.zeros((0, 0)), 0.0, {}, {}, 1, {}, None)
     return Candidate(effects, fit, left, left, 0.0)
 

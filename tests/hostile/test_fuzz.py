@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
 import pamrs
@@ -71,6 +71,7 @@ def refusal(work: Callable[[], object]) -> str:
 @pytest.mark.parametrize("kind", KINDS)
 @FUZZ
 @given(changes=CHANGES, end=st.one_of(st.just(1.0), st.floats(0.0, 1.0)))
+@example(changes=[(0.1, b"\x01")], end=1.0)  # a Feather file that asks for 7e16 bytes
 def test_a_log_of_any_bytes_is_read_or_refused(
     kind: str, changes: list[tuple[float, bytes]], end: float
 ) -> None:

@@ -114,6 +114,8 @@ class SameData:
         The own parameter that would tell the two apart, if it were not zero.
     held : tuple of (str, float)
         Own parameters with the values at which the two are the same.
+    held_at : str
+        Kind of block that the held parameters act on; they say nothing in a rig that has none.
     told_by : str
         What tells the two apart, since no recording of the same channels does.
     """
@@ -124,6 +126,7 @@ class SameData:
     size: str
     without: str
     held: tuple[tuple[str, float], ...]
+    held_at: str
     told_by: str
 
 

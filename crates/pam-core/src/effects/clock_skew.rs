@@ -55,6 +55,7 @@ const fn late(effect: &'static str) -> SameData {
         size: "offset",
         without: "rate",
         held: &[("angle_share", 1.0)],
+        held_at: "joint",
     }
 }
 

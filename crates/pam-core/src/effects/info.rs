@@ -328,6 +328,8 @@ pub struct SameData {
     pub without: &'static str,
     /// Own parameters with the values at which the two are the same.
     pub held: &'static [(&'static str, f64)],
+    /// What of a rig the held parameters act on; in a rig that has none they say nothing.
+    pub held_at: &'static str,
 }
 
 /// Why an effect has no linear model.

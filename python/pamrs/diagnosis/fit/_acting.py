@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from pamrs.diagnosis.prepare import Block
 from pamrs.effects import (
@@ -125,8 +126,10 @@ def fits(rig: Rig, effect: str) -> bool:
 
 
 def same_data_in(rig: Rig, effect: str) -> SameData | None:
-    """The other effect whose recordings an effect leaves in a rig."""
-    return next((s for s in info_of(effect).same_data if _acts_on(rig, EFFECTS[s.effect])), None)
+    """The effect that leaves the same recordings in a rig, its held parameters only where they act."""
+    found = (s for s in info_of(effect).same_data if _acts_on(rig, EFFECTS[s.effect]))
+    same = next(found, None)
+    return same and replace(same, held=same.held if rig.tables(same.held_at) else ())
 
 
 def _acts_on(rig: Rig, info: EffectInfo) -> bool:

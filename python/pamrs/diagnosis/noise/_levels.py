@@ -26,13 +26,10 @@ __all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
 
 _BIN_TIME = 0.1  # [s] bins of residuals against noise: what is missing is slower (decision 14)
 _LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
-# variance over the noise's that is a mismatch however that scatters (decision 22)
-_MOST_LIMIT = 2.5
 # numbers of a stated error, as its square scatters: bumps of a force curve over a stroke
 _STATED_FREEDOM = 4.0
 # share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
 _CURVE_REST = 0.02
-_MOST_LOG_LIMIT = 1.0  # largest logarithm of what the scatter adds to the margin
 
 
 Array = NDArray[np.float64]
@@ -88,8 +85,7 @@ class Excess:
     p_value : float
         Chance of such a ratio (above the margin) from noise, by the scatter of the noise levels.
     limit : float
-        Ratio that noise exceeds with the chance ``noise.chance`` of the settings, at most
-        ``noise.most_limit``.
+        Ratio that noise exceeds with the chance ``noise_chance`` of the settings.
     scatter : float
         Standard deviation of the ratio's logarithm from noise and from what noise levels are known
         to.
@@ -332,7 +328,7 @@ def _pooled(
     pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.noise_replicates))
     chance = t(len(keys) * (settings.noise_replicates - 1))
-    beyond = min(_MOST_LOG_LIMIT, float(chance.isf(settings.noise_chance)) * scatter)
+    beyond = float(chance.isf(settings.noise_chance)) * scatter
     # the model has one error, the same in all recordings, and its square is that of a few numbers
     stated = float(np.sum(shares * [noise_level[key].stated for key in keys]))
     larger = 1.0 + stated * (
@@ -347,7 +343,7 @@ def _pooled(
         float(chance.sf(math.log(max(ratio, 1e-300) / margin) / scatter)),
         math.sqrt(float(np.average(squares, weights=weights))),
         noise,
-        min(_MOST_LIMIT * larger, margin * math.exp(beyond)),
+        margin * math.exp(beyond),
         scatter,
         tuple(pieces),
     )

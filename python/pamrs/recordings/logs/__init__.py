@@ -7,6 +7,8 @@ channel, and in what unit, is for those who call it.
 
 from __future__ import annotations
 
+import gc
+import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -145,13 +147,20 @@ def read_log(path: Path, form: TextFormat | None = None) -> Log:
         If a package is missing; the message names the extra.
     """
     check_readable(path)
+    reason, hook = "", sys.unraisablehook
+    sys.unraisablehook = lambda _: None  # asammdf fails once more as its half-read file is freed
     try:
         log = _format(path).read(path, form or TextFormat())
-    except (PamrsError, MemoryError):
+    except PamrsError:
         raise
     except Exception as error:  # each library has its own kinds for a broken file
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
-        raise RecordingError(f"{path}: cannot be read ({reason[:200]})") from error
+        reason = next(iter(str(error).strip().splitlines()), type(error).__name__)
+    finally:
+        if reason:
+            gc.collect()
+        sys.unraisablehook = hook
+    if reason:
+        raise RecordingError(f"{path}: cannot be read ({reason[:200]})")
     sizes = [series.values.size for series in log.series.values()]
     check_size(max(sizes, default=0), sum(sizes), str(path))
     return log
