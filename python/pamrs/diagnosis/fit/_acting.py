@@ -126,7 +126,7 @@ def fits(rig: Rig, effect: str) -> bool:
 
 
 def same_data_in(rig: Rig, effect: str) -> SameData | None:
-    """The effect that leaves the same recordings in a rig, its held parameters only where they act."""
+    """The effect that leaves the same recordings in a rig, held parameters only where they act."""
     found = (s for s in info_of(effect).same_data if _acts_on(rig, EFFECTS[s.effect]))
     same = next(found, None)
     return same and replace(same, held=same.held if rig.tables(same.held_at) else ())
