@@ -72,9 +72,8 @@ def test_a_diagnosis_on_a_terminal_prints_names_as_text(fault, tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="/dev/full is needed")
-@pytest.mark.parametrize("stream", [">&-", "2>/dev/full"])
-def test_a_diagnosis_is_written_although_it_cannot_be_told(stream, tmp_path):
-    shell = f'exec "$0" -m pamrs diagnose "$1" --json a.json {stream}'
+def test_a_diagnosis_is_written_although_it_cannot_be_told(tmp_path):
+    shell = 'exec "$0" -m pamrs diagnose "$1" --json a.json >/dev/full'
     done = subprocess.run(
         ["sh", "-c", shell, sys.executable, str(FAULTS / "19_name_markup")],
         cwd=tmp_path,

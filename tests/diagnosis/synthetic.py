@@ -20,6 +20,7 @@ from pamrs.findings import (
     Tested,
     Where,
 )
+from tests.tables import rows_of
 
 
 class ModelText:
@@ -67,132 +68,31 @@ def fit_entry(scale: float) -> dict[str, float]:
     }
 
 
+def residual(rms: float, noise: float, p_value: float) -> dict[str, Any]:
+    sizes = {"rms": rms, "noise": noise, "excess": rms - noise, "p_value": p_value}
+    return {**sizes, "channel": "muscle_pressure"}
+
+
 def diagnosis(**changes: Any) -> Diagnosis:
     x, y = np.linspace(100.0, 500.0, 13), np.linspace(-60.0, 60.0, 11)
     centre_x, centre_y = np.meshgrid((x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2)
     z = 6.0 * np.tanh(centre_y / 30.0) * (centre_x / 500.0)
     z[0, :3] = np.nan
-    content: dict[str, Any] = {
-        "case": "shoulder_a",
-        "verdict": "effects",
-        "where": {
-            "block": "chamber",
-            "channel": "muscle_pressure",
-            "recording": "sine_sweep",
-            "intervals": [[0.0, 2.4], [9.0, 11.2], [18.0, 20.3]],
-            "conditions": [
-                Condition(
-                    "filled",
-                    0.81,
-                    0.2,
-                    3.1,
-                    "the pressure has just risen: 81 % of the excess lies within 2.5 s of a fill",
-                ),
-                Condition("muscle pressure", 0.6, 0.3, 2.0, "muscle pressure 310 to 490 kPa"),
-            ],
-            "text": "The excess is in the chamber: after each fill the pressure sags by 8 kPa.",
-        },
-        "effects": [
-            {
-                "id": "heat_transfer",
-                "probability": 0.9991,
-                "parameters": {
-                    "heat_transfer_coefficient": {
-                        "value": 41.3,
-                        "std": 2.2,
-                        "unit": "W/(m2 K)",
-                        "interval": [37.0, 45.9],
-                        "identifiable": True,
-                    },
-                    "wall_conductance": {
-                        "value": 1.3e-9,
-                        "std": 4.0e-9,
-                        "unit": "W/K",
-                        "identifiable": False,
-                    },
-                },
-            }
-        ],
-        "ambiguity": [],
-        "probabilities": {
-            "heat_transfer": 0.962,
-            "leak_muscle": 0.021,
-            "heat_transfer+leak_muscle": 0.012,
-            "unlisted": 0.004,
-            "parameters": 0.001,
-            "none": 0.0,
-        },
-        "parameters": {
-            "chamber.dead_volume": {
-                "nominal": 6.4e-5,
-                "value": 6.61e-5,
-                "std": 4e-7,
-                "unit": "m3",
-                "moved_sigmas": 0.7,
-                "identifiable": True,
-            },
-            "valve.discharge_area_max": {
-                "nominal": 1.1e-6,
-                "value": 9.6e-7,
-                "std": 2e-8,
-                "unit": "m2",
-                "moved_sigmas": -3.4,
-                "identifiable": True,
-            },
-            "arm.payload": {
-                "nominal": 2.0,
-                "value": 2.1,
-                "std": float("nan"),
-                "unit": "kg",
-                "moved_sigmas": float("nan"),
-                "identifiable": False,
-            },
-        },
-        "fit": {
-            "channels": {"muscle_pressure": fit_entry(3e5), "joint_angle": fit_entry(0.6)},
-            "held_out": {"muscle_pressure": fit_entry(3e5), "joint_angle": fit_entry(0.6)},
-            "gap_closed": 0.97,
-        },
-        "next_experiment": {
-            "text": "Fill to 5 bar, shut the valve and record the pressure for 60 s.",
-            "excitation": {"kind": "sealed hold", "pressure": 5e5, "duration": 60.0},
-            "expected_information_bits": 2.4,
-        },
-        "warnings": ["frozen joint_angle in step_up, 3.1 to 3.4 s: masked"],
-        "seconds": 31.4,
-        ("text"): (
-            "After each fill the gas cools and the pressure sags.\n\nA leak goes on; this stops."
-        ),
-        "tested": [
-            {"id": "heat_transfer", "blocks": ["chamber"], "predicted_gain": 0.96, "left": 0.003},
-            {
-                "id": "valve_hysteresis",
-                "blocks": ["chamber"],
-                "predicted_gain": 0.011,
-                "left": None,
-            },
-        ],
+    content: dict[str, Any] = rows_of(__file__, "diagnosis")
+    content["where"]["conditions"] = [Condition(*own) for own in content["where"]["conditions"]]
+    own = {"muscle_pressure": fit_entry(3e5), "joint_angle": fit_entry(0.6)}
+    content["fit"] |= {"channels": own, "held_out": own}
+    sizes = {"valve": 1.2, "chamber": 6.3, "muscle": 0.98, "arm": 1.4}
+    roles = {"step_up": "fit", "sine_sweep": "held_out", "random": "held_out"}
+    channels = (("joint_angle", "rad", 0.6), ("muscle_pressure", "Pa", 3e5))
+    content |= {
         "rig": ModelText(),
         "traces": [
-            trace(name, role, channel, unit, scale, seed=i)
-            for i, (name, role) in enumerate(
-                [("step_up", "fit"), ("sine_sweep", "held_out"), ("random", "held_out")]
-            )
-            for channel, unit, scale in (
-                ("joint_angle", "rad", 0.6),
-                ("muscle_pressure", "Pa", 3e5),
-            )
+            trace(name, role, *channel, seed=i)
+            for i, (name, role) in enumerate(roles.items())
+            for channel in channels
         ],
-        "residuals": {
-            name: {
-                "rms": rms,
-                "noise": 1.0,
-                "excess": rms - 1.0,
-                "p_value": 0.5,
-                "channel": "muscle_pressure",
-            }
-            for name, rms in (("valve", 1.2), ("chamber", 6.3), ("muscle", 0.98), ("arm", 1.4))
-        },
+        "residuals": {name: residual(rms, 1.0, 0.5) for name, rms in sizes.items()},
         "condition_map": {
             "x_label": "muscle pressure [kPa]",
             "y_label": "pressure rate [kPa/s]",
@@ -202,7 +102,6 @@ def diagnosis(**changes: Any) -> Diagnosis:
             "z_after": 0.1 * z,
             "block": "chamber",
         },
-        "timings": {"locate": 4.2, "refit": 12.0, "name": 15.2},
     }
     content.update(changes)
     return Diagnosis(**content | entries(content))
@@ -227,7 +126,7 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
         "parameters": each(ParameterFound, content["parameters"]),
         "fit": FitErrors(**errors, gap_closed=content["fit"].get("gap_closed")),
         "next_experiment": NextExperiment(**content["next_experiment"]),
-        "tested": [Tested(**row) for row in content["tested"]],
+        "tested": [Tested(**{"left": None, **row}) for row in content["tested"]],
         "residuals": each(BlockResidual, content["residuals"]),
         "condition_map": None if shown is None else ConditionMap(**shown),
     }
@@ -240,15 +139,7 @@ def sealed_chamber() -> Diagnosis:
         traces=[trace("hold", "fit", "muscle_pressure", "Pa", 3e5, n=900)],
         fit={"channels": {"muscle_pressure": fit_entry(3e5)}, "held_out": {}, "gap_closed": None},
         condition_map=None,
-        residuals={
-            "chamber": {
-                "rms": 900.0,
-                "noise": 100.0,
-                "excess": 800.0,
-                "p_value": 1e-9,
-                "channel": "muscle_pressure",
-            }
-        },
+        residuals={"chamber": residual(900.0, 100.0, 1e-9)},
         timings={},
     )
 

@@ -25,6 +25,7 @@ from pamrs.findings import (
 from pamrs.report import render_html
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
+from tests.tables import rows_of
 
 
 @pytest.mark.parametrize("make", [synthetic.diagnosis, synthetic.sealed_chamber, synthetic.nothing])
@@ -169,86 +170,18 @@ def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagn
 
 
 @pytest.mark.parametrize(
-    ("found", "said", "badge", "chance"),
-    [
-        (
-            _judged("effects", {"muscle_creep": 0.97, "unlisted": 0.03}, effects=["muscle_creep"]),
-            "leaves out: muscle creep in the arm, probability 0.97",
-            "missing physics named",
-            0.97,
-        ),
-        # never surer than 0.55 against 0.45
-        (
-            _judged(
-                "unlisted",
-                {"unlisted": 0.55, "muscle_creep": 0.45},
-                ambiguity=[["unlisted"], ["muscle_creep"]],
-            ),
-            "cannot tell an effect outside the catalogue (0.55) from muscle creep (0.45)",
-            "missing physics, no name",
-            0.55,
-        ),
-        # many rivals, none of them probable enough for a set
-        (
-            _judged(
-                "unlisted",
-                {"unlisted": 0.7, "muscle_creep": 0.16, "payload_change": 0.1, "none": 0.04},
-            ),
-            "nothing is probable enough to be named: an effect outside the catalogue (0.70), "
-            "muscle creep (0.16) or payload change (0.10)",
-            "missing physics, no name",
-            0.7,
-        ),
-        (
-            _judged("unlisted", {"unlisted": 0.96, "muscle_creep": 0.04}),
-            "Physics outside the catalogue acts in the arm, probability 0.96",
-            "missing physics, not in the catalogue",
-            0.96,
-        ),
-        (
-            _judged(
-                "effects",
-                {"muscle_creep": 0.79, "payload_change+muscle_creep": 0.14, "unlisted": 0.07},
-                effects=["muscle_creep"],
-                ambiguity=[["muscle_creep"], ["muscle_creep", "payload_change"], ["unlisted"]],
-            ),
-            "cannot tell muscle creep (0.79), muscle creep + payload change (0.14) and an effect "
-            "outside the catalogue (0.07) apart",
-            "missing physics, the name is not settled",
-            0.79,
-        ),
-        # named by what its sets have in common, though none of them leads
-        (
-            _judged(
-                "effects",
-                {"unlisted": 0.4, "muscle_creep": 0.3, "muscle_creep+payload_change": 0.3},
-                effects=["muscle_creep"],
-            ),
-            "leaves out: muscle creep in the arm, probability 0.60",
-            "missing physics named",
-            0.6,
-        ),
-        (
-            _judged("none", {"none": 0.6, "parameters": 0.38, "unlisted": 0.02}),
-            "Nothing is missing",
-            "nothing missing",
-            0.98,
-        ),
-        (
-            _judged(
-                "parameters",
-                {"parameters": 0.8, "muscle_creep": 0.2},
-                ambiguity=[["parameters"], ["muscle_creep"]],
-            ),
-            "cannot rule out muscle creep (0.20) in the arm",
-            "parameters or physics, not settled",
-            0.8,
-        ),
-    ],
+    ("verdict", "probabilities", "more", "said", "badge", "chance"),
+    rows_of(__file__, "headline_badge_page_and_json_say_the_same"),
 )
 def test_headline_badge_page_and_json_say_the_same(
-    found: Diagnosis, said: str, badge: str, chance: float
+    verdict: str,
+    probabilities: dict[str, float],
+    more: dict[str, Any],
+    said: str,
+    badge: str,
+    chance: float,
 ) -> None:
+    found = _judged(verdict, probabilities, **more)
     assert said in found.headline
     assert words.leading(found)[1] == pytest.approx(chance)
     html = render_html(found)

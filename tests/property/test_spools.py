@@ -56,7 +56,7 @@ _MOMENTS = [
 ]
 
 
-@settings(max_examples=5, **SLOW)
+@settings(max_examples=2, **SLOW)
 @given(
     st.floats(8.0, 60.0),
     st.sampled_from([0.08, 0.3, 0.7, 1.0, 1.6]),
@@ -90,7 +90,7 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("here", "there"), PAIRS)
-@settings(max_examples=4, **SLOW)
+@settings(max_examples=2, **SLOW)
 @given(
     st.tuples(st.floats(1e-3, 9e-3), st.floats(5e-4, 6e-3)),
     st.sampled_from([0.0, 40.0, 57.3, 210.0]),

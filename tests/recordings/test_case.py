@@ -141,6 +141,10 @@ def test_sealed_cases_load(path: Path) -> None:
     case = load_case(path)
     assert (len(case.fit), len(case.held_out)) == (3, 2)
     assert case.channels == ("valve_command", "supply_pressure", "muscle_pressure", "joint_angle")
+    for recording in case.recordings:
+        assert recording.issues == []
+        assert (len(recording), recording.sample_time) == (8000, 0.005)
+        assert recording.valid().all()
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the recordings are not beside the project")

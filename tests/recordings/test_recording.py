@@ -19,8 +19,6 @@ from pamrs.recordings._faults import find_faults
 from pamrs.recordings.table import TEXT
 
 Array = NDArray[np.float64]
-SHARED = Path(__file__).parents[2] / ".." / "shared"
-CONCEALED = SHARED / "concealed"
 N = 4000
 DT = 0.005
 LSB = {"supply_pressure": 42.0, "muscle_pressure": 42.0, "joint_angle": 0.011}
@@ -547,15 +545,6 @@ def test_no_false_alarms_on_sound_channels(seed: int, thin: int) -> None:
     data = lively(seed)
     for channel in SENSORS:
         assert find_faults(channel, data[channel][::thin]) == []
-
-
-@pytest.mark.parametrize("case", sorted(CONCEALED.glob("case_*")), ids=lambda path: path.name)
-def test_sealed_recordings_are_sound(case: Path) -> None:
-    for file in sorted(case.glob("*.csv")):
-        recording = load_recording(file)
-        assert recording.issues == []
-        assert (len(recording), recording.sample_time) == (8000, 0.005)
-        assert recording.valid().all()
 
 
 def test_every_canonical_channel_is_read(tmp_path: Path) -> None:
