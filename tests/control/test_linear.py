@@ -18,16 +18,7 @@ SAMPLE = 2.5e-4  # s
 STEP = 1e-5  # s, so that the integrator's error is none beside that of the differences
 COMMAND = 1e-5  # V
 #: Half widths of the differences, by the channel or the effect's state; of a mass in parts of it.
-WIDTHS = {
-    "supply_pressure": 100.0,
-    "line_pressure": 10.0,
-    "muscle_pressure": 10.0,
-    "pressure_lag": 10.0,
-    "muscle_creep": 1e-6,
-    "input_path_lag": 2e-6,
-    "closure_flow": 1e-4,
-    "closure_supply": 1e-4,
-}
+WIDTHS = rows_of(__file__, "widths")
 #: Where the typical values show little: sums of terms are zero without coefficients, and a delay is
 #: none.
 GIVEN = rows_of(__file__, "given")

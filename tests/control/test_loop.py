@@ -11,6 +11,7 @@ from pamrs.control import Controller, Sensors, closed_loop, sweep
 from pamrs.control.trajectories import degrees, lift_hold_return, step
 from pamrs.errors import ParameterError
 from tests.control.helpers import SmallPid
+from tests.tables import rows_of
 
 LIFT = lift_hold_return(*degrees(15, 60), ramp=2.0, hold=1.0, duration=8.0)
 
@@ -223,15 +224,7 @@ def test_bad_input_is_named(rig, change, word):
 
 @pytest.mark.parametrize(
     "bad",
-    [
-        {"noise": {"joint_angle": -1.0}},
-        {"resolution": {"joint_angle": 0.0}},
-        {"delay": -1.0},
-        {"seed": -1},
-        {"noise": "a"},
-        {"noise": {"a": "b"}},
-        {"delay": "a"},
-    ],
+    rows_of(__file__, "bad_sensors_are_named"),
 )
 def test_bad_sensors_are_named(bad):
     with pytest.raises(ParameterError, match=next(iter(bad))):

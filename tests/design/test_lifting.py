@@ -13,6 +13,7 @@ from pamrs import cli, rigs
 from pamrs.design import lift
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint, Rig
+from tests.tables import rows_of
 
 PSI, LB = 6894.757293168361, 0.45359237
 FULL = 150.0 * PSI
@@ -310,15 +311,7 @@ def test_command_prints_and_writes(capsys, tmp_path):
 
 @pytest.mark.parametrize(
     ("words", "message"),
-    [
-        (("nowhere.toml",), "nowhere.toml"),
-        (("sealed_chamber",), "no [muscle]"),
-        (("elbow", "--pressure", "8"), "--pressure = '8'"),
-        (("elbow", "--pressure", "8 kg"), "--pressure = '8 kg'"),
-        (("elbow", "--payload", "-3 kg"), "--payload = '-3 kg'"),
-        (("elbow", "--to", "200 deg"), "200 deg"),
-        (("elbow", "--png", "no/such/folder/a.png"), "no/such/folder"),
-    ],
+    rows_of(__file__, "command_refuses_what_it_cannot_use"),
 )
 def test_command_refuses_what_it_cannot_use(capsys, words, message):
     code, out, err = run(capsys, *words)

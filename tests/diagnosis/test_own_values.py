@@ -20,6 +20,7 @@ from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import SHOULDER as NOISE
 from tests.diagnosis.noisy import noisy
 from tests.diagnosis.test_gauge_zeros import FED
+from tests.tables import rows_of
 
 SETTINGS = DiagnosisSettings()
 DT = 0.005
@@ -270,14 +271,7 @@ def test_a_case_file_leaves_a_value_to_the_recording(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
-    [
-        ('{ "arm.payloat" = { value = 12, unit = "kg" } }', "has no parameter 'arm.payloat'"),
-        ('{ "arm.payload" = { value = 12, unit = "bar" } }', "wrong dimension"),
-        ('{ "arm.payload" = { value = 12 } }', "unit = None is not allowed"),
-        ('{ "arm.payload" = { value = -12, unit = "kg" } }', "-12"),
-        ('{ "arm.payload" = { value = 2, unit = "kg", error = "some" } }', "error = 'some'"),
-        ('"heavy"', "a table of parameters"),
-    ],
+    rows_of(__file__, "what_is_wrong_is_said"),
 )
 def test_what_is_wrong_is_said(tmp_path: Path, parameters: str, message: str) -> None:
     with pytest.raises(CaseError, match=message):

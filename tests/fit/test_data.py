@@ -693,15 +693,7 @@ def test_description_gives_map_muscle_and_tolerances(described):
 
 @pytest.mark.parametrize(
     ("old", "new", "match"),
-    [
-        ("pamrs.force_map/1", "pamrs.force_map/9", "schema = 'pamrs.force_map/9'"),
-        ('file = "map.csv"', 'file = "gone.csv"', "there is no file"),
-        ('file = "map.csv"', "", "file is missing"),
-        ("where =", "were =", "unknown key 'were'; did you mean 'where'"),
-        ('unit = "N" }', 'unit = "bar" }', "clipped_force: unit 'bar' has the wrong dimension"),
-        ("value = 64.0", "value = 640.0", "muscle.braid_angle"),
-        ("[muscle]", "[mussel]", "muscle.* is missing"),
-    ],
+    rows_of(__file__, "description_problems_are_named"),
 )
 def test_description_problems_are_named(described, old, new, match):
     text = described.read_text(encoding="utf-8")

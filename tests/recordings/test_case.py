@@ -10,6 +10,7 @@ import pytest
 import pamrs
 from pamrs.errors import CaseError
 from pamrs.recordings import load_case
+from tests.tables import rows_of
 
 ROOT = Path(__file__).parents[2]
 SHARED = ROOT / ".." / "shared"
@@ -66,34 +67,7 @@ def test_roles_names_and_files_outside(tmp_path: Path) -> None:
     assert case.held_out[0].sample_time == 0.2
 
 
-BAD = [
-    ('schema = "pamrs.case/1"', 'schema = "pamrs.case/9"', ["'pamrs.case/9'", "'pamrs.case/1'"]),
-    ('rig = "rig.toml"', 'rig = "other.toml"', ["rig = 'other.toml'", "cannot be read"]),
-    ('rig = "rig.toml"', "rig = 4", ["rig = 4"]),
-    ('rig = "rig.toml"', 'rigg = "rig.toml"', ["'rigg'", "'rig'"]),
-    ('role = "fit"', 'role = "train"', ["recording[0].role = 'train'", "'held_out'"]),
-    ('role = "fit"', 'role = "held_out"', ["'fit'", "nothing is left"]),
-    ('role = "fit"', "role = ['fit']", ["recording[0].role"]),
-    ('role = "fit"', 'rolle = "fit"', ["'recording[0].rolle'", "'role'"]),
-    ('role = "fit"', "header = 1", ["recording[0].header = 1", "true or false"]),
-    ('role = "fit"', 'delimiter = "::"', ["recording[0].delimiter", "one character"]),
-    ('role = "fit"', "columns = [1, 2]", ["recording[0].columns"]),
-    ('role = "fit"', "thousands = { time = 1 }", ["recording[0].thousands"]),
-    ('role = "fit"', "sample_time = true", ["recording[0].sample_time"]),
-    ('role = "fit"', "sample_time = -1.0", ["sample_time = -1.0", "positive"]),
-    ('role = "fit"', "name = 3", ["recording[0].name"]),
-    ('role = "fit"', 'columns = ["time [s]", "force [V]"]', ["run.csv", "force [V]"]),
-    (
-        'file = "run.csv"',
-        'file = "absent.csv"',
-        ["recording[0].file = 'absent.csv'", "no file", "copy it"],
-    ),
-    ('file = "run.csv"', "file = 7", ["recording[0].file = 7"]),
-    ('file = "run.csv"', 'file = "."', ["folder"]),
-    ("[[recording]]", "[recording]", ["[[recording]]"]),
-    ("[[recording]]", "[[recordings]]", ["'recordings'", "[[recording]]"]),
-    ("[[recording]]", "[[recording", ["not valid TOML"]),
-]
+BAD = rows_of(__file__, "bad")
 
 
 @pytest.mark.parametrize(("old", "new", "wanted"), BAD)

@@ -13,6 +13,7 @@ from pamrs.errors import CaseError, MissingPackageError, RecordingError
 from pamrs.recordings import _gate, load_case, load_recordings
 from pamrs.recordings import logs as logs_package
 from tests.recordings.written import DT, N, mapping, signals, written
+from tests.tables import rows_of
 
 BASE = {"muscle_pressure": {"column": "p1", "unit": "bar"}}
 
@@ -354,15 +355,7 @@ def test_parts_of_a_bag_are_limited_together(monkeypatch: pytest.MonkeyPatch) ->
 
 @pytest.mark.parametrize(
     ("old", "new", "words"),
-    [
-        ('time = "t"', 'time = "tt"', "no channel 'tt'"),
-        ("pieces = [1, 2]", "pieces = 1", "recording[0].pieces = 1"),
-        ("pieces = [1, 2]", "pieces = []", "recording[0].pieces = []"),
-        ('column = "p1", ', "", "channels.muscle_pressure.column"),
-        ('channels.muscle_pressure = { column = "p1", unit = "bar" }', "", "goes with channels"),
-        ("pieces = [3]", "pieces = [2]", "two recordings are called 'run_2'"),
-        ('role = "held_out"', 'columns = { "a" = "b" }', "recording[1].columns"),
-    ],
+    rows_of(__file__, "mistakes_in_a_case"),
 )  # fmt: skip
 def test_mistakes_in_a_case(tmp_path: Path, old: str, new: str, words: str) -> None:
     data = signals()

@@ -13,6 +13,7 @@ from pamrs.errors import ParameterError, RecordingError
 from pamrs.recordings import load_case, propose, suspicions
 from pamrs.recordings.logs import split_heading, understood_unit
 from tests.recordings.written import CHANNELS, DT, FORMATS, UNITS, N, signals, written
+from tests.tables import rows_of
 
 TIME = np.arange(4000) * 5e-3
 LIFT = np.sin(np.pi * TIME / TIME[-1]) ** 2
@@ -143,29 +144,7 @@ def test_without_clock_or_channel(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("heading", "name", "unit"),
-    [
-        ("p1 [bar]", "p1", "bar"),
-        ("p1 (bar)", "p1", "bar"),
-        ("p1 / bar", "p1", "bar"),
-        ("p1 in bar", "p1", "bar"),
-        ("p1_kPa", "p1_kPa", "kPa"),
-        ("p1 (left)", "p1 (left)", ""),
-        ("axis/t", "axis/t", ""),
-        ("gain_m", "gain_m", ""),
-        ("time [zz]", "time", "zz"),
-        ("Comp_P_(mA)", "Comp_P", "mA"),
-        ("p1 {bar}", "p1", "bar"),
-        ("p1 <psi>", "p1", "psi"),
-        ("p1 (bar(a))", "p1", "bar(a)"),
-        ("p1 (counts)", "p1", "counts"),
-        ("p1 (bar/x)", "p1", "bar/x"),
-        ("p1_bar_abs", "p1_bar_abs", "bar abs"),
-        ("p1 psia", "p1 psia", "psia"),
-        ("tank bar(a)", "tank bar(a)", "bar(a)"),
-        ("p1 kPa (g)", "p1 kPa (g)", "kPa (g)"),
-        ("torque_V", "torque_V", "V"),
-        ("p1 [4..20 mA = 0..6 bar]", "p1", "4..20 mA = 0..6 bar"),
-    ],
+    rows_of(__file__, "headings"),
 )
 def test_headings(heading: str, name: str, unit: str) -> None:
     assert split_heading(heading) == (name, unit)
@@ -315,21 +294,7 @@ def test_suspicions_stand_in_the_case(tmp_path: Path) -> None:
     assert "read as psi" in proposal.case_toml(tmp_path)
 
 
-PROGRAMS = {
-    "LabVIEW": (
-        "LabVIEW Measurement\t\nWriter_Version\t2\nReader_Version\t2\nSeparator\tTab\n"
-        "Decimal_Separator\t,\nMulti_Headings\tNo\nX_Columns\tOne\nTime_Pref\tRelative\n"
-        "Date\t2024/05/12\nTime\t10:31:08,5129\n***End_of_Header***\t\n\t\n"
-        "Channels\t2\t\t\nSamples\t40\t40\t\nDate\t2024/05/12\t2024/05/12\t\n"
-        "Y_Unit_Label\tbar\tdeg\t\nDelta_X\t0,010000\t0,010000\t\n***End_of_Header***\t\t\t\n"
-        "X_Value\tMuscle pressure\tElbow angle\tComment\n",
-        "\t",
-        ",",
-    ),
-    "PicoScope": ("Time,Muscle pressure,Elbow angle\n(s),(bar),(deg)\n\n", ",", "."),
-    "a script": ("# stand 4, 12 May\n# time [s] muscle_pressure [bar] angle [deg]\n", " ", "."),
-    "Excel": ("Zeit;Druck Muskel;Winkel Ellbogen\ns;bar;°\n", ";", ","),
-}
+PROGRAMS = rows_of(__file__, "programs")
 
 
 @pytest.mark.parametrize("program", PROGRAMS)

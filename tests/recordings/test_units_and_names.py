@@ -26,6 +26,7 @@ from pamrs.recordings import (
     propose,
 )
 from pamrs.rig import load_rig
+from tests.tables import rows_of
 
 Array = NDArray[np.float64]
 FAULTS = Path(__file__).parents[1] / "faults"
@@ -115,21 +116,7 @@ def test_absolute_pressures_become_gauge_pressures(
     assert "was recorded as an absolute pressure" in only.notes["muscle_pressure"]
 
 
-LEFT = [
-    ("p_muscle [mA]", "is in mA: give from and to"),
-    ("Muscle_P_(mA)", "is in mA: give from and to"),
-    ("p_muscle [V]", "is in V: give from and to"),
-    ("p_muscle_V", "is in V: give from and to"),
-    ("p_muscle [counts]", "the unit 'counts' is not known"),
-    ("p_muscle (raw)", "the unit 'raw' is not known"),
-    ("p_muscle [%]", "the unit '%' is not known"),
-    ("p_muscle [mmXy]", "the unit 'mmXy' is not known"),
-    ("p_muscle (bar/x)", "the unit 'bar/x' is not known"),
-    ("p_muscle [psid]", "the unit 'psid' is not known"),
-    ("p_muscle [100 kPa]", "the unit '100 kPa' is not known"),
-    ("p_muscle [bar/10]", "the unit 'bar/10' is not known"),
-    ("p_muscle (10 kPa)", "the unit '10 kPa' is not known"),
-]
+LEFT = rows_of(__file__, "left")
 
 
 @pytest.mark.parametrize(("heading", "told"), LEFT)
@@ -263,24 +250,7 @@ def test_a_heading_writes_no_line_of_its_own_into_the_case(tmp_path: Path) -> No
 # --------------------------------------------------------------------------- names
 
 TANKED = {"valve_command", "supply_pressure", "muscle_pressure", "joint_angle"}
-NAMES = [
-    ({"pressure [bar]": "muscle_pressure", "u [V]": "valve_command"}, ""),
-    ({"p_soll [bar]": "", "p_ist [bar]": "muscle_pressure"}, "p_soll is called like a command"),
-    ({"target pressure [bar]": "", "p [bar]": "muscle_pressure"}, "(target)"),
-    ({"u_cmd [V]": "valve_command", "u_meas [V]": ""}, ""),
-    ({"u_act [V]": "", "u_des [V]": "valve_command"}, ""),
-    ({"angle_ref [deg]": "", "angle_meas [deg]": "joint_angle"}, "(ref)"),
-    ({"Winkel Soll [°]": "", "Winkel Ist [°]": "joint_angle"}, "(soll)"),
-    ({"Muskeldruck [bar]": "muscle_pressure", "Versorgungsdruck [bar]": "supply_pressure"}, ""),
-    ({"Ventilspannung [V]": "valve_command", "Istdruck [bar]": "muscle_pressure"}, ""),
-    ({"Set 1/p1 [bar]": "muscle_pressure"}, ""),
-    ({"p1 [bar]": "muscle_pressure", "p2 [bar]": ""}, "not found in this log: "),
-    ({"pressure sensor [V]": "", "angle [deg]": "joint_angle"}, ""),
-    ({"p_ref": "", "u": "valve_command"}, "p_ref is called like a command"),
-    ({"Kraftsensor [V]": "", "p [bar]": "muscle_pressure"}, ""),
-    ({"torque [V]": "", "p [bar]": "muscle_pressure"}, "is in V: give from and to"),
-    ({"force [kg]": "", "p [bar]": "muscle_pressure"}, ""),
-]
+NAMES = rows_of(__file__, "names")
 
 
 @pytest.mark.parametrize(("columns", "told"), NAMES)

@@ -19,6 +19,7 @@ pytest.importorskip("jinja2")
 from pamrs.findings import BudgetTerm
 from pamrs.report import figures, render_html
 from pamrs.report import text as words
+from tests.tables import rows_of
 
 
 @pytest.fixture(scope="module")
@@ -42,21 +43,7 @@ def test_page_is_self_contained(make, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("verdict", "ambiguity", "words"),
-    [
-        (
-            "effects",
-            [["activation_pressure"], ["parameters"]],
-            "cannot tell activation pressure from parameter values",
-        ),
-        (
-            "parameters",
-            [["parameters"], ["activation_pressure"]],
-            "cannot rule out activation pressure",
-        ),
-        ("none", [["none"], ["unlisted"]], "cannot rule out an effect outside the catalogue"),
-        ("parameters", [], "No physics is missing"),
-        ("none", [], "Nothing is missing"),
-    ],
+    rows_of(__file__, "a_set_with_parameters_in_it_is_no_missing_physics_yet"),
 )
 def test_a_set_with_parameters_in_it_is_no_missing_physics_yet(
     verdict: str, ambiguity: list[list[str]], words: str

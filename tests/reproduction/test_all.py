@@ -12,6 +12,7 @@ from reproduction import CHAPTERS, store
 from reproduction.__main__ import main
 from reproduction.page import Picture, Section, page
 from reproduction.summary import counts, summary
+from tests.tables import rows_of
 
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 ROWS = (
@@ -88,20 +89,7 @@ def package(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("file", "matters"),
-    [
-        ("pamrs/_core.abi3.so", True),
-        ("pamrs/rig/__init__.py", True),
-        ("pamrs/rigs/shoulder.toml", True),
-        ("reproduction/chapter6.py", True),
-        ("reproduction/chapter6_figures.py", True),
-        ("reproduction/statements/symbols.toml", True),
-        ("reproduction/chapter3.py", False),
-        ("reproduction/statements/chapter6.toml", True),
-        ("reproduction/statements/chapter3.toml", False),
-        ("reproduction/page.py", False),
-        ("pamrs/cli/fit.py", False),
-        ("pamrs/__pycache__/x.pyc", False),
-    ],
+    rows_of(__file__, "chapter_depends_on_what_it_is_calculated_from"),
 )
 def test_chapter_depends_on_what_it_is_calculated_from(package, file, matters):
     before = store.digest("ch6", search=True)

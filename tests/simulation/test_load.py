@@ -96,16 +96,7 @@ def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
-    [
-        ("value = 280", "value = 170", r"load\.max_length = 0\.17 m is not allowed"),
-        (
-            "[load]\nmass",
-            '[load]\nkind = "frame"\nmass',
-            r"load\.mass is not allowed with 'frame': only with mass",
-        ),
-        ("value = 40, ", "value = 0, ", r"load\.mass = 0 kg"),
-        ("[muscle]", "[sensor]", r"needs the block \[muscle\]|sensor"),
-    ],
+    rows_of(__file__, "loads_that_cannot_be_are_named"),
 )
 def test_loads_that_cannot_be_are_named(old: str, new: str, message: str) -> None:
     with pytest.raises(pamrs.RigError, match=message):
