@@ -59,8 +59,15 @@ def loops(
     }
 
 
+def fitted(pressure, contraction, force, direction=None, **options):
+    """The friction of a map of loops."""
+    length = REST * (1.0 - np.asarray(contraction))
+    made = {"rest_length": REST, "direction": direction, "check_duplicates": False}
+    return fit_friction(ForceMap.from_arrays(length, pressure, force, **made), **options)
+
+
 def test_exact_loops_give_the_coefficients_back():
-    fit = fit_friction(**loops())
+    fit = fitted(**loops())
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=1e-3)
     assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=1e-3)
     assert fit.slope_significant
@@ -74,7 +81,7 @@ def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
     given = loops(levels=np.append(1e3, LEVELS), noise=3.0)
     slack = given["pressure"] < 2e3
     given["force"][slack] = np.random.default_rng(1).normal(size=slack.sum())
-    fit = fit_friction(**given)
+    fit = fitted(**given)
     assert len(fit.levels) == 6
     assert "1 kPa: forces below 1 % of the map's largest: no coefficient" in fit.issues
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.02)
@@ -83,7 +90,7 @@ def test_a_pressure_at_which_nothing_pulls_gives_no_coefficient():
 def test_standard_errors_tell_the_truth():
     scores = []
     for seed in range(24):
-        fit = fit_friction(**loops(noise=10.0, seed=seed))
+        fit = fitted(**loops(noise=10.0, seed=seed))
         scores.append(
             [
                 (fit.params[k].value - t) / fit.params[k].stderr
@@ -96,7 +103,7 @@ def test_standard_errors_tell_the_truth():
 
 
 def test_levels_on_the_floor_do_not_bend_the_line():
-    fit = fit_friction(**loops(np.array([2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]) * 1e5, noise=1.0))
+    fit = fitted(**loops(np.array([2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0]) * 1e5, noise=1.0))
     assert [level.at_floor for level in fit.levels] == [False] * 5 + [True] * 2
     assert fit.ndata == 5
     assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=0.01)
@@ -104,7 +111,7 @@ def test_levels_on_the_floor_do_not_bend_the_line():
 
 
 def test_friction_that_does_not_depend_on_pressure():
-    fit = fit_friction(**loops(friction={"friction_coefficient": 0.08}, noise=5.0))
+    fit = fitted(**loops(friction={"friction_coefficient": 0.08}, noise=5.0))
     assert not fit.slope_significant
     assert fit.params["friction_coefficient"].value == pytest.approx(
         0.08, abs=3 * fit.params["friction_coefficient"].stderr
@@ -113,22 +120,21 @@ def test_friction_that_does_not_depend_on_pressure():
 
 
 def test_a_muscle_without_friction_is_on_the_floor():
-    fit = fit_friction(**loops(friction={}, noise=1.0))
+    fit = fitted(**loops(friction={}, noise=1.0))
     assert np.all(fit.predict(LEVELS) == FLOOR)
     assert "the law is its floor at every pressure" in " ".join(fit.issues)
 
 
 def test_presliding_from_dense_reversals():
-    fit = fit_friction(**loops(LEVELS[:3], count=400, presliding=4e-3), rest_length=REST)
+    fit = fitted(**loops(LEVELS[:3], count=400, presliding=4e-3))
     assert fit.presliding == pytest.approx(4e-3, rel=0.05)
-    sparse = fit_friction(**loops(LEVELS[:3], count=20, presliding=4e-3), rest_length=REST)
+    sparse = fitted(**loops(LEVELS[:3], count=20, presliding=4e-3))
     assert sparse.presliding is None
     assert "too sparse after 9 of 9 reversals" in sparse.presliding_reason
-    assert "rest_length is not given" in fit_friction(**loops()).presliding_reason
 
 
 def test_to_muscle_carries_the_friction():
-    fit = fit_friction(**loops(LEVELS[:3], count=400, presliding=4e-3), rest_length=REST)
+    fit = fitted(**loops(LEVELS[:3], count=400, presliding=4e-3))
     rubbed = fit.to_muscle(muscle())
     given = rubbed.parameters
     assert given["friction_coefficient"] == fit.params["friction_coefficient"].value
@@ -136,7 +142,7 @@ def test_to_muscle_carries_the_friction():
     assert given["friction_presliding"] == fit.presliding
     expected = muscle(**RUBBED).force(3e5, 0.1, direction=1.0)
     assert rubbed.force(3e5, 0.1, direction=1.0) == pytest.approx(expected, rel=0.01)
-    stays = fit_friction(**loops()).to_muscle(muscle(friction_presliding=2e-3))
+    stays = fitted(**loops()).to_muscle(muscle(friction_presliding=2e-3))
     assert stays.parameters["friction_presliding"] == 2e-3
 
 
@@ -164,7 +170,7 @@ def test_force_map_with_rows_of_unknown_direction():
 def test_a_pressure_with_one_branch_is_named_and_the_others_count():
     made = loops()
     keep = ~((made["pressure"] == 3e5) & (made["direction"] > 0))
-    fit = fit_friction(**{name: values[keep] for name, values in made.items()})
+    fit = fitted(**{name: values[keep] for name, values in made.items()})
     assert len(fit.levels) == 5
     assert "300 kPa: 0 rows while lengthening, 4 at least are needed: no coefficient" in fit.issues
 
@@ -174,15 +180,15 @@ def test_what_the_loops_do_not_determine_is_named():
     with pytest.raises(
         RecordingError, match=r"one pressure only \(100 kPa\): the slope c1 is not determinable"
     ):
-        fit_friction(**loops(LEVELS[:1]))
+        fitted(**loops(LEVELS[:1]))
     order = np.random.default_rng(2).permutation(len(made["force"]))
     for rows in (np.lexsort((made["contraction"], made["pressure"])), order, order[:6]):
         with pytest.raises(RecordingError, match="no row has a direction of motion: give a column"):
-            fit_friction(**without_direction(made, rows))
+            fitted(**without_direction(made, rows))
     one_way = made["direction"] < 0
     with pytest.raises(RecordingError, match="no pressure gives a coefficient"):
-        fit_friction(**{name: values[one_way] for name, values in made.items()})
-    two = fit_friction(**loops(LEVELS[:2], noise=2.0))
+        fitted(**{name: values[one_way] for name, values in made.items()})
+    two = fitted(**loops(LEVELS[:2], noise=2.0))
     assert np.isnan(two.slope_pvalue)
     assert not two.slope_significant
     assert "cannot be tested" in two.fit_report()
@@ -192,14 +198,13 @@ def test_what_the_loops_do_not_determine_is_named():
     ("options", "message"),
     [
         ({"floor": 1.5}, "floor = 1.5 is not allowed"),
-        ({"force": None}, "force: needed when no ForceMap is given"),
     ],
 )
 def test_impossible_arguments_are_named(options, message):
     with pytest.raises(ParameterError, match=message):
-        fit_friction(**{**loops(), **options})
+        fitted(**{**loops(), **options})
     with pytest.raises(ParameterError, match="pressure: a value is not finite"):
-        fit_friction(**loops()).predict(np.nan)
+        fitted(**loops()).predict(np.nan)
 
 
 def without_direction(made, rows=slice(None)):
@@ -232,8 +237,8 @@ def test_the_order_of_the_rows_tells_the_directions(noise, bound):
     made["contraction"] = made["contraction"] + 2e-4 * noise * np.random.default_rng(5).normal(
         size=len(made["force"])
     )
-    given = fit_friction(**made)
-    found = fit_friction(**without_direction(made))
+    given = fitted(**made)
+    found = fitted(**without_direction(made))
     assert "directions of motion are those of the rows' order" in " ".join(found.issues)
     for name, true in zip(found.params, (C0, C1), strict=True):
         assert found.params[name].value == pytest.approx(true, rel=max(bound, 1e-3) * 2)
@@ -242,7 +247,7 @@ def test_the_order_of_the_rows_tells_the_directions(noise, bound):
 
 def test_the_order_tells_the_presliding_distance_too():
     made = loops(LEVELS[:3], count=400, presliding=4e-3)
-    found = fit_friction(**without_direction(made), rest_length=REST)
+    found = fitted(**without_direction(made))
     assert found.presliding == pytest.approx(4e-3, rel=0.05)
 
 
@@ -252,7 +257,7 @@ def test_pressure_cycles_at_held_lengths_are_loops(contractions):
     made["contraction"] = made["contraction"] + 3e-4 * np.random.default_rng(1).normal(
         size=len(made["force"])
     )
-    fit = fit_friction(**made, rest_length=REST)
+    fit = fitted(**made)
     assert fit.isometric
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.02)
     assert fit.params["friction_pressure_slope"].value == pytest.approx(C1, rel=0.04)
@@ -266,12 +271,12 @@ def test_pressure_cycles_at_held_lengths_are_loops(contractions):
 def test_pressure_steps_at_a_held_length_are_enough():
     """Sixteen steps up and down, one reading each."""
     made = pressure_loops([0.1], count=16, cycles=1)
-    fit = fit_friction(**made)
+    fit = fitted(**made)
     assert fit.params["friction_coefficient"].value == pytest.approx(C0, rel=0.01)
     one_way = without_direction(pressure_loops([0.05, 0.1], count=16, cycles=1))
     rising = np.tile(np.arange(32) < 16, 2)
     with pytest.raises(RecordingError, match="over pressure and back at each length"):
-        fit_friction(**{name: values[rising] for name, values in one_way.items()})
+        fitted(**{name: values[rising] for name, values in one_way.items()})
     few = pressure_loops([0.1], count=7, cycles=1)
     with pytest.raises(RecordingError, match="have both branches at a held length, 8 at least"):
-        fit_friction(**few)
+        fitted(**few)

@@ -7,10 +7,10 @@ from __future__ import annotations
 import re
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import typer
 
@@ -28,8 +28,10 @@ if TYPE_CHECKING:
 __all__ = [
     "GEOMETRY",
     "QUANTITY",
+    "Contents",
     "as_given",
     "check_writable",
+    "document",
     "exact",
     "named_muscle",
     "progress",
@@ -155,14 +157,25 @@ def usable_samples(
     }
 
 
-def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]], told: str = "") -> None:
-    """Write every file and say so, then print what was found; a file that fails does not keep the
-    others, or the text, from coming.
+#: What is to be in each file, or what writes it, given its path; None where no file is wanted.
+Contents: TypeAlias = dict[Path | None, "str | bytes | Callable[[Path], object]"]
+
+
+def document(schema: str, **content: Any) -> str:
+    """A result as JSON, its schema first."""
+    import json
+
+    return json.dumps({"schema": schema, **content}, indent=1, allow_nan=False) + "\n"
+
+
+def write(contents: Contents, told: str = "") -> None:
+    """Write every file that is wanted and say so, then print what was found; a file that fails does
+    not keep the others, or the text, from coming.
 
     Parameters
     ----------
-    contents : mapping of Path to str, bytes or callable
-        What is to be in each file, or what writes it, given its path.
+    contents : dict of Path or None to str, bytes or callable
+        The files.
     told : str, optional
         What was found, as text.
 
@@ -179,6 +192,8 @@ def write(contents: Mapping[Path, str | bytes | Callable[[Path], object]], told:
     failed: list[str] = []
     refused: ParameterError | None = None
     for path, content in contents.items():
+        if path is None:
+            continue
         try:
             if callable(content):
                 content(path)

@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
-from pamrs.cli._shared import check_writable, exact, named_muscle, write
+from pamrs.cli._shared import Contents, check_writable, document, exact, named_muscle, write
 from pamrs.cli._streams import terminal
+from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.design import (
@@ -93,26 +94,29 @@ def _joint(
     check_writable(png, json, rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
+    from pamrs._writing import write_atomically
     from pamrs.units import bar_and_psi
 
-    draw = None if png is None else _picture()
+    check_packages("plot", *(["matplotlib"] if png else []))
     problem = _problem(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
     )
     search = _Search(method, evaluations, mutation, seed)
     found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
-    contents: dict[Path, str | bytes | Callable[[Path], object]] = {}
-    if json is not None:
-        contents[json] = _json(title, found)
-    if rig_joint is not None:
-        contents[rig_joint] = found.design.to_toml()
-    if png is not None and draw is not None:
-        from pamrs._writing import write_atomically
+    caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
 
-        caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
-        shown = {"comparison": found.comparison, "front": found.front}
-        contents[png] = lambda path: write_atomically(path, draw(found.design, caption, **shown))
+    def draw(path: Path) -> None:
+        from pamrs.design.figures import summary_png
+
+        picture = summary_png(found.design, caption, comparison=found.comparison, front=found.front)
+        write_atomically(path, picture)
+
+    contents: Contents = {
+        json: _document(title, found),
+        rig_joint: found.design.to_toml(),
+        png: draw,
+    }
     write(contents, f"{title}\n{_summary(found)}")
 
 
@@ -249,17 +253,6 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 # ------------------------------------------------------------------------ outputs
 
 
-def _picture() -> Callable[..., bytes]:
-    """What draws a design; its error names the packages that are missing."""
-    from pamrs.errors import missing_package
-
-    try:
-        from pamrs.design.figures import summary_png
-    except ImportError as error:
-        raise missing_package(error, "plot") from error
-    return summary_png
-
-
 def _summary(found: _Found) -> str:
     """What goes to standard output behind the title."""
     from pamrs.units import bar_and_psi
@@ -331,26 +324,21 @@ def _front_table(front: ParetoFront) -> str:
     return "\n".join(lines)
 
 
-def _json(title: str, found: _Found) -> str:
-    import json
-
+def _document(title: str, found: _Found) -> str:
     problem = found.design.problem
-    document = {
-        "schema": SCHEMA,
-        "title": title,
-        "problem": {
+    keys = ("count", "torque", "min_angle", "max_angle")
+    return document(
+        SCHEMA,
+        title=title,
+        problem={
             "muscle": problem.muscle.parameters,
-            "count": problem.count,
-            "torque": problem.torque,
-            "min_angle": problem.min_angle,
-            "max_angle": problem.max_angle,
+            **{key: getattr(problem, key) for key in keys},
             "bounds": {name: list(pair) for name, pair in problem.bounds.items()},
             "max_contraction": problem.max_contraction,
         },
-        "design": found.design.to_dict(),
-        "minimum_pressure": None if found.lowest is None else found.lowest.to_dict(),
-        "least_pressure": None if found.strict is None else found.strict.to_dict(),
-        "comparison": None if found.comparison is None else found.comparison.rows(),
-        "front": None if found.front is None else found.front.to_dict(),
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
+        design=found.design.to_dict(),
+        minimum_pressure=None if found.lowest is None else found.lowest.to_dict(),
+        least_pressure=None if found.strict is None else found.strict.to_dict(),
+        comparison=None if found.comparison is None else found.comparison.rows(),
+        front=None if found.front is None else found.front.to_dict(),
+    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,6 +10,7 @@ import typer
 from pamrs._files import resolved
 from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
+    Contents,
     check_writable,
     exact,
     progress,
@@ -138,14 +138,14 @@ def diagnose_command(
 
     with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded, consider=consider or ())
-    files: dict[Path | None, Callable[[Path], object]] = {
+    files: Contents = {
         json: result.to_json,
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
         _playable(result, experiment): lambda path: write_atomically(path, _commands(result)),
         png: result.figure,
         report: result.report,
     }
-    write({path: how for path, how in files.items() if path is not None}, result.summary())
+    write(files, result.summary())
 
 
 def _playable(result: Diagnosis, file: Path | None) -> Path | None:
@@ -213,5 +213,4 @@ def _plan(
     )
     with progress(f"planning for {loaded.name}"):
         result = plan_diagnosis(loaded, given, noise=noise)
-    files = {} if json is None else {json: dumps(result.to_dict(), indent=2) + "\n"}
-    write(files, result.text())
+    write({json: dumps(result.to_dict(), indent=2) + "\n"}, result.text())

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
 from pamrs.cli._shared import (
     GEOMETRY,
+    Contents,
     check_writable,
+    document,
     named_muscle,
     progress,
     quantity,
@@ -23,7 +25,7 @@ from pamrs.cli._shared import (
 from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
-    from pamrs.fit import ForceMap, FrictionFit, MapFit, ModelComparison, MuscleFit
+    from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
     from pamrs.rig import Muscle, Rig
 
 __all__ = ["fit_app"]
@@ -31,7 +33,6 @@ __all__ = ["fit_app"]
 SCHEMA: Final = "pamrs.muscle_fit/1"
 FRICTION_SCHEMA: Final = "pamrs.friction_fit/1"
 MAP_SCHEMA: Final = "pamrs.map_fit/1"
-_Contents: TypeAlias = dict[Path, str | bytes | Callable[[Path], object]]
 _MODULI: Final = {"modulus_slope": "dimensionless"}
 
 
@@ -154,80 +155,41 @@ def _muscle(
     allow_outside: _Outside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    outputs = _Outputs(report=report, rig=rig, json=json, png=png)
-    _check_outputs(outputs, per_level=per_level)
-    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    inputs = _inputs(data, muscle, sizes, where or [], clipped, allow_outside)
-    shape, notes = _shape(inputs, model, geometry, levels, free, prior, noise)
-    asked = _Asked(model, order, "per_level" if per_level else "linear", friction, compare)
-    summary, contents = _results(inputs, asked, shape, notes, _command(context), outputs)
-    write(contents, summary)
-    if rig is not None and inputs.rig is None:
-        typer.echo(
-            (
-                f"{rig} is the muscle on a load frame: simulate it with a length, or give it "
-                "[joint] and [arm]"
-            ),
-            err=True,
-        )
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """How a muscle is to be fitted, beside what a comparison takes too."""
-
-    model: str | None
-    order: int | None
-    moduli: str
-    friction: FrictionChoice | None
-    compare: bool
-
-
-def _check_outputs(outputs: _Outputs, *, per_level: bool) -> None:
-    """Refuse files that cannot be written, before any work."""
-    report, rig, png = outputs.report, outputs.rig, outputs.png
-    check_writable(report, rig, outputs.json, png)
+    check_writable(report, rig, json, png)
     drawn = ["matplotlib"] if report or png else []
     check_packages("report", *(["jinja2", "markupsafe"] if report else []), *drawn)
     if per_level and rig is not None:
         raise typer.BadParameter(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
         )
-
-
-def _results(
-    inputs: _Inputs,
-    asked: _Asked,
-    shape: dict[str, Any],
-    notes: Sequence[str],
-    command: str,
-    outputs: _Outputs,
-) -> tuple[str, _Contents]:
-    """What to say of a fit, and every file to write."""
-    from pamrs.fit import FitError
+    inputs = _inputs(context)
+    shape, notes = _shape(context, inputs)
+    from pamrs.fit import FitError, fit_muscle
+    from pamrs.fit import report as pages
 
     with progress(f"fitting {inputs.data.label}"):
         try:
-            fit, comparison, rubbing, words = _fitted(inputs, asked, shape)
-            contents = _contents(fit, comparison, rubbing, command, inputs.rig, outputs)
-            return _summary(fit, comparison, words, notes), contents
+            start, rubbing, words = _rubbing(inputs, friction, model, shape["levels"])
+            moduli = "per_level" if per_level else "linear"
+            fit = fit_muscle(inputs.data, start, model=model, order=order, moduli=moduli, **shape)
+            comparison = _comparison(inputs.data, start, fit.order, shape) if compare else None
+            summary = _summary(fit, comparison, words, notes)
         except FitError as error:
             raise FitError("; ".join([str(error), *inputs.data.notes])) from error
-
-
-def _fitted(
-    inputs: _Inputs, asked: _Asked, shape: dict[str, Any]
-) -> tuple[MuscleFit, ModelComparison | None, FrictionFit | None, str]:
-    """The fit, every model beside it if that is asked for, and the friction with what to say of
-    it.
-    """
-    from pamrs.fit import fit_muscle
-
-    map_, model = inputs.data, asked.model
-    start, rubbing, words = _rubbing(map_, inputs.muscle, asked.friction, model, shape["levels"])
-    fit = fit_muscle(map_, start, model=model, order=asked.order, moduli=asked.moduli, **shape)
-    comparison = _comparison(map_, start, fit.order, shape) if asked.compare else None
-    return fit, comparison, rubbing, words
+    command = _command(context)
+    contents: Contents = {
+        json: _muscle_document(fit, comparison, rubbing, context),
+        rig: fit.to_rig(inputs.rig).to_toml_text() if rig else "",
+        png: lambda path: pages.write_figure(fit, path, comparison),
+        report: lambda path: pages.write_report(fit, path, comparison, command=command),
+    }
+    write(contents, summary)
+    if rig is not None and inputs.rig is None:
+        typer.echo(
+            f"{rig} is the muscle on a load frame: simulate it with a length, or give it [joint] "
+            "and [arm]",
+            err=True,
+        )
 
 
 @fit_app.command("map")
@@ -257,17 +219,15 @@ def _map(
     that no force model has to fit. Its geometry gives the volume only.
     """
     check_writable(rig, json)
-    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    inputs = _inputs(data, muscle, sizes, where or [], clipped, allow_outside)
+    inputs = _inputs(context)
     from pamrs.fit import fit_map
 
     with progress(f"fitting {inputs.data.label}"):
         fit = fit_map(inputs.data, nodes=nodes)
-    contents: _Contents = {}
-    if json is not None:
-        contents[json] = _map_json(fit, inputs.data, _command(context))
-    if rig is not None:
-        contents[rig] = fit.to_rig(inputs.muscle, inputs.rig).to_toml_text()
+    contents: Contents = {
+        json: _document(MAP_SCHEMA, inputs.data, context, fit=fit.to_dict()),
+        rig: fit.to_rig(inputs.muscle, inputs.rig).to_toml_text() if rig else "",
+    }
     write(contents, f"{inputs.data.label}: {fit.fit_report()}")
 
 
@@ -299,26 +259,23 @@ def _friction(
     """
     check_writable(json, png)
     check_packages("report", *(["matplotlib"] if png else []))
-    sizes = _stated(rest_length, rest_diameter, braid_angle, wall_thickness)
-    map_ = _loops(data, muscle, sizes, where or [], clipped, allow_outside).with_directions()
+    map_ = _loops(context).with_directions()
+    from pamrs._writing import write_atomically
     from pamrs.fit import fit_friction
+    from pamrs.fit.report import render_friction_png
 
     with progress(f"fitting {map_.label}"):
         fit = fit_friction(map_, floor=floor)
-    contents: _Contents = {}
-    if json is not None:
-        contents[json] = _friction_json(fit, map_, _command(context))
-    if png is not None:
-        from pamrs._writing import write_atomically
-        from pamrs.fit.report import render_friction_png
-
-        contents[png] = lambda path: write_atomically(path, render_friction_png(fit, map_))
+    rows = len(map_)
+    contents: Contents = {
+        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit.to_dict()),
+        png: lambda path: write_atomically(path, render_friction_png(fit, map_)),
+    }
     write(contents, f"{map_.label}: {fit.fit_report()}")
 
 
 def _rubbing(
-    data: ForceMap,
-    muscle: Muscle,
+    inputs: _Inputs,
     choice: FrictionChoice | None,
     model: str | None,
     pressures: Sequence[float] | None,
@@ -329,23 +286,15 @@ def _rubbing(
     Unasked, friction is fitted where the rows have both directions and the muscle has none; not for
     the elbow's model, which has a branch of its own for lengthening.
     """
-    import numpy as np
-
     from pamrs.errors import RecordingError
     from pamrs.fit import fit_friction
     from pamrs.fit.remarks import friction_words
 
-    given = muscle.parameters
-    bare = dict.fromkeys(("friction_coefficient", "friction_pressure_slope", "friction_floor"), 0.0)
+    data, muscle = inputs.data, inputs.muscle
     if choice is FrictionChoice.none:
-        return muscle.replace(**bare), None, ""
-    way = data.direction[data.used]
-    loops = bool(np.any(way < 0) and np.any(way > 0))
-    alone = (
-        loops
-        and not any(given[name] for name in bare)
-        and (model or muscle.model) != "elbow_linear"
-    )
+        return muscle.without_friction(), None, ""
+    loops = data.has_loops
+    alone = loops and not muscle.has_friction and (model or muscle.model) != "elbow_linear"
     if choice is FrictionChoice.muscle or (choice is None and not alone):
         law = friction_words(muscle) if loops else ""
         return muscle, None, f"friction as the muscle has it: {law}" if law else ""
@@ -359,24 +308,15 @@ def _rubbing(
     if choice is None and not found.ndata:
         return muscle, None, f"friction: none, no pressure's c_F is above {found.floor:g}"
     if choice is None and not found.told:
-        return (
-            muscle,
-            None,
-            (
-                "friction: none, the loops do not tell it from their scatter (--friction fit takes "
-                "it all the same)"
-            ),
-        )
+        words = "the loops do not tell it from their scatter (--friction fit takes it all the same)"
+        return muscle, None, f"friction: none, {words}"
     c0, c1 = found.params["friction_coefficient"], found.params["friction_pressure_slope"]
     line = (
         f"c0 = {c0.value:.4g} +- {c0.stderr:.2g}, c1 = {1e6 * c1.value:.4g} +- "
         f"{1e6 * c1.stderr:.2g} 1/MPa"
     )
-    return (
-        found.to_muscle(muscle),
-        found,
-        f"friction, fitted to the loops before the moduli: {line}",
-    )
+    words = f"friction, fitted to the loops before the moduli: {line}"
+    return found.to_muscle(muscle), found, words
 
 
 def _comparison(
@@ -411,37 +351,13 @@ class _Inputs:
     rig: Rig | None = None
 
 
-def _stated(
-    rest_length: str | None,
-    rest_diameter: str | None,
-    braid_angle: str | None,
-    wall_thickness: str | None,
-) -> dict[str, str]:
-    """The sizes that were given, by their name in :data:`GEOMETRY`."""
-    sizes = {
-        "rest_length": rest_length,
-        "rest_diameter": rest_diameter,
-        "braid_angle": braid_angle,
-        "wall_thickness": wall_thickness,
-    }
-    return {name: text for name, text in sizes.items() if text is not None}
-
-
-def _shape(
-    inputs: _Inputs,
-    model: str | None,
-    geometry: str | None,
-    levels: str | None,
-    free: str | None,
-    prior: str | None,
-    noise: str | None,
-) -> tuple[dict[str, Any], list[str]]:
+def _shape(context: typer.Context, inputs: _Inputs) -> tuple[dict[str, Any], list[str]]:
     """What a fit and a comparison both take, and notes on what is not used."""
     from pamrs.rig.muscle_models import ELASTIC_PARAMETERS
 
-    pressures = None
-    if levels is not None:
-        pressures = [quantity("levels", text, "pressure")[0] for text in levels.split(",")]
+    keys = ("model", "geometry", "levels", "free", "prior", "noise")
+    model, geometry, levels, free, prior, noise = (context.params[key] for key in keys)
+    texts = [] if levels is None else levels.split(",")
     names = [name.strip().replace("-", "_") for name in (free or "").split(",") if name.strip()]
     # a description may know of coefficients that another model has
     own = {*GEOMETRY, *ELASTIC_PARAMETERS.get(model or inputs.muscle.model, ())}
@@ -457,74 +373,67 @@ def _shape(
         "geometry": geometry,
         "free": names,
         "tolerance": known,
-        "levels": pressures,
+        "levels": [quantity("levels", text, "pressure")[0] for text in texts] or None,
         "noise": inputs.noise if noise is None else _noise(noise, inputs.data),
     }
     return shape, notes
 
 
-def _inputs(
-    data: Path,
-    muscle: str | None,
-    sizes: Mapping[str, str],
-    where: Sequence[str],
-    clipped: str | None,
-    allow_outside: bool,
-) -> _Inputs:
+def _inputs(context: typer.Context) -> _Inputs:
     """From a description, or from a table and the options."""
     from pamrs.errors import ParameterError
 
+    given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
-        given = ["--muscle"] if muscle is not None else []
-        given += [f"--{name.replace('_', '-')}" for name in sizes] + (["--where"] if where else [])
-        given += ["--clipped"] if clipped is not None else []
-        if given:
+        beside = [key for key in ("muscle", *GEOMETRY, "where", "clipped") if given[key]]
+        if beside:
             raise ParameterError(
-                f"{', '.join(given)} cannot be given: {data} describes its table and its muscle "
-                "itself"
+                f"{', '.join(map(_option, beside))} cannot be given: {data} describes its table "
+                "and its muscle itself"
             )
         from pamrs.fit import load_measured_muscle
 
-        measured = load_measured_muscle(data, allow_outside=allow_outside)
+        measured = load_measured_muscle(data, allow_outside=given["allow_outside"])
         return _Inputs(measured.data, measured.muscle, measured.tolerance, measured.noise)
-    start, tolerance, base = _start(muscle, sizes)
-    map_ = _table(data, float(start.parameters["rest_length"]), where, clipped)
+    start, tolerance, base = _start(given)
+    map_ = _table(given, float(start.parameters["rest_length"]))
     return _Inputs(map_.checked_against(start), start, tolerance, rig=base)
 
 
-def _table(data: Path, rest_length: float, where: Sequence[str], clipped: str | None) -> ForceMap:
+def _option(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _table(given: Mapping[str, Any], rest_length: float) -> ForceMap:
     """The map of a table."""
     from pamrs.fit import load_force_map
 
+    clipped = given["clipped"]
     return load_force_map(
-        data,
+        given["data"],
         rest_length=rest_length,
-        where=dict(_filter(text) for text in where) or None,
+        where=dict(map(_filter, given["where"] or [])) or None,
         clipped=None if clipped is None else quantity("clipped", clipped, "force")[0],
     )
 
 
-def _loops(
-    data: Path,
-    muscle: str | None,
-    sizes: Mapping[str, str],
-    where: Sequence[str],
-    clipped: str | None,
-    allow_outside: bool,
-) -> ForceMap:
+def _loops(context: typer.Context) -> ForceMap:
     """The map of hysteresis loops: friction needs the rest length alone, any other size is for the
     check of the forces.
     """
     from pamrs.errors import ParameterError
 
-    if data.suffix.lower() == ".toml" or muscle is not None or set(sizes) - {"rest_length"}:
-        return _inputs(data, muscle, sizes, where, clipped, allow_outside).data
+    given = context.params
+    sizes = {name for name in GEOMETRY if given[name] is not None}
+    described = given["data"].suffix.lower() == ".toml"
+    if described or given["muscle"] is not None or sizes - {"rest_length"}:
+        return _inputs(context).data
     if not sizes:
         raise ParameterError(
             "the rest length is missing: give --rest-length (like '300 mm'), or --muscle with a "
             "rig file or a name of the library"
         )
-    return _table(data, quantity("rest_length", sizes["rest_length"], "length")[0], where, clipped)
+    return _table(given, quantity("rest_length", given["rest_length"], "length")[0])
 
 
 def _prior(text: str | None) -> dict[str, float]:
@@ -564,23 +473,21 @@ def _filter(text: str) -> tuple[str, str]:
     return column.strip(), value.strip()
 
 
-def _start(
-    muscle: str | None, sizes: Mapping[str, str]
-) -> tuple[Muscle, dict[str, float], Rig | None]:
+def _start(given: Mapping[str, Any]) -> tuple[Muscle, dict[str, float], Rig | None]:
     """The nominal muscle, what is known of it, and the rig that it is of."""
     from pamrs.errors import ParameterError
     from pamrs.rig import Muscle
 
     values: dict[str, Any] = {}
     tolerance: dict[str, float] = {}
-    for name, text in sizes.items():
-        values[name], spread = quantity(name, text, GEOMETRY[name])
-        if spread is not None:
-            tolerance[name] = spread
-    if muscle is not None:
-        base, known, rig = named_muscle(muscle)
+    for name, dimension in GEOMETRY.items():
+        if given[name] is not None:
+            values[name], spread = quantity(name, given[name], dimension)
+            tolerance |= {} if spread is None else {name: spread}
+    if given["muscle"] is not None:
+        base, known, rig = named_muscle(given["muscle"])
         return base.replace(**values), {**known, **tolerance}, rig
-    lacking = [f"--{name.replace('_', '-')}" for name in GEOMETRY if name not in values]
+    lacking = [_option(name) for name in GEOMETRY if name not in values]
     if lacking:
         raise ParameterError(
             f"the geometry of the muscle is missing: give {', '.join(lacking)} (like --rest-length "
@@ -613,46 +520,11 @@ def _summary(
     return text if comparison is None else f"{text}\n{comparison.to_text()}"
 
 
-@dataclass(frozen=True)
-class _Outputs:
-    """The files to write."""
-
-    report: Path | None
-    rig: Path | None
-    json: Path | None
-    png: Path | None
-
-
-def _contents(
-    fit: MuscleFit,
-    comparison: ModelComparison | None,
-    friction: FrictionFit | None,
-    command: str,
-    base: Rig | None,
-    files: _Outputs,
-) -> _Contents:
-    """Every file to write with its content, or what draws it: what is text comes first."""
-    from pamrs.fit import report as pages
-
-    contents: _Contents = {}
-    if files.json is not None:
-        contents[files.json] = _json(fit, comparison, friction, command)
-    if files.rig is not None:
-        contents[files.rig] = fit.to_rig(base).to_toml_text()
-    if files.png is not None:
-        contents[files.png] = lambda path: pages.write_figure(fit, path, comparison)
-    if files.report is not None:
-        contents[files.report] = lambda path: pages.write_report(
-            fit, path, comparison, command=command
-        )
-    return contents
-
-
 def _command(context: typer.Context) -> str:
     """The command line that gives this result again."""
     words = ["pamrs", "fit", str(context.info_name), str(context.params["data"])]
     for name, value in context.params.items():
-        option = f"--{name.replace('_', '-')}"
+        option = _option(name)
         if value is True:
             words.append(option)
         elif isinstance(value, (list, tuple)):
@@ -662,49 +534,29 @@ def _command(context: typer.Context) -> str:
     return shlex.join(words)
 
 
-def _json(
-    fit: MuscleFit, comparison: ModelComparison | None, friction: FrictionFit | None, command: str
-) -> str:
-    import json
+def _document(schema: str, data: ForceMap, context: typer.Context, **found: Any) -> str:
+    """A result with what it was made of."""
+    made = {"name": data.label, "source": data.source, "command": _command(context)}
+    return document(schema, **made, **found)
 
+
+def _muscle_document(
+    fit: MuscleFit,
+    comparison: ModelComparison | None,
+    friction: FrictionFit | None,
+    context: typer.Context,
+) -> str:
     from pamrs.fit.remarks import cross_validation
 
     cross, _ = cross_validation(fit)
-    document = {
-        "schema": SCHEMA,
-        "name": fit.data.label,
-        "source": fit.data.source,
-        "command": command,
-        "issues": fit.data.issues,
-        "rows": len(fit.data),
-        "friction": None if friction is None else friction.to_dict(),
-        "fit": fit.to_dict(),
-        "leave_one_pressure_out": None if cross is None else cross.to_dict(),
-        "comparison": None if comparison is None else comparison.to_dicts(),
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"
-
-
-def _friction_json(fit: FrictionFit, data: ForceMap, command: str) -> str:
-    import json
-
-    document = {
-        "schema": FRICTION_SCHEMA,
-        "name": data.label,
-        "source": data.source,
-        "command": command,
-        "rows": len(data),
-    }
-    return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"
-
-
-def _map_json(fit: MapFit, data: ForceMap, command: str) -> str:
-    import json
-
-    document = {
-        "schema": MAP_SCHEMA,
-        "name": data.label,
-        "source": data.source,
-        "command": command,
-    }
-    return json.dumps({**document, "fit": fit.to_dict()}, indent=1, allow_nan=False) + "\n"
+    return _document(
+        SCHEMA,
+        fit.data,
+        context,
+        issues=fit.data.issues,
+        rows=len(fit.data),
+        friction=None if friction is None else friction.to_dict(),
+        fit=fit.to_dict(),
+        leave_one_pressure_out=None if cross is None else cross.to_dict(),
+        comparison=None if comparison is None else comparison.to_dicts(),
+    )

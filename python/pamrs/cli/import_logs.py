@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from pamrs._files import is_inside, resolved
-from pamrs.cli._shared import as_given, exact, progress, rig_named, write
+from pamrs.cli._shared import Contents, as_given, exact, progress, rig_named, write
 
 if TYPE_CHECKING:
     from pamrs.recordings import LogProposal
@@ -77,7 +77,7 @@ def import_command(
     for item in proposal.logs:
         _show(item)
     folder = out or Path()
-    contents: dict[Path, str | bytes] = {}
+    contents: Contents = {}
     named = "rig.toml"
     if rig is not None and rig.exists():
         named = Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix()

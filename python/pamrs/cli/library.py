@@ -37,13 +37,10 @@ def library_command(
         typer.echo(_facts() if facts else text.overview())
         return
     shown = text.description(name)
-    contents: dict[Path, str | bytes] = {}
-    if rig is not None:
-        from pamrs.library import entry
-        from pamrs.rigs import bench
+    from pamrs.library import entry
+    from pamrs.rigs import bench
 
-        contents[rig] = bench(entry(name).muscle, name).to_toml_text()
-    write(contents, shown)
+    write({rig: bench(entry(name).muscle, name).to_toml_text() if rig else ""}, shown)
 
 
 def _facts() -> str:

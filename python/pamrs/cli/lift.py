@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import as_given, check_writable, exact, rig_named, write
+from pamrs.cli._shared import as_given, check_writable, document, exact, rig_named, write
 from pamrs.errors import check_packages
 
 __all__ = ["lift_command"]
@@ -57,12 +56,4 @@ def lift_command(
         pressure=None if pressure is None else exact("pressure", pressure, "pressure"),
         to=None if to is None else exact("to", to, "angle"),
     )
-    import json as encoder
-
-    document = {"schema": SCHEMA, **result.to_dict()}
-    files: dict[Path | None, str | Callable[[Path], object]] = {
-        json: encoder.dumps(document, indent=1, allow_nan=False) + "\n",
-        png: result.plot,
-    }
-    found = {path: content for path, content in files.items() if path is not None}
-    write(found, result.summary())
+    write({json: document(SCHEMA, **result.to_dict()), png: result.plot}, result.summary())

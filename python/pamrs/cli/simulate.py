@@ -4,7 +4,6 @@ line.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +11,7 @@ import typer
 
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
+    Contents,
     check_writable,
     exact,
     progress,
@@ -121,12 +121,12 @@ def simulate_command(
             unit, factor = laboratory_unit(name)
             told = f"{name}: rms difference from the recording {factor * rms:.4g}"
             lines.append(with_unit(told, unit))
-    files: dict[Path | None, Callable[[Path], object]] = {
+    files: Contents = {
         output: lambda path: _write_csv(path, result),
         plot: lambda path: result.plot(path, recorded=recorded),
         animation: lambda path: _animate(path, result, speed),
     }
-    write({path: how for path, how in files.items() if path is not None}, "\n".join(lines))
+    write(files, "\n".join(lines))
 
 
 def _animate(path: Path, result: Simulation, speed: float) -> None:

@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import QUANTITY, as_given, check_writable, exact, named_muscle, write
+from pamrs.cli._shared import (
+    QUANTITY,
+    as_given,
+    check_writable,
+    document,
+    exact,
+    named_muscle,
+    write,
+)
 
 if TYPE_CHECKING:
-    from pamrs.design.sizing import Candidate, Filling, Requirement, SizingResult
+    from pamrs.design.sizing import Candidate, Filling, Requirement
 
 __all__ = ["size_command"]
 
@@ -75,21 +84,22 @@ def size_command(
     working = None if pressure is None else _size("pressure", pressure, "pressure")
     candidates = [_candidate(name, working) for name in muscle or library.names()]
     result = size(candidates, requirement, filling=filling, core=free, max_count=max_count)
-    contents: dict[Path, str | bytes] = (
-        {} if json is None else {json: _json(result, requirement, filling, free, max_count)}
-    )
-    area, supplied, dead = (
-        filling.area * 1e6,
-        filling.supply_pressure / 1e5,
-        filling.dead_volume * 1e3,
-    )
     lines = [
         f"required: {', '.join(point)}",
-        f"valve {area:.4g} mm2, supply {supplied:.4g} bar, dead volume {dead:.4g} l\n",
+        f"valve {filling.area * 1e6:.4g} mm2, supply {filling.supply_pressure / 1e5:.4g} bar, "
+        f"dead volume {filling.dead_volume * 1e3:.4g} l\n",
         result.table(),
         *_remarks(candidates),
     ]
-    write(contents, "\n".join(lines))
+    written = document(
+        SCHEMA,
+        requirement={"position": requirement.position, "points": requirement.array.tolist()},
+        filling=asdict(filling),
+        core=free,
+        max_count=max_count,
+        **result.to_dict(),
+    )
+    write({json: written}, "\n".join(lines))
 
 
 # ------------------------------------------------------------------------- inputs
@@ -198,20 +208,3 @@ def _remarks(candidates: Sequence[Candidate]) -> list[str]:
         for item in candidates
         if item.pressure > tested.get(item.name, item.pressure) * (1.0 + 1e-9)
     ]
-
-
-def _json(
-    result: SizingResult, requirement: Requirement, filling: Filling, core: float, max_count: int
-) -> str:
-    import json
-    from dataclasses import asdict
-
-    document = {
-        "schema": SCHEMA,
-        "requirement": {"position": requirement.position, "points": requirement.array.tolist()},
-        "filling": asdict(filling),
-        "core": core,
-        "max_count": max_count,
-        **result.to_dict(),
-    }
-    return json.dumps(document, indent=1, allow_nan=False) + "\n"

@@ -15,12 +15,11 @@ if TYPE_CHECKING:
     from pamrs.fit._bench import from_recording
     from pamrs.fit._compare import ModelComparison, compare_models
     from pamrs.fit._data import ForceMap
-    from pamrs.fit._engine import fit_muscle
     from pamrs.fit._friction import FrictionFit, fit_friction
     from pamrs.fit._load import MeasuredMuscle, load_force_map, load_measured_muscle
     from pamrs.fit._map import MapFit, fit_map
     from pamrs.fit._result import MuscleFit
-    from pamrs.fit._solution import COEFFICIENTS, GEOMETRY
+    from pamrs.fit._solution import COEFFICIENTS, GEOMETRY, fit_muscle
     from pamrs.fit._statistics import FitParameter
     from pamrs.fit._validation import CrossValidation, PressureErrors
 
@@ -61,7 +60,7 @@ _HOMES: Final[dict[str, str]] = {
     "compare_models": "_compare",
     "fit_friction": "_friction",
     "fit_map": "_map",
-    "fit_muscle": "_engine",
+    "fit_muscle": "_solution",
     "from_recording": "_bench",
     "load_force_map": "_load",
     "load_measured_muscle": "_load",

@@ -185,13 +185,8 @@ def outlying(problem: Problem, found: Estimate, rows: Mask) -> list[tuple[int, f
         Place among the fitted rows and weighted error of the prediction from the others. Empty with
         few points to spare, and when more than 5 stand apart: then it is the model that errs.
     """
-    prior = np.concatenate(
-        [problem.expected(found.design)[1], [1.0 / free.tolerance for free in problem.free]]
-    )
-    matrix, residual = (
-        np.vstack([found.jacobian, np.diag(found.sigma * prior)]),
-        found.residual.copy(),
-    )
+    prior = found.sigma * problem.information(found.design)
+    matrix, residual = np.vstack([found.jacobian, np.diag(prior)]), found.residual.copy()
     count = len(residual)
     places = np.arange(count)
     apart: list[tuple[int, float]] = []
@@ -240,11 +235,7 @@ def _loops(problem: Problem, found: Estimate, rows: Mask) -> list[str]:
     branch of its own for it.
     """
     way, force = problem.direction[rows], problem.force[rows]
-    given = problem.blank.parameters
-    rubs = any(
-        given[name]
-        for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor")
-    )
+    rubs = problem.blank.has_friction
     if len(way) and not rubs and np.all(way == way[0]) and way[0] != 0:
         word = "contracting" if way[0] < 0 else "lengthening"
         return [f"all rows are {word}: friction cannot be determined and is in the moduli"]

@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import FAR
 from pamrs.fit._design import CONSTANTS, template
-from pamrs.fit._engine import fit_muscle
 from pamrs.fit._result import MuscleFit
-from pamrs.fit._solution import COEFFICIENTS, has_effect, level_indices
+from pamrs.fit._solution import COEFFICIENTS, fit_muscle, has_effect, level_indices
 from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODELS
 
 if TYPE_CHECKING:
@@ -308,12 +307,7 @@ def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, 
     """A note where the rows are loops and the muscle has no friction: only one model then has two
     branches.
     """
-    way = data.direction[data.used]
-    rubs = any(
-        muscle.parameters[name]
-        for name in ("friction_coefficient", "friction_pressure_slope", "friction_floor")
-    )
-    if direction is None or rubs or not (np.any(way < 0) and np.any(way > 0)):
+    if direction is None or muscle.has_friction or not data.has_loops:
         return ()
     return (
         "the rows are loops and the muscle has no friction: only elbow_linear has a branch for "
@@ -322,28 +316,11 @@ def _loops(data: ForceMap, muscle: Muscle, direction: str | None) -> tuple[str, 
     )
 
 
-_EMPTY: dict[str, Any] = dict.fromkeys(
-    (
-        ("rank"),
-        ("reason"),
-        ("condition_number"),
-        ("rms"),
-        ("max"),
-        ("lopo_rms"),
-        ("lopo_max"),
-        ("lopo_stderr"),
-        ("lopo_interior_rms"),
-        ("lopo_end_rms"),
-        ("lopo_excess"),
-        ("lopo_excess_stderr"),
-        ("aicc"),
-        ("bic"),
-        ("subset_rms"),
-        ("subset_max"),
-        ("subset_reason"),
-        ("moved"),
-    )
-)
+_COLUMNS: Final = (
+    "rank", "reason", "condition_number", "rms", "max", "lopo_rms", "lopo_max", "lopo_stderr",
+    "lopo_interior_rms", "lopo_end_rms", "lopo_excess", "lopo_excess_stderr", "aicc", "bic",
+    "subset_rms", "subset_max", "subset_reason", "moved",
+)  # fmt: skip
 
 
 def _level_squares(fit: MuscleFit) -> Array:
@@ -370,7 +347,7 @@ def _candidate(
         "order": settings["order"],
         "nvarys": _unknowns(settings),
         "recommended": False,
-        **_EMPTY,
+        **dict.fromkeys(_COLUMNS),
     }
     try:
         fit = fit_muscle(data, muscle, **settings)

@@ -45,9 +45,7 @@ def covariances(problem: Problem, result: Estimate, level: Index) -> tuple[Array
         levels than parameters, or when a level cannot be spared.
     """
     p = result.jacobian.shape[1]
-    prior = np.concatenate(
-        [problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]]
-    )
+    prior = problem.information(result.design)
     jacobian = result.jacobian / result.sigma if result.sigma > 0.0 else result.jacobian
     if p == 0:
         return np.empty((0, 0)), np.empty((0, 0))

@@ -322,6 +322,12 @@ class ForceMap:
             return [f"index {index}" for index in used]
         return [f"row {self.row_numbers[index]}" for index in used]
 
+    @property
+    def has_loops(self) -> bool:
+        """Whether used rows go both ways."""
+        way = self.direction[self.used]
+        return bool(np.any(way < 0) and np.any(way > 0))
+
     def used_rows(self) -> tuple[Array, Array, Array, Index, NDArray[np.int8]]:
         """Pressure [Pa], contraction [1], force [N], level and direction of the used rows, (k,)
         arrays.
@@ -384,10 +390,9 @@ class ForceMap:
         pressure, contraction, _, level, _ = self.used_rows()
         way = np.zeros(len(self), dtype=np.int8)
         way[self.used] = table_ways(contraction, pressure, level)
-        if not (np.any(way < 0) and np.any(way > 0)):
-            return self
         note = "directions of motion are those of the rows' order: no column gives them"
-        return replace(self, direction=way, notes=(*self.notes, note))
+        told = replace(self, direction=way, notes=(*self.notes, note))
+        return told if told.has_loops else self
 
     def level_indices(self, pressures: Sequence[float]) -> list[int]:
         """Indices of the levels nearest to some pressures.

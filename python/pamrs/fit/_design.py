@@ -227,9 +227,7 @@ def _parts(
     has its own.
     """
     if muscle.model == "elbow_linear" and np.any(direction > 0):
-        still = muscle.replace(
-            friction_coefficient=0.0, friction_pressure_slope=0.0, friction_floor=0.0
-        )
+        still = muscle.without_friction()
         way = np.where(direction == 0, -1.0, direction)
         gas = still.force(pressure, contraction, direction=way)
         loaded = still.replace(bladder_modulus=_UNIT_MODULUS).force(

@@ -139,6 +139,11 @@ class Problem:
                 variance[i] += (factor * known.tolerance) ** 2
         return np.where(np.isfinite(variance), values, 0.0), 1.0 / np.sqrt(variance)
 
+    def information(self, design: Design) -> Array:
+        """``1/tolerance`` of the coefficients and the free geometry (k + q,), 0 without a prior."""
+        free = [1.0 / free.tolerance for free in self.free]
+        return np.concatenate([self.expected(design)[1], free])
+
     def equations(self, design: Design, muscle: Muscle, rows: Mask) -> tuple[Array, Array]:
         """:meth:`system`, and below it one equation for each coefficient with a prior, weighted by
         the noise.
@@ -507,10 +512,7 @@ class _Geometry:
 def _check_identified(problem: Problem, result: Estimate) -> None:
     """Refuse a geometry that neither the data nor a tolerance determines."""
     names = (*result.design.names, *(free.name for free in problem.free))
-    information = np.concatenate(
-        [problem.expected(result.design)[1], [1.0 / free.tolerance for free in problem.free]]
-    )
-    priors = np.diag(result.sigma * information)
+    priors = np.diag(result.sigma * problem.information(result.design))
     loose = [free.name for free in problem.free if math.isinf(free.tolerance)]
     stacked = np.vstack([result.jacobian, priors])
     hint = (

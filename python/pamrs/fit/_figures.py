@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 import math
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
@@ -16,7 +15,7 @@ from matplotlib.colors import LinearSegmentedColormap, Normalize
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from pamrs.report.figures import COLOURS, STYLE, svg_text
+from pamrs.report.figures import COLOURS, STYLE, summary_figure, svg_text
 
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
@@ -120,21 +119,18 @@ def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
         _draw_model(axes, fit, level, contraction[rows], floor, colour)
         rows = thinned(rows)
         face = colour if index in shown else "white"
-        axes.scatter(
-            contraction[rows],
-            data.force[rows],
-            s=size,
-            facecolor=face,
-            edgecolor=colour,
-            lw=1.1,
-            zorder=3,
-        )
+        _dots(axes, contraction[rows], data.force[rows], colour, face, s=size)
     _family_legend(axes, fit, size)
     axes.set_ylim(floor - 0.02 * largest, 1.06 * largest)
     axes.set_xlabel("contraction [%]")
     axes.set_ylabel("pulling force [N]")
     axes.legend(loc="upper right")
     return mpl.cm.ScalarMappable(norm, cmap)
+
+
+def _dots(axes: Axes, x: Any, y: Any, edge: Any, face: Any, **style: Any) -> None:
+    """Marks of one colour, open ones with a white face."""
+    axes.scatter(x, y, facecolor=face, edgecolor=edge, lw=1.1, zorder=3, **style)
 
 
 def _draw_unused(axes: Axes, data: ForceMap, contraction: Array, size: float) -> None:
@@ -177,19 +173,10 @@ def _draw_model(
 def _family_legend(axes: Axes, fit: MuscleFit, size: float) -> None:
     """One entry for each kind of point and line."""
     data, both = fit.data, bool(np.any(fit.data.direction[fit.data.used]))
-    if _fitted_levels(fit) != set(range(len(data.levels))):
-        axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured, fitted")
-        axes.scatter(
-            [],
-            [],
-            s=size,
-            facecolor="white",
-            edgecolor=_INK,
-            lw=1.1,
-            label="measured, left out of the fit",
-        )
-    else:
-        axes.scatter([], [], s=size, facecolor=_INK, edgecolor=_INK, label="measured")
+    part = _fitted_levels(fit) != set(range(len(data.levels)))
+    kinds = {"measured, fitted": _INK, "measured, left out of the fit": "white"}
+    for label, face in kinds.items() if part else [("measured", _INK)]:
+        _dots(axes, [], [], _INK, face, s=size, label=label)
     axes.plot([], [], color=_INK, lw=1.3, label="model, contracting" if both else "model")
     if both:
         axes.plot([], [], color=_INK, lw=1.3, ls=(0, (5, 2)), label="model, lengthening")
@@ -211,11 +198,15 @@ def family_svg(fit: MuscleFit, prefix: str = "family") -> str:
     str
         SVG element. Levels of the fit are filled, others open.
     """
+    return _with_bar(partial(_draw_family, fit=fit), 5.4, prefix, label="pressure [kPa]")
+
+
+def _with_bar(draw: Callable[[Axes], Any], height: float, prefix: str, **bar: Any) -> str:
+    """A panel with a colour bar beside it, as an SVG element."""
     with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 5.4), layout="constrained")
+        figure = Figure(figsize=(10.0, height), layout="constrained")
         axes = figure.subplots()
-        colours = _draw_family(axes, fit)
-        figure.colorbar(colours, ax=axes, label="pressure [kPa]", pad=0.015)
+        figure.colorbar(draw(axes), ax=axes, pad=0.015, **bar)
         return svg_text(figure, prefix)
 
 
@@ -298,15 +289,8 @@ def moduli_svg(
 def _draw_modulus(axes: Axes, line: _Curve | None, points: _Curve | None) -> None:
     if line is not None:
         kpa, mpa, band = line[0] / 1e3, line[1] / 1e6, 2 * line[2] / 1e6
-        axes.fill_between(
-            kpa,
-            mpa - band,
-            mpa + band,
-            color=COLOURS["after"],
-            alpha=0.16,
-            lw=0,
-            label="± 2 standard errors",
-        )
+        shade: dict[str, Any] = {"color": COLOURS["after"], "alpha": 0.16, "lw": 0}
+        axes.fill_between(kpa, mpa - band, mpa + band, label="± 2 standard errors", **shade)
         axes.plot(kpa, mpa, color=COLOURS["after"], lw=1.6, label="one fit of all levels")
     low, high = _span(line, points)
     if points is not None:
@@ -349,26 +333,9 @@ def _draw_errors(axes: Axes, curves: Sequence[ErrorCurve], *, left: bool) -> Non
         fitted = np.zeros(len(levels), dtype=bool) if left else curve.fitted
         axes.plot(levels / 1e3, 100 * rms, color=colour, lw=1.1, zorder=2)
         for rows, face in ((fitted, colour), (~fitted, "white")):
-            axes.scatter(
-                levels[rows] / 1e3,
-                100 * rms[rows],
-                marker=mark,
-                s=24,
-                facecolor=face,
-                edgecolor=colour,
-                lw=1.1,
-                zorder=3,
-            )
-        axes.plot(
-            [],
-            [],
-            color=colour,
-            marker=mark,
-            ms=5,
-            lw=1.1,
-            mfc="white" if left else colour,
-            label=curve.name,
-        )
+            _dots(axes, levels[rows] / 1e3, 100 * rms[rows], colour, face, marker=mark, s=24)
+        key: dict[str, Any] = {"marker": mark, "ms": 5, "mfc": "white" if left else colour}
+        axes.plot([], [], color=colour, lw=1.1, label=curve.name, **key)
     axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
     axes.yaxis.set_minor_formatter(lambda value, _: f"{value:g}" if f"{value:e}"[0] in "25" else "")
     axes.tick_params(axis="y", which="minor", labelsize="small")
@@ -406,13 +373,8 @@ def errors_svg(curves: Sequence[ErrorCurve], prefix: str = "errors") -> str:
             panels[1].set_title("Each level predicted from the others")
         if len(curves) > 1:
             handles, labels = panels[0].get_legend_handles_labels()
-            figure.legend(
-                handles,
-                labels,
-                loc="outside lower center",
-                ncols=min(len(curves), 7),
-                columnspacing=1.4,
-            )
+            places: dict[str, Any] = {"loc": "outside lower center", "columnspacing": 1.4}
+            figure.legend(handles, labels, ncols=min(len(curves), 7), **places)
         return svg_text(figure, prefix)
 
 
@@ -428,19 +390,12 @@ def _draw_residuals(axes: Axes, fit: MuscleFit, *, size: float = 34.0) -> Any:
     keep = thinned(np.arange(len(share)))
     fitted = np.isin(level, list(_fitted_levels(fit)))
     colours = None
+    style: dict[str, Any] = {"cmap": "RdBu_r", "vmin": -limit, "vmax": limit, "s": size}
     for rows, mark in ((keep[fitted[keep]], "o"), (keep[~fitted[keep]], "s")):
         if len(rows):
+            x, y = 100 * contraction[rows], pressure[rows] / 1e3
             colours = axes.scatter(
-                100 * contraction[rows],
-                pressure[rows] / 1e3,
-                c=share[rows],
-                cmap="RdBu_r",
-                vmin=-limit,
-                vmax=limit,
-                marker=mark,
-                s=size,
-                edgecolor="#4b5563",
-                lw=0.6,
+                x, y, c=share[rows], marker=mark, edgecolor="#4b5563", lw=0.6, **style
             )
     axes.set_xlabel("contraction [%]")
     axes.set_ylabel("pressure [kPa]")
@@ -463,18 +418,8 @@ def residuals_svg(fit: MuscleFit, prefix: str = "residuals") -> str:
     str
         SVG element. Points of levels that the fit left out are squares.
     """
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 4.2), layout="constrained")
-        axes = figure.subplots()
-        colours = _draw_residuals(axes, fit)
-        figure.colorbar(
-            colours,
-            ax=axes,
-            label="measured − model [% of the largest force]",
-            extend="both",
-            pad=0.015,
-        )
-        return svg_text(figure, prefix)
+    label = "measured − model [% of the largest force]"
+    return _with_bar(partial(_draw_residuals, fit=fit), 4.2, prefix, label=label, extend="both")
 
 
 # ------------------------------------------------------------------------ summary
@@ -497,61 +442,26 @@ def summary_png(fit: MuscleFit, curves: Sequence[ErrorCurve], title: str) -> byt
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    style = {
-        **STYLE,
-        "font.size": 8.5,
-        "axes.titlesize": 9.5,
-        "legend.fontsize": 8.0,
-        "axes.labelsize": 8.5,
-    }
-    with mpl.rc_context(style):
-        figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
-        figure.get_layout_engine().set(w_pad=0.1, h_pad=0.08, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]
-        figure.suptitle(
-            "\n".join(textwrap.wrap(title, 84)),
-            x=0.012,
-            ha="left",
-            fontsize=14,
-            fontweight="bold",
-            color="#111827",
-        )
+    with summary_figure(title, 84) as (figure, finished):
         left, right = figure.subfigures(1, 2, width_ratios=[1.35, 1.0], squeeze=False)[0]
         axes = left.subplots()
-        left.colorbar(
-            _draw_family(axes, fit, size=20.0),
-            ax=axes,
-            label="pressure [kPa]",
-            location="bottom",
-            pad=0.02,
-            aspect=40,
-        )
+        bar: dict[str, Any] = {"location": "bottom", "pad": 0.02, "aspect": 40}
+        left.colorbar(_draw_family(axes, fit, size=20.0), ax=axes, label="pressure [kPa]", **bar)
         axes.set_title("Force: measured against model")
         upper, lower = right.subplots(2, 1, gridspec_kw={"height_ratios": [1.25, 1.0]})
         _draw_errors(upper, curves, left=False)
+        dashed: dict[str, Any] = {"lw": 0.9, "ls": (0, (4, 2))}
         for curve, (colour, _) in zip(curves, _SERIES * 3, strict=False):
             if len(curve.left_levels):
-                upper.plot(
-                    curve.left_levels / 1e3,
-                    100 * curve.left_rms,
-                    color=colour,
-                    lw=0.9,
-                    ls=(0, (4, 2)),
-                )
+                rms = 100 * curve.left_rms
+                upper.plot(curve.left_levels / 1e3, rms, color=colour, **dashed)
         upper.set_title("Error by pressure (dashed: left out)")
         upper.set_ylabel("rms / largest force [%]")
         if len(curves) > 1:
-            upper.legend(
-                loc="upper center",
-                bbox_to_anchor=(0.45, -0.22),
-                ncols=3,
-                fontsize=7.0,
-                columnspacing=1.0,
-            )
+            place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.45, -0.22)}
+            upper.legend(ncols=3, fontsize=7.0, columnspacing=1.0, **place)
         colours = _draw_residuals(lower, fit, size=26.0)
-        lower.set_title(
-            "Residual (squares: left out)" if np.any(~fit.fitted & fit.data.used) else "Residual"
-        )
+        squares = " (squares: left out)" if np.any(~fit.fitted & fit.data.used) else ""
+        lower.set_title(f"Residual{squares}")
         right.colorbar(colours, ax=lower, label="measured − model [%]", extend="both", pad=0.02)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=160)
-        return stream.getvalue()
+        return finished()

@@ -75,14 +75,13 @@ Columns = Mapping[str, "str | Mapping[str, Any]"] | Sequence["str | Mapping[str,
 def read_map(
     file: Path,
     *,
-    rest_length: float | None,
-    columns: Columns | None,
-    where: Mapping[str, str | float] | None,
-    clipped: float | None,
-    level_tolerance: float | None,
-    delimiter: str | None,
-    decimal: str | None,
-    name: str | None,
+    rest_length: float | None = None,
+    columns: Columns | None = None,
+    where: Mapping[str, str | float] | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    name: str | None = None,
+    **levels: Any,
 ) -> ForceMap:
     """Read a force map from a table; arguments and errors as those of
     :func:`pamrs.fit.load_force_map`.
@@ -120,9 +119,7 @@ def read_map(
             header=table.header is not None,
             name=title,
         )
-        return from_recording(
-            recording, rest_length=rest_length, clipped=clipped, level_tolerance=level_tolerance
-        )
+        return from_recording(recording, rest_length=rest_length, **levels)
     keep, notes = _kept(table, wanted, decimal, source)
     if where is None:
         _one_specimen(table, strange, source)
@@ -141,8 +138,7 @@ def read_map(
         values["force"],
         rest_length=rest_length,
         direction=values.get("direction"),
-        clipped=clipped,
-        level_tolerance=level_tolerance,
+        **levels,
         name=title,
         source=source,
         notes=notes,

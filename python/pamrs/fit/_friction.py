@@ -185,11 +185,11 @@ class FrictionFit:
         """Pressure [Pa], contraction [1] and mean force of both branches [N] of all levels: data
         free of friction.
         """
-        return (
-            np.concatenate([level.pressures for level in self.levels]),
-            np.concatenate([level.contraction for level in self.levels]),
-            np.concatenate([level.force for level in self.levels]),
+        keys = ("pressures", "contraction", "force")
+        pressure, contraction, force = (
+            np.concatenate([getattr(level, key) for level in self.levels]) for key in keys
         )
+        return pressure, contraction, force
 
     def to_muscle(self, muscle: Muscle) -> Muscle:
         """The muscle with this friction.
@@ -276,29 +276,14 @@ class FrictionFit:
         )
 
 
-def fit_friction(
-    data: ForceMap | None = None,
-    *,
-    pressure: ArrayLike | None = None,
-    contraction: ArrayLike | None = None,
-    force: ArrayLike | None = None,
-    direction: ArrayLike | None = None,
-    rest_length: float | None = None,
-    floor: float = 0.01,
-) -> FrictionFit:
+def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
     """Friction coefficients from the hysteresis loops of a muscle.
 
     Parameters
     ----------
-    data : ForceMap, optional
-        A map, of length cycles at held pressures or of pressure cycles at held lengths
-        (isometric); else give arrays.
-    pressure, contraction, force, direction : (n,) array_like, optional
-        Gauge pressure [Pa], contraction [1], force [N], and -1 while contracting, +1 while
-        lengthening, in the order measured. Without directions they are those of the rows' order
-        (:meth:`ForceMap.with_directions`).
-    rest_length : float, optional
-        With arrays [m]; without it the presliding distance, a length, is not determined.
+    data : ForceMap
+        Length cycles at held pressures, or pressure cycles at held lengths (isometric). Without
+        directions of motion they are those of the rows' order (:meth:`ForceMap.with_directions`).
     floor : float
         The least that ``c_F`` becomes; 0.01 in (2.36).
 
@@ -309,18 +294,16 @@ def fit_friction(
     Raises
     ------
     ParameterError
-        If neither a map nor pressure, contraction and force are given, or ``floor`` is negative or
-        not below 1.
+        If ``floor`` is negative or not below 1.
     RecordingError
         If no direction is known or can be told, or fewer than two pressures have both branches.
     """
     if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
         raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
-    rested = data is not None or rest_length is not None
-    if data is None:
-        data = _map(pressure, contraction, force, direction, rest_length)
     data = data.with_directions()
-    gas, e, *_ = data.used_rows()
+    gas, e, _, _, way = data.used_rows()
+    if not np.any(way):
+        raise RecordingError(f"{data.label}: {_NO_WAY}")
     held = held_lengths(e, gas)
     levels, issues = _isometric_levels(data, held) if held else _loops(data)
     line, above = _law(levels, floor)
@@ -330,10 +313,8 @@ def fit_friction(
     free = max(int(above.sum()) - 2, 0)
     if held:
         distance, reason = None, "not determinable: the length is held"
-    elif rested:
-        distance, reason = _presliding(data, levels)
     else:
-        distance, reason = None, "not determinable: a length, and rest_length is not given"
+        distance, reason = _presliding(data, levels)
     best = np.maximum(
         line.values[0] + line.values[1] * np.array([x.pressure for x in levels]), floor
     )
@@ -361,42 +342,15 @@ def fit_friction(
     )
 
 
-def _map(
-    pressure: ArrayLike | None,
-    contraction: ArrayLike | None,
-    force: ArrayLike | None,
-    direction: ArrayLike | None,
-    rest_length: float | None,
-) -> ForceMap:
-    """The map of arrays; one of a muscle 1 m long where no length is known.
-
-    Raises
-    ------
-    ParameterError
-        If an array is missing.
-    """
-    given = {"pressure": pressure, "contraction": contraction, "force": force}
-    missing = [word for word, values in given.items() if values is None]
-    if missing or pressure is None or contraction is None or force is None:
-        raise ParameterError(f"{', '.join(missing)}: needed when no ForceMap is given")
-    rest = 1.0 if rest_length is None else rest_length
-    length = rest * (1.0 - np.asarray(contraction, dtype=np.float64))
-    return ForceMap.from_arrays(
-        length, pressure, force, rest_length=rest, direction=direction, check_duplicates=False
-    )
-
-
 def _loops(data: ForceMap) -> tuple[list[FrictionLevel], list[str]]:
     """The loop of every pressure that has one, and what was found of the others.
 
     Raises
     ------
     RecordingError
-        If no direction is known, or fewer than two pressures have both branches.
+        If fewer than two pressures have both branches.
     """
     gas, e, pull, level, way = data.used_rows()
-    if not np.any(way != 0):
-        raise RecordingError(f"{data.label}: {_NO_WAY}")
     issues = list(data.issues)
     unknown = int(np.sum(way == 0))
     if unknown:
@@ -444,11 +398,9 @@ def _isometric_levels(
     Raises
     ------
     RecordingError
-        If no direction is known, or too few pressures have both branches.
+        If too few pressures have both branches.
     """
     gas, e, pull, _, way = data.used_rows()
-    if not np.any(way != 0):
-        raise RecordingError(f"{data.label}: {_NO_WAY}")
     issues = [
         *data.issues,
         "loops of pressure at held lengths: rising pressure counts as contracting",

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import io
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from pamrs.fit._figures import pressure_colours, thinned
-from pamrs.report.figures import COLOURS, STYLE
+from pamrs.report.figures import COLOURS, summary_figure
 
 if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
@@ -25,27 +23,14 @@ _MARKS: Final = ((-1, "v", "contracting"), (1, "^", "lengthening"))
 
 def friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
     """What :func:`pamrs.fit.report.render_friction_png` returns."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(10.0, 5.0), dpi=160, layout="constrained")
-        c0, c1 = (
-            fit.params["friction_coefficient"].value,
-            fit.params["friction_pressure_slope"].value * 1e6,
-        )
-        law = f"$c_F$ = max({c0:.3g} {'−' if c1 < 0 else '+'} {abs(c1):.3g} P/MPa, {fit.floor:g})"
-        figure.suptitle(
-            f"{data.label}: {law}",
-            x=0.012,
-            ha="left",
-            fontsize=13,
-            fontweight="bold",
-            color="#111827",
-        )
+    c0, c1 = (item.value for item in fit.params.values())
+    sign = "−" if c1 < 0 else "+"
+    law = f"$c_F$ = max({c0:.3g} {sign} {abs(1e6 * c1):.3g} P/MPa, {fit.floor:g})"
+    with summary_figure(f"{data.label}: {law}", 200, 13.0, 5.0) as (figure, finished):
         loops, line = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
         _draw_loops(loops, fit, data)
         _draw_law(line, fit)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=160)
-        return stream.getvalue()
+        return finished()
 
 
 def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
@@ -56,15 +41,8 @@ def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
         colour = cmap(norm(pressure / 1e3))
         for way, mark, _ in _MARKS:
             rows = thinned(np.flatnonzero((data.level == index) & (data.direction == way)))
-            axes.scatter(
-                across[rows],
-                data.force[rows],
-                s=7.0,
-                marker=mark,
-                color=colour,
-                alpha=0.45,
-                lw=0,
-            )
+            style: dict[str, Any] = {"s": 7.0, "marker": mark, "color": colour, "alpha": 0.45}
+            axes.scatter(across[rows], data.force[rows], lw=0, **style)
     for level in fit.levels:
         axes.plot(
             level.pressures / 1e3 if fit.isometric else 100.0 * level.contraction,
@@ -75,14 +53,9 @@ def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
     for _, mark, word in _MARKS:
         axes.scatter([], [], s=16.0, marker=mark, color=_INK, lw=0, label=word)
     axes.plot([], [], color=_INK, lw=1.3, label="mean of both")
-    axes.figure.colorbar(
-        mpl.cm.ScalarMappable(norm, cmap),
-        ax=axes,
-        label="pressure [kPa]",
-        location="bottom",
-        pad=0.02,
-        aspect=40,
-    )
+    bar: dict[str, Any] = {"location": "bottom", "pad": 0.02, "aspect": 40}
+    scale = mpl.cm.ScalarMappable(norm, cmap)
+    axes.figure.colorbar(scale, ax=axes, label="pressure [kPa]", **bar)
     axes.set_xlabel("pressure [kPa]" if fit.isometric else "contraction [%]")
     axes.set_ylabel("pulling force [N]")
     axes.set_title("Loops: measured, and their mean")
@@ -97,16 +70,8 @@ def _draw_law(axes: Axes, fit: FrictionFit) -> None:
     )
     grid = np.linspace(0.0, 1.08 * float(pressure.max()), 200)
     axes.plot(grid / 1e3, fit.predict(grid), color=COLOURS["after"], lw=1.6, label="law")
-    axes.errorbar(
-        pressure / 1e3,
-        value,
-        2.0 * error,
-        fmt="o",
-        ms=5,
-        color=COLOURS["before"],
-        lw=0.9,
-        label="each level, ± 2 s.e.",
-    )
+    style: dict[str, Any] = {"fmt": "o", "ms": 5, "color": COLOURS["before"], "lw": 0.9}
+    axes.errorbar(pressure / 1e3, value, 2.0 * error, label="each level, ± 2 s.e.", **style)
     axes.axhline(fit.floor, color=_INK, lw=0.8, ls=(0, (1, 2)), label="floor")
     axes.set_xlim(0.0, grid[-1] / 1e3)
     axes.set_ylim(bottom=min(0.0, 1.1 * float(np.min(value - 2.0 * error))))

@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError
 from pamrs.fit._data import ForceMap
@@ -102,34 +102,22 @@ def load_force_map(
         or the wrong one, or fewer than two rows are usable.
     """
     file = Path(path)
-    if file.suffix.lower() == ".toml":
-        given = {
-            "rest_length": rest_length,
-            "columns": columns,
-            "where": where,
-            "clipped": clipped,
-            "level_tolerance": level_tolerance,
-        }
-        for key, value in {
-            **given,
-            "delimiter": delimiter,
-            "decimal": decimal,
-            "name": name,
-        }.items():
-            if value is not None:
-                raise ParameterError(f"{key} cannot be given: {file} describes its table itself")
-        return load_measured_muscle(file, allow_outside=allow_outside).data
-    return read_map(
-        file,
-        rest_length=rest_length,
-        columns=columns,
-        where=where,
-        clipped=clipped,
-        level_tolerance=level_tolerance,
-        delimiter=delimiter,
-        decimal=decimal,
-        name=name,
-    )
+    given: dict[str, Any] = {
+        "rest_length": rest_length,
+        "columns": columns,
+        "where": where,
+        "clipped": clipped,
+        "level_tolerance": level_tolerance,
+        "delimiter": delimiter,
+        "decimal": decimal,
+        "name": name,
+    }
+    if file.suffix.lower() != ".toml":
+        return read_map(file, **given)
+    for key, value in given.items():
+        if value is not None:
+            raise ParameterError(f"{key} cannot be given: {file} describes its table itself")
+    return load_measured_muscle(file, allow_outside=allow_outside).data
 
 
 def load_measured_muscle(

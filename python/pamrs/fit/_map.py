@@ -189,16 +189,12 @@ class MapFit:
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
         return {
-            "pressure": self.pressure.tolist(),
-            "contraction": self.contraction.tolist(),
-            "force": self.force.tolist(),
-            "scatter": self.scatter,
-            "between": None if math.isnan(self.between) else self.between,
-            "half_width": None if math.isnan(self.half_width) else self.half_width,
-            "share": self.share,
-            "rows": self.rows,
-            "rest_length": self.rest_length,
-            "issues": self.issues,
+            name: value.tolist()
+            if isinstance(value, np.ndarray)
+            else None
+            if isinstance(value, float) and math.isnan(value)
+            else value
+            for name, value in vars(self).items()
         }
 
 

@@ -114,13 +114,8 @@ class FitStatistics:
         """How the rows were used: ``weights``, ``direction`` and ``noise`` of
         :func:`pamrs.fit.fit_muscle`.
         """
-        problem = self._problem
-        weights = "force" if np.all(problem.weight == 1.0) else "level"
-        return {
-            "weights": weights,
-            "direction": "data" if np.any(problem.direction) else None,
-            "noise": problem.noise,
-        }
+        direction = "data" if np.any(self._problem.direction) else None
+        return {"weights": self.weights, "direction": direction, "noise": self.stated_noise}
 
     @property
     def moduli_names(self) -> tuple[str, ...]:
@@ -153,11 +148,6 @@ class FitStatistics:
     def x(self) -> Array:
         """Values of ``params`` as an array, as in SciPy."""
         return np.array([item.value for item in self.params.values()])
-
-    @property
-    def var_names(self) -> list[str]:
-        """Names of ``params`` in order."""
-        return list(self.params)
 
     @property
     def best_fit(self) -> Array:
@@ -249,15 +239,6 @@ class FitStatistics:
     def bic(self) -> float:
         """Schwarz's criterion with ``n = ndata``."""
         return self.criteria()[2]
-
-    @property
-    def correl(self) -> Array:
-        """Correlation matrix of ``covar``; parameters of no spread correlate with none."""
-        spread = np.sqrt(np.diag(self.covar))
-        safe = np.where(spread > 0.0, spread, 1.0)
-        matrix = np.asarray(self.covar / np.outer(safe, safe))
-        np.fill_diagonal(matrix, 1.0)
-        return matrix
 
     @property
     def rsquared(self) -> float:

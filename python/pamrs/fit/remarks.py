@@ -92,14 +92,10 @@ def cross_validation(fit: MuscleFit) -> tuple[CrossValidation | None, str]:
 
 def friction_words(muscle: Muscle) -> str:
     """The friction law (2.36) of a muscle with its numbers; empty without friction."""
-    given = muscle.parameters
-    c0, c1, floor = (
-        given["friction_coefficient"],
-        given["friction_pressure_slope"],
-        given["friction_floor"],
-    )
-    if not (c0 or c1 or floor):
+    if not muscle.has_friction:
         return ""
+    law = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
+    c0, c1, floor = (muscle.parameters[name] for name in law)
     return f"c_F = max(c0 + c1 P, {floor:.4g}), c0 = {c0:.4g}, c1 = {1e6 * c1:.4g} 1/MPa"
 
 

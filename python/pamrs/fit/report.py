@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from pamrs.fit._figures import ErrorCurve
     from pamrs.fit._friction import FrictionFit
     from pamrs.fit._result import MuscleFit
-    from pamrs.fit._statistics import FitStatistics
 
 __all__ = [
     "error_curves",
@@ -80,13 +79,13 @@ def error_curves(fit: MuscleFit, comparison: ModelComparison | None = None) -> l
     return [_curve(remarks.title(other), other) for other in best.values()]
 
 
-def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
+def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     """The same fit with moduli free at each level that has points enough; None where that says
     nothing.
     """
     import numpy as np
 
-    from pamrs.fit._solution import solution
+    from pamrs.fit._solution import fit_muscle
 
     if fit.moduli_kind == "per_level" or not fit.params:
         return None
@@ -101,7 +100,7 @@ def _level_by_level(fit: MuscleFit) -> FitStatistics | None:
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:
-        return solution(
+        return fit_muscle(
             fit.data,
             fit.muscle.replace(**fixed),
             model=fit.model,

@@ -6,7 +6,8 @@ import io
 import math
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
@@ -45,7 +46,9 @@ __all__ = [
     "decimate",
     "legend_above",
     "map_svg",
+    "png_bytes",
     "separating_curves",
+    "summary_figure",
     "summary_png",
     "svg_text",
     "telling_trace",
@@ -95,6 +98,8 @@ STYLE: Any = {
     "savefig.facecolor": "white",
 }
 """Matplotlib settings of every figure."""
+_SMALL: Any = {"font.size": 8.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
+"""Those of a summary that are others."""
 
 
 def decimate(
@@ -223,14 +228,8 @@ def _draw_residuals(axes: Axes, trace: Trace, noise: float | None, *, width: flo
 
 def legend_above(axes: Axes, *, columns: int = 4) -> None:
     """Legend in one line above the axes, flush right."""
-    axes.legend(
-        loc="lower right",
-        bbox_to_anchor=(1.0, 1.0),
-        ncols=columns,
-        borderaxespad=0.1,
-        handlelength=1.8,
-        columnspacing=1.3,
-    )
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    axes.legend(ncols=columns, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place)
 
 
 def _shade(axes: Axes, diagnosis: Findings, trace: Trace) -> None:
@@ -240,6 +239,37 @@ def _shade(axes: Axes, diagnosis: Findings, trace: Trace) -> None:
     if diagnosis.where.recording == trace.recording:
         for start, stop in diagnosis.where.intervals:
             axes.axvspan(start, stop, color="#f5e6b8", alpha=0.5, lw=0, zorder=0)
+
+
+def png_bytes(figure: Figure) -> bytes:
+    """A figure as PNG, with the dots per inch that it was made with."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=figure.dpi)
+    return stream.getvalue()
+
+
+@contextmanager
+def summary_figure(
+    title: str, letters: int, size: float = 15.0, height: float = 6.25
+) -> Iterator[tuple[Figure, Callable[[], bytes]]]:
+    """A picture of 1600 pixels with a headline, and what gives it as PNG.
+
+    Parameters
+    ----------
+    title : str
+        The headline.
+    letters : int
+        In a line of it.
+    size, height : float
+        Of its letters [points] and of the picture [inch].
+    """
+    with mpl.rc_context(STYLE | _SMALL):
+        figure = Figure(figsize=(10.0, height), dpi=160, layout="constrained")
+        room = {"w_pad": 0.12, "h_pad": 0.06, "wspace": 0.03, "hspace": 0.03}
+        figure.get_layout_engine().set(**room)  # type: ignore[union-attr]
+        style: dict[str, Any] = {"fontsize": size, "fontweight": "bold", "color": "#111827"}
+        figure.suptitle("\n".join(textwrap.wrap(title, letters)), x=0.012, ha="left", **style)
+        yield figure, lambda: png_bytes(figure)
 
 
 def svg_text(figure: Figure, prefix: str) -> str:
@@ -367,11 +397,10 @@ def _block_rows(diagnosis: Findings) -> list[tuple[str, float, bool]]:
     return sorted(rows, key=lambda r: CHAIN.index(r[0]) if r[0] in CHAIN else len(CHAIN))
 
 
-def _beside(axes: Axes, x: float, y: float, text: str) -> None:
-    """A number beside the end of a bar (SVG drops spaces that stand before a text)."""
-    axes.annotate(
-        text, (x, y), xytext=(4.0, 0.0), textcoords="offset points", va="center", fontsize="small"
-    )
+def _beside(axes: Axes, x: float, y: float, text: str, **style: Any) -> None:
+    """A text beside the end of a bar (SVG drops spaces that stand before a text)."""
+    style = {"va": "center", "fontsize": "small"} | style
+    axes.annotate(text, (x, y), xytext=(4.0, 0.0), textcoords="offset points", **style)
 
 
 def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows: int = 1) -> None:
@@ -381,14 +410,7 @@ def _draw_blocks(axes: Axes, rows: Sequence[tuple[str, float, bool]], least_rows
     colours = [COLOURS["before"] if r[2] else COLOURS["quiet"] for r in rows]
     axes.barh(position, size - left, left=left, color=colours, height=0.62)
     axes.axvline(1.0, color="#1f1f1f", lw=1.1, ls=(0, (3, 2)))
-    axes.annotate(
-        "noise level",
-        (1.0, -0.62),
-        xytext=(4.0, 0.0),
-        textcoords="offset points",
-        color="#374151",
-        fontsize="small",
-    )
+    _beside(axes, 1.0, -0.62, "noise level", color="#374151", va="baseline")
     axes.set_xscale("log")
     axes.set_xlim(left, max(3.0, float(size.max()) * 1.9))
     for y, value in zip(position.tolist(), size.tolist(), strict=True):
@@ -561,18 +583,7 @@ def summary_png(diagnosis: Findings) -> bytes:
     bytes
         PNG of 1600 x 1000 pixels.
     """
-    style = {
-        **STYLE,
-        "font.size": 8.5,
-        "axes.titlesize": 9.5,
-        "legend.fontsize": 8.0,
-        "axes.labelsize": 8.5,
-    }
-    with mpl.rc_context(style):
-        figure = Figure(figsize=(10.0, 6.25), dpi=160, layout="constrained")
-        figure.get_layout_engine().set(w_pad=0.12, h_pad=0.06, wspace=0.03, hspace=0.03)  # type: ignore[union-attr, call-arg]
-        title = "\n".join(textwrap.wrap(headline(diagnosis), 78))
-        figure.suptitle(title, x=0.012, ha="left", fontsize=15, fontweight="bold", color="#111827")
+    with summary_figure(headline(diagnosis), 78) as (figure, finished):
         left, right = figure.subfigures(1, 2, width_ratios=[1.45, 1.0], squeeze=False)[0]
         trace = telling_trace(diagnosis)
         if trace is not None:
@@ -586,22 +597,16 @@ def summary_png(diagnosis: Findings) -> bytes:
                 f"{spoken_name(trace.channel).capitalize()}, {role} {trace.recording}", pad=20
             )
             lower.set_title("What the model does not explain", pad=20)
+            place: dict[str, Any] = {"loc": "lower left", "bbox_to_anchor": (-0.01, 0.995)}
             for panel in (upper, lower):
                 panel.legend(
-                    loc="lower left",
-                    bbox_to_anchor=(-0.01, 0.995),
-                    ncols=4,
-                    borderaxespad=0.1,
-                    handlelength=1.6,
-                    columnspacing=1.2,
+                    ncols=4, borderaxespad=0.1, handlelength=1.6, columnspacing=1.2, **place
                 )
                 panel.margins(x=0.005)
             lower.set_xlabel("time [s]")
             left.align_ylabels([upper, lower])
         _draw_right(right, diagnosis)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=160)
-        return stream.getvalue()
+        return finished()
 
 
 def _head(part: Any, text: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import math
 from typing import TYPE_CHECKING, Any, Final
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
-from pamrs.report.figures import COLOURS, STYLE, decimate
+from pamrs.report.figures import COLOURS, STYLE, decimate, legend_above, png_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -91,17 +90,9 @@ def channels_png(
             axes.set_title(title)
             axes.set_ylabel(laboratory_unit(names[0])[0])
             if len(axes.lines) > 1:
-                axes.legend(
-                    loc="lower right",
-                    bbox_to_anchor=(1.0, 1.0),
-                    ncols=6,
-                    fontsize="small",
-                    borderaxespad=0.1,
-                )
+                legend_above(axes, columns=6)
         rows[-1].set_xlabel("time [s]")
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png")
-    return stream.getvalue()
+        return png_bytes(figure)
 
 
 def _draw_channel(

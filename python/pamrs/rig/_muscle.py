@@ -16,6 +16,7 @@ from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 __all__ = ["Muscle"]
 
 Array = NDArray[np.float64]
+_FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
 
 
 class Muscle:
@@ -240,6 +241,15 @@ class Muscle:
 
         table = compiled_law(law, (min_pressure, max_pressure), contraction, tolerance)
         return cls(model="map", **table, **parameters)
+
+    @property
+    def has_friction(self) -> bool:
+        """Whether a friction law is given."""
+        return any(self.parameters[name] for name in _FRICTION)
+
+    def without_friction(self) -> Muscle:
+        """The same muscle without friction."""
+        return self.replace(**dict.fromkeys(_FRICTION, 0.0))
 
     def replace(self, **changes: Any) -> Muscle:
         """The same muscle with other parameters.
