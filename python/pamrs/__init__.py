@@ -84,40 +84,19 @@ __all__ = [
 _MODULES: Final = {name: f"pamrs.{name}" for name in ("fit", "library", "rigs", "sweeps")} | {
     "sizing": "pamrs.design.sizing"
 }
-_HOMES: Final[dict[str, str]] = {
-    "Batch": "pamrs.simulation",
-    "BatchRun": "pamrs.simulation",
-    "Case": "pamrs.recordings",
-    "CaseError": "pamrs.errors",
-    "Diagnosis": "pamrs.diagnosis.result",
-    "DiagnosisError": "pamrs.errors",
-    "DiagnosisSettings": "pamrs.diagnosis.settings",
-    "FitError": "pamrs.errors",
-    "Issue": "pamrs.recordings",
-    "Joint": "pamrs.rig",
-    "Lift": "pamrs.design",
-    "Muscle": "pamrs.rig",
-    "PamrsError": "pamrs.errors",
-    "Parameter": "pamrs.rig",
-    "ParameterError": "pamrs.errors",
-    "Plan": "pamrs.diagnosis.next_experiment",
-    "Recording": "pamrs.recordings",
-    "RecordingError": "pamrs.errors",
-    "Rig": "pamrs.rig",
-    "RigError": "pamrs.errors",
-    "Simulation": "pamrs.simulation",
-    "SimulationError": "pamrs.errors",
-    "Simulator": "pamrs.simulation",
-    "diagnose": "pamrs.diagnosis",
-    "lift": "pamrs.design",
-    "load_case": "pamrs.recordings",
-    "load_recording": "pamrs.recordings",
-    "load_rig": "pamrs.rig",
-    "plan_diagnosis": "pamrs.diagnosis.next_experiment",
-    "simulate": "pamrs.simulation",
-    "simulate_batch": "pamrs.simulation",
-    "sweep": "pamrs.sweeps",
+_NAMES: Final = {
+    "design": ("Lift", "lift"),
+    "diagnosis": ("diagnose",),
+    "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
+    "diagnosis.result": ("Diagnosis",),
+    "diagnosis.settings": ("DiagnosisSettings",),
+    "errors": tuple(name for name in __all__ if name.endswith("Error")),
+    "recordings": ("Case", "Issue", "Recording", "load_case", "load_recording"),
+    "rig": ("Joint", "Muscle", "Parameter", "Rig", "load_rig"),
+    "simulation": ("Batch", "BatchRun", "Simulation", "Simulator", "simulate", "simulate_batch"),
+    "sweeps": ("sweep",),
 }
+_HOMES: Final = {name: f"pamrs.{home}" for home, names in _NAMES.items() for name in names}
 
 
 def _version() -> str:

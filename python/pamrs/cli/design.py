@@ -113,8 +113,8 @@ def _joint(
         write_atomically(path, picture)
 
     contents: Contents = {
-        json: _document(title, found),
-        rig_joint: found.design.to_toml(),
+        json: _document(title, found) if json else "",
+        rig_joint: found.design.to_toml() if rig_joint else "",
         png: draw,
     }
     write(contents, f"{title}\n{_summary(found)}")

@@ -45,26 +45,19 @@ __all__ = [
     "load_measured_muscle",
 ]
 
-_HOMES: Final[dict[str, str]] = {
-    "COEFFICIENTS": "_solution",
-    "CrossValidation": "_validation",
-    "FitParameter": "_statistics",
-    "ForceMap": "_data",
-    "FrictionFit": "_friction",
-    "GEOMETRY": "_solution",
-    "MapFit": "_map",
-    "MeasuredMuscle": "_load",
-    "ModelComparison": "_compare",
-    "MuscleFit": "_result",
-    "PressureErrors": "_validation",
-    "compare_models": "_compare",
-    "fit_friction": "_friction",
-    "fit_map": "_map",
-    "fit_muscle": "_solution",
-    "from_recording": "_bench",
-    "load_force_map": "_load",
-    "load_measured_muscle": "_load",
+_NAMES: Final = {
+    "_bench": ("from_recording",),
+    "_compare": ("ModelComparison", "compare_models"),
+    "_data": ("ForceMap",),
+    "_friction": ("FrictionFit", "fit_friction"),
+    "_load": ("MeasuredMuscle", "load_force_map", "load_measured_muscle"),
+    "_map": ("MapFit", "fit_map"),
+    "_result": ("MuscleFit",),
+    "_solution": ("COEFFICIENTS", "GEOMETRY", "fit_muscle"),
+    "_statistics": ("FitParameter",),
+    "_validation": ("CrossValidation", "PressureErrors"),
 }
+_HOMES: Final = {name: home for home, names in _NAMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:

@@ -18,7 +18,7 @@ from pamrs.recordings import load_recording
 from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
 from pamrs.recordings.dialect import decimal_of, dialect_of
 from pamrs.recordings.logs import read_log, table_of
-from pamrs.recordings.table import Table, is_text, read_table, read_text
+from pamrs.recordings.table import Table, is_text, read_table, read_text, stem_of
 from pamrs.units import parse_unit, same_dimension, to_si
 
 __all__ = ["Columns", "read_map"]
@@ -99,7 +99,7 @@ def read_map(
     found, strange = _understood(headings, lines, source)
     decimal = decimal or decimal_of(_texts(table, found), source)
     wanted = {heading: str(value) for heading, value in (where or {}).items()}
-    title = name or "_".join([file.name.removesuffix(".gz").rsplit(".", 1)[0], *wanted.values()])
+    title = name or "_".join([stem_of(file), *wanted.values()])
     if "time" in found:
         if wanted:
             raise RecordingError(

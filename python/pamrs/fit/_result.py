@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -38,6 +39,12 @@ class MuscleFit(FitStatistics):
     It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure
     and on pressures left out, and it predicts.
     """
+
+    _fit: Callable[..., MuscleFit] = field(repr=False)
+
+    def refitted(self, muscle: Muscle, **options: Any) -> MuscleFit:
+        """The same map fitted in another way; arguments as those of :func:`fit_muscle`."""
+        return self._fit(self.data, muscle, **options)
 
     @cached_property
     def all_residuals(self) -> Array:

@@ -371,6 +371,7 @@ def _result(
         _problem=problem,
         _estimate=found,
         _rows=rows,
+        _fit=fit_muscle,
     )
 
 

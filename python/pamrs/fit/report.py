@@ -85,8 +85,6 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     """
     import numpy as np
 
-    from pamrs.fit._solution import fit_muscle
-
     if fit.moduli_kind == "per_level" or not fit.params:
         return None
     counts = np.bincount(fit.data.level[fit.fitted], minlength=len(fit.data.levels))
@@ -100,8 +98,7 @@ def _level_by_level(fit: MuscleFit) -> MuscleFit | None:
     if any(p.name == "rest_length" for p in fit.params.values()):
         return None
     try:
-        return fit_muscle(
-            fit.data,
+        return fit.refitted(
             fit.muscle.replace(**fixed),
             model=fit.model,
             geometry=fit.muscle.geometry,

@@ -91,6 +91,11 @@ class Grid:
             count = int(np.floor(stamps[-1] / step + _ON_SAMPLE)) + 1
             time = np.arange(count, dtype=np.float64) * step
         self.time: Array = time
+        self._place_samples()
+
+    def _place_samples(self) -> None:
+        """Between which stamps each sample lies, and whether these are near enough."""
+        stamps, step, usual = self._stamps, self.sample_time, self.usual
         right = np.clip(np.searchsorted(stamps, self.time, side="left"), 1, len(stamps) - 1)
         self._left, self._right = right - 1, right
         span = stamps[self._right] - stamps[self._left]

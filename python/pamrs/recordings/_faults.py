@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._stretches import stretches
 from pamrs.channels import CHANNELS
 
 __all__ = ["Fault", "find_faults"]
@@ -82,14 +83,11 @@ def find_faults(channel: str, values: Array) -> list[Fault]:
     data = values[good]
     if len(data) < 3 * _LEAST:
         return faults
-    stretches = _Stretches(channel, data)
-    for kind, start, stop in stretches.suspects():
-        length = stop - start
+    for kind, start, stop in _Stretches(channel, data).suspects():
         where = "its extreme value" if kind == "saturated" else "exactly one value"
-        text, rail = f"{length} samples at {where}", None
-        if kind == "saturated":
-            rail = float(data[start])
-        faults.append(Fault(kind, int(good[start]), int(good[stop - 1]) + 1, text, rail=rail))
+        found = _fault(kind, good, start, stop, f"{stop - start} samples at {where}")
+        cut_off = kind == "saturated"
+        faults.append(found._replace(rail=float(data[start])) if cut_off else found)
     return faults
 
 
@@ -110,33 +108,32 @@ def _rails(data: Array, good: NDArray[np.intp]) -> list[Fault]:
         return found
     steps = np.abs(np.diff(data))
     for value in (float(data.min()), float(data.max())):
-        runs = _groups(np.flatnonzero(data == value))
-        share = sum(last - first + 1 for first, last in runs) / len(data)
+        runs = stretches(data == value)
+        share = sum(stop - start for start, stop in runs) / len(data)
         beside = np.zeros(len(steps), dtype=bool)
-        for first, last in runs:
-            beside[max(0, first - 1) : last + 1] = True
+        for start, stop in runs:
+            beside[max(0, start - 1) : stop] = True
         if share > _RAIL_SHARE or beside.all():
             continue
         usual = max(float(steps[~beside].max()), float(np.median(steps)))
-        if all(_dropped(data, first, last, usual) for first, last in runs):
-            found += [
-                Fault(
-                    "saturated",
-                    int(good[first]),
-                    int(good[last]) + 1,
-                    f"{last - first + 1} samples at the end of its range ({value:.4g}, SI), "
-                    "reached by a leap",
-                )
-                for first, last in runs
-                if last > first  # a single one is an outlier
-            ]
+        if not all(_dropped(data, start, stop, usual) for start, stop in runs):
+            continue
+        for start, stop in runs:
+            if stop - start > 1:  # a single one is an outlier
+                text = f"{stop - start} samples at the end of its range ({value:.4g}, SI), "
+                found.append(_fault("saturated", good, start, stop, f"{text}reached by a leap"))
     return found
 
 
-def _dropped(data: Array, first: int, last: int, usual: float) -> bool:
+def _fault(kind: str, good: NDArray[np.intp], start: int, stop: int, text: str) -> Fault:
+    """A fault of the channel, from samples of its good rows."""
+    return Fault(kind, int(good[start]), int(good[stop - 1]) + 1, text)
+
+
+def _dropped(data: Array, start: int, stop: int, usual: float) -> bool:
     """Whether a run is a dropout: leaps at both ends, about the same value on either side."""
-    sides = [float(data[i]) for i in (first - 1, last + 1) if 0 <= i < len(data)]
-    leaps = [abs(side - float(data[first])) for side in sides]
+    sides = [float(data[i]) for i in (start - 1, stop) if 0 <= i < len(data)]
+    leaps = [abs(side - float(data[start])) for side in sides]
     same = len(sides) == 1 or abs(sides[0] - sides[1]) <= _RAIL_SAME * min(leaps)
     return bool(leaps) and min(leaps) > _RAIL_LEAP * usual and same
 
@@ -153,22 +150,13 @@ def _outliers(data: Array, good: NDArray[np.intp]) -> list[Fault]:
     quantum = _quantum(data)
     ordinary = np.quantile(np.abs(off), 0.99)
     limit = np.maximum(np.maximum(12.0 * quantum, 7.0 * ordinary), 6.0 * local)
-    rows = np.flatnonzero(np.abs(off) > limit)
-    if len(rows) > n // 50:
+    apart = np.abs(off) > limit
+    if apart.sum() > n // 50:
         return []
     return [
-        Fault("outlier", int(good[first]), int(good[last]) + 1, f"a spike of {off[first]:.3g} (SI)")
-        for first, last in _groups(rows)
+        _fault("outlier", good, start, stop, f"a spike of {off[start]:.3g} (SI)")
+        for start, stop in stretches(apart)
     ]
-
-
-def _groups(rows: NDArray[np.intp]) -> list[tuple[int, int]]:
-    if not len(rows):
-        return []
-    cuts = np.flatnonzero(np.diff(rows) > 1)
-    firsts = np.concatenate([rows[:1], rows[cuts + 1]])
-    lasts = np.concatenate([rows[cuts], rows[-1:]])
-    return [(int(a), int(b)) for a, b in zip(firsts, lasts, strict=True)]
 
 
 def _quantum(data: Array) -> float:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import os
-import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from pamrs.recordings._several_clocks import Sampled, recording_of, sampled
 from pamrs.recordings._splitting import Cut, Split, parts, read_split
 from pamrs.recordings._stamps import Ticks, counted_on, ticks, unit_of_stamps
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
+from pamrs.recordings.table import stem_of
 from pamrs.units import same_dimension, to_si
 
 __all__ = ["Clocks", "check_asked", "completed", "load_recordings", "recordings_of"]
@@ -100,8 +100,8 @@ def load_recordings(
     clock = read_clock(time, source)
     cut = read_split(split, source)
     content = log or read_log(file, form)
-    stem = re.sub(r"\.[^.]*$", "", file.name.removesuffix(".gz"))
-    found = recordings_of(content, sources, clock, name or stem, role, sample_time, cut, pieces)
+    called = name or stem_of(file)
+    found = recordings_of(content, sources, clock, called, role, sample_time, cut, pieces)
     every = [*sources, *constants]
     made = [completed(each, every, source, ambient_pressure) for each in found]
     return [each.between(start, stop) for each in made]

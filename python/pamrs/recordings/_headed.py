@@ -17,7 +17,7 @@ from pamrs.recordings._from_log import check_asked, completed, recordings_of
 from pamrs.recordings._mapping import Clock, Source
 from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings.logs import Log, Series, read_log, table_of
-from pamrs.recordings.table import Table, is_text, read_table, thousands_of
+from pamrs.recordings.table import Table, is_text, read_table, stem_of, thousands_of
 from pamrs.units import measured_from
 
 __all__ = ["load_recording"]
@@ -107,14 +107,13 @@ def load_recording(
             f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)"
         )
     log, missing = _log(file, table, wanted, thousands, decimal)
-    stem = file.name.removesuffix(".gz").rsplit(".", 1)[0]
     clock = Clock("time", wanted["time"][1]) if "time" in wanted else Clock()
     sources = [
         Source(channel, channel, unit, absolute)
         for channel, (_, unit, absolute) in wanted.items()
         if channel != "time"
     ]
-    (made,) = recordings_of(log, sources, clock, name or stem, role, sample_time)
+    (made,) = recordings_of(log, sources, clock, name or stem_of(file), role, sample_time)
     issues = [Issue("log", channel, 0.0, made.duration, text) for channel, text in missing]
     made = replace(made, issues=[*issues, *made.issues])
     return completed(made, sources, source, ambient_pressure)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import CHANNELS, channel_of
-from pamrs.declared import unknown_key
+from pamrs.declared import NAME, Rule, accepts, unknown_key
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._case_keys import CHANNEL, CLOCK, CONSTANT
 from pamrs.recordings._doubts import unit_trouble
@@ -146,41 +146,38 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
         problems.append(f'{label} = {entry!r} is not allowed: {{ column = "...", unit = "..." }}')
         return None
     constant = "value" in entry
-    allowed = CONSTANT if constant else CHANNEL
-    problems += [unknown_key(f"{label}.", key, allowed) for key in entry if key not in allowed]
-    for key in ("unit",) if constant else ("column", "unit"):
-        if not isinstance(entry.get(key), str) or not entry.get(key):
-            problems.append(f"{label}.{key} = {entry.get(key)!r} is not allowed: a text is needed")
-            return None
-    assumed = entry.get("assumed", "")
-    if not isinstance(assumed, str):
-        problems.append(f"{label}.assumed = {assumed!r} is not allowed: a text says why")
+    rules = CONSTANT if constant else CHANNEL
+    wrong = len(problems)
+    _check(problems, label, entry, rules, ("unit",) if constant else ("column", "unit"))
+    if len(problems) > wrong:
         return None
     unit, kind = measured_from(entry["unit"])
     if trouble := unit_trouble(channel, unit):
         problems.append(f"{label}.unit: {trouble}")
-    absolute = kind == "absolute"
+    shared = {"absolute": kind == "absolute", "assumed": entry.get("assumed", "")}
     if constant:
-        value = entry["value"]
-        if not is_finite(value):
-            problems.append(f"{label}.value = {value!r} is not allowed: a number is needed")
-            return None
-        return Source(name, "", unit, absolute, value=float(value), assumed=assumed)
-    hold = entry.get("hold", False)
-    if not isinstance(hold, bool):
-        problems.append(f"{label}.hold = {hold!r} is not allowed: true or false is needed")
+        return Source(name, "", unit, value=float(entry["value"]), **shared)
     line = read_calibration(problems, label, entry)
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
-    return Source(
-        name,
-        entry["column"],
-        unit,
-        absolute,
-        line,
-        clock=clock,
-        hold=hold is True,
-        assumed=assumed,
-    )
+    hold = entry.get("hold", False)
+    return Source(name, entry["column"], unit, line=line, clock=clock, hold=hold, **shared)
+
+
+def _check(
+    problems: list[str],
+    label: str,
+    entry: Mapping[str, Any],
+    rules: Mapping[str, Rule],
+    needed: Sequence[str] = (),
+) -> None:
+    """Note keys that are unknown, missing or of another type than their rules say."""
+    problems += [unknown_key(f"{label}.", key, rules) for key in entry if key not in rules]
+    for key, rule in rules.items():
+        value = entry.get(key)
+        number = rule.schema.get("type") == "number"
+        fine = is_finite(value) if number else key == "time" or accepts(rule.schema, value)
+        if (key in entry or key in needed) and not fine:
+            problems.append(f"{label}.{key} = {value!r} is not allowed: {rule.needed} is needed")
 
 
 def read_clock(time: Any, source: str) -> Clock:
@@ -218,15 +215,11 @@ def _clock(problems: list[str], label: str, entry: Any) -> Clock:
             "unit and offset"
         )
         return Clock()
-    problems += [unknown_key(f"{label}.", key, CLOCK) for key in entry if key not in CLOCK]
-    column, unit, offset = entry.get("column"), entry.get("unit"), entry.get("offset", 0.0)
-    for key, value in (("column", column), ("unit", unit)):
-        if value is not None and not (isinstance(value, str) and value):
-            problems.append(f"{label}.{key} = {value!r} is not allowed: a text is needed")
-            return Clock()
-    if not is_finite(offset):
-        problems.append(f"{label}.offset = {offset!r} is not allowed: a number of seconds")
+    wrong = len(problems)
+    _check(problems, label, entry, CLOCK | {"unit": Rule(NAME, "a text")})
+    if len(problems) > wrong:
         return Clock()
+    column, unit, offset = entry.get("column"), entry.get("unit"), entry.get("offset", 0.0)
     if unit is not None:
         try:
             to_si(1.0, unit, "time")

@@ -24,6 +24,7 @@ from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
 from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
 from pamrs.recordings.logs import Log, Series, TextFormat, read_log, understood_unit
+from pamrs.recordings.table import stem_of
 from pamrs.rig import Rig
 from pamrs.units import parse_unit, same_dimension
 
@@ -279,8 +280,7 @@ def _proposals(
         sheet = table.rstrip("/")
         if not item.matches:
             item.remarks.append(f"no channel was recognised in {sheet}: nothing is proposed for it")
-        stem = log.path.name.removesuffix(".gz").rsplit(".", 1)[0]
-        made.append(replace(item, name=f"{stem}_{sheet}"))
+        made.append(replace(item, name=f"{stem_of(log.path)}_{sheet}"))
     return made
 
 

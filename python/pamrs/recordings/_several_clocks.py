@@ -14,7 +14,6 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._clock import (
     GAP,
     Array,
-    Event,
     Grid,
     Mask,
     check_samples,
@@ -187,20 +186,10 @@ class _Averaged(Grid):
 class _Held(Grid):
     """Events: each value holds until the next one; there may be only one."""
 
-    def __init__(  # nothing is interpolated
-        self,
-        stamps: Array,
-        rows: NDArray[np.intp],
-        step: float,
-        usual: float,
-        events: list[Event],
-        time: Array | None = None,
-    ) -> None:
-        self.rows = rows
-        self.sample_time, self.usual = step, np.inf
-        self.events = events
-        self.time = stamps if time is None else time
-        self._stamps = stamps
+    interpolates = False
+
+    def _place_samples(self) -> None:
+        """Nothing: no sample lies between two."""
 
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """The last value at or before each time; NaN, and False in the mask, before the first."""
@@ -216,24 +205,12 @@ class _Commanded(_Held):
     follows, so that what they did in all stays the same.
     """
 
-    def __init__(
-        self,
-        stamps: Array,
-        rows: NDArray[np.intp],
-        step: float,
-        usual: float,
-        events: list[Event],
-        time: Array | None = None,
-    ) -> None:
-        super().__init__(stamps, rows, step, usual, events, time)
-        self._longest = GAP * usual
-
     def lay(self, values: Array, usable: Mask) -> tuple[Array, Mask]:
         """Means; NaN, and False in the mask, where the command was not recorded."""
         _, mask = super().lay(values, usable)
         near = 1e-6 * self.sample_time
         lasting = np.diff(self._stamps)
-        lost = ~usable[:-1] | (lasting > self._longest)
+        lost = ~usable[:-1] | (lasting > GAP * self.usual)
         safe = np.where(usable, values, 0.0)
         total = np.concatenate([[0.0], np.cumsum(safe[:-1] * lasting)])
         losses = np.concatenate([[0], np.cumsum(lost)])

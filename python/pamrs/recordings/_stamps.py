@@ -16,6 +16,7 @@ from pamrs.units import parse_unit
 
 __all__ = [
     "CLOCK_WORDS",
+    "TIME_UNITS",
     "Rows",
     "Ticks",
     "counted_on",
@@ -29,7 +30,8 @@ __all__ = [
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
-_NAMED: Final = {
+#: Unit of the words by which series of times are called.
+TIME_UNITS: Final = {
     word: unit
     for unit, words in {
         "ns": "nanos ns nsec nsecs nanosec nanosecs nanosecond nanoseconds",
@@ -85,7 +87,7 @@ def unit_of_stamps(values: Array, name: str, said: str = "") -> tuple[str, str]:
     steps = steps[steps > 0.0]
     usual = float(np.median(steps)) if len(steps) else 0.0
     size = float(np.max(np.abs(good))) if len(good) else 0.0
-    spoken = _NAMED.get(_last_word(name), "")
+    spoken = TIME_UNITS.get(_last_word(name), "")
     for unit in (said, spoken):
         if unit and size * parse_unit(unit).scale <= _LONGEST:
             return unit, "" if unit == said else f"the times {name} are taken as {unit} by name"

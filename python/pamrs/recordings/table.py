@@ -33,6 +33,7 @@ __all__ = [
     "read_text",
     "same_width",
     "split_rows",
+    "stem_of",
     "thousands_of",
     "told_cells",
     "told_rows",
@@ -331,6 +332,11 @@ def is_text(path: Path) -> bool:
     """Whether a file is read as text, by its ending; the others are logs of their own kinds."""
     ending = path.with_suffix("").suffix if path.suffix.lower() == ".gz" else path.suffix
     return ending.lower() in TEXT
+
+
+def stem_of(path: Path) -> str:
+    """Name of a file without its last ending, and without that it is packed."""
+    return path.name.removesuffix(".gz").rpartition(".")[0] or path.name.removesuffix(".gz")
 
 
 def read_text(path: Path) -> str:

@@ -13,7 +13,14 @@ from markupsafe import Markup
 
 from pamrs._losses import Losses
 from pamrs.channels import UNITS, channel_of
-from pamrs.findings import ChannelError, Findings, Trace
+from pamrs.findings import (
+    BlockMismatch,
+    BlockVerdict,
+    ChannelError,
+    Findings,
+    StageError,
+    Trace,
+)
 from pamrs.report import figures
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
@@ -78,136 +85,67 @@ def _typeset(text: str) -> str:
     return raised.replace("+-", "±")
 
 
-def _effects(diagnosis: Findings) -> list[dict[str, Any]]:
-    rows = []
-    for effect in diagnosis.effects:
-        parameters = []
-        for name, p in effect.parameters.items():
-            known = p.identifiable is not False and words.is_number(p.value)
-            parameters.append(
-                {
-                    "name": words.label(name),
-                    "known": known,
-                    "value": words.format_uncertain(p.value, p.std),
-                    "interval": _span(words.span95(p)),
-                    "unit": _unit(p.unit),
-                }
-            )
-        rows.append(
-            {
-                "id": effect.id,
-                "name": words.effect_heading(diagnosis, effect),
-                "probability": words.name_chance(diagnosis, effect),
-                "inclusion": "" if effect.inclusion is None else f"{100 * effect.inclusion:.0f} %",
-                "parameters": parameters,
-            }
-        )
-    return rows
+def _verdict(block: BlockVerdict) -> tuple[str, str, str]:
+    """The verdict of a group of blocks, what it names, and the most probable hypothesis."""
+    wrong, is_open = bool(block.wrong_parameters), len(block.ambiguity) > 1
+    found = [*block.effects, *block.wrong_parameters]
+    leading, chance = max(
+        block.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan)
+    )
+    told = f"{words.hypothesis_label(leading)}, {words.format_probability(chance)}"
+    named = words.set_label(found) if found else "–"
+    return _badge(block.verdict, wrong=wrong, is_open=is_open), named, told
 
 
-def _blocks(diagnosis: Findings) -> list[dict[str, Any]]:
-    """The verdict of each group of blocks, and what each block misses before and after."""
-    rows = []
-    for entry in diagnosis.judged:
-        found = [*entry.effects, *entry.wrong_parameters]
-        leading, chance = max(
-            entry.probabilities.items(), key=lambda kv: kv[1], default=("none", math.nan)
-        )
-        sizes = []
-        for block in entry.mismatch:
-            part = block.held_out or block.fitted
-            unit, factor = words.display_unit(block.unit, abs(part.refit.size))
-            shown = [
-                (
-                    f"{words.format_number(s.noises, 2)} "
-                    f"({words.format_number(s.size * factor, 2)} {unit})"
-                )
-                if s.more_than_noise
-                else "noise only"
-                for s in (part.refit, part.after)
-            ]
-            sizes.append(
-                {
-                    "block": words.spoken_name(block.block),
-                    "refit": shown[0],
-                    "after": shown[1],
-                }
-            )
-        rows.append(
-            {
-                "verdict": _badge(
-                    entry.verdict,
-                    wrong=bool(entry.wrong_parameters),
-                    is_open=len(entry.ambiguity) > 1,
-                ),
-                "names": words.set_label(found) if found else "–",
-                "probability": words.format_probability(chance),
-                "leading": words.hypothesis_label(leading),
-                "sizes": sizes,
-            }
-        )
-    return rows
-
-
-def _not_judged(diagnosis: Findings) -> list[dict[str, str]]:
-    """Blocks that were not judged, and why."""
+def _missed(block: BlockMismatch) -> list[str]:
+    """What a block misses above the noise, refitted and with what was found."""
+    part = block.held_out or block.fitted
+    unit, factor = words.display_unit(block.unit, abs(part.refit.size))
     return [
-        {"block": words.blocks_label(b), "covers": b.covers, "why": b.reason}
-        for b in diagnosis.not_judged
+        f"{words.format_number(s.noises, 2)} ({words.format_number(s.size * factor, 2)} {unit})"
+        if s.more_than_noise
+        else "noise only"
+        for s in (part.refit, part.after)
     ]
 
 
-def _wrong(diagnosis: Findings) -> list[dict[str, Any]]:
-    """Values of the rig file that are wrong."""
-    rows = []
+def _mended(errors: Mapping[str, StageError]) -> str:
+    """What a wrong value does to the errors of the held-out recordings."""
+    told = []
+    for channel, error in errors.items():
+        shown, scale = words.display_unit(UNITS.get(channel_of(channel), ""), max(error.values()))
+        before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
+        told.append(f"{words.spoken_name(channel)}: {before} to {after} {shown}")
+    return "; ".join(told)
+
+
+def _wrong(diagnosis: Findings) -> list[tuple[str, ...]]:
+    """Values of the rig file that are wrong, as cells."""
+    rows: list[tuple[str, ...]] = []
     for entry in diagnosis.wrong_parameters:
         unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
-        errors = []
-        for channel, error in entry.held_out.items():
-            shown, scale = words.display_unit(
-                UNITS.get(channel_of(channel), ""), max(error.values())
-            )
-            before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
-            errors.append(f"{words.spoken_name(channel)}: {before} to {after} {shown}")
-        interval = [float(v) * factor for v in entry.interval]
+        low, high = (float(v) * factor for v in entry.interval)
+        stated = words.format_uncertain(entry.nominal * factor, entry.tolerance * factor)
+        value = words.format_uncertain(entry.value * factor, entry.std * factor)
+        chance, errors = words.name_chance(diagnosis, entry), _mended(entry.held_out)
+        moved = _signed(entry.moved_sigmas)
         rows.append(
-            {
-                "name": entry.name,
-                "unit": _unit(unit),
-                "stated": words.format_uncertain(entry.nominal * factor, entry.tolerance * factor),
-                "value": words.format_uncertain(entry.value * factor, entry.std * factor),
-                "interval": _span((interval[0], interval[1]), 4),
-                "moved": f"{entry.moved_sigmas:+.1f}".replace("-", "−"),
-                "probability": words.name_chance(diagnosis, entry),
-                "errors": "; ".join(errors),
-            }
+            (entry.name, stated, value, _span((low, high), 4), _unit(unit), moved, chance, errors)
         )
     return rows
 
 
-def _tested(diagnosis: Findings) -> list[dict[str, str]]:
-    """Effects that were tested, in percent of the mismatch."""
+def _signed(moved: float) -> str:
+    return f"{moved:+.1f}".replace("-", "−")
 
-    def percent(share: float | None) -> str:
-        return (
-            "not fitted"
-            if share is None
-            else "all"
-            if share >= 1.0
-            else f"{100 * share:.0f} %"
-            if share > 0.005
-            else "under 1 %"
-        )
 
-    return [
-        {
-            "name": words.label(a.id),
-            "blocks": ", ".join(a.blocks),
-            "predicted_gain": percent(a.predicted_gain),
-            "left": percent(a.left),
-        }
-        for a in diagnosis.tested
-    ]
+def _share(share: float | None) -> str:
+    """A share of the mismatch in percent."""
+    if share is None:
+        return "not fitted"
+    if share >= 1.0:
+        return "all"
+    return f"{100 * share:.0f} %" if share > 0.005 else "under 1 %"
 
 
 def _intervals(diagnosis: Findings) -> list[str]:
@@ -222,63 +160,50 @@ def _intervals(diagnosis: Findings) -> list[str]:
 
 
 def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
+    wrong = {w.name for w in diagnosis.wrong_parameters}
     rows = []
     for name, p in diagnosis.parameters.items():
-        known = p.identifiable is not False
-        moved = p.moved_sigmas
-        flag = ""
-        if name in {w.name for w in diagnosis.wrong_parameters}:
-            flag = "the rig file is wrong"
-        elif not known:
+        known, size = p.identifiable is not False, abs(p.moved_sigmas)
+        told = known and math.isfinite(size)
+        flag = "the rig file is wrong" if name in wrong else ""
+        if not flag and not known:
             flag = "not determined by these recordings"
-        elif abs(moved) >= 3:
-            flag = "outside its tolerance"
-        elif abs(moved) >= 2:
-            flag = "at the edge of its tolerance"
+        elif not flag and size >= 2:
+            flag = "outside its tolerance" if size >= 3 else "at the edge of its tolerance"
         rows.append(
             {
+                "cells": (
+                    words.format_number(p.nominal, 4),
+                    words.format_uncertain(p.value, p.std) if known else "–",
+                ),
                 "name": name,
-                "nominal": words.format_number(p.nominal, 4),
-                "value": words.format_uncertain(p.value, p.std) if known else "–",
                 "unit": _unit(p.unit),
-                "moved": f"{moved:+.1f}".replace("-", "−")
-                if known and math.isfinite(moved)
-                else "–",
-                "bar": min(1.0, abs(moved) / 4.0) if known and math.isfinite(moved) else 0.0,
-                "right": moved >= 0,
+                "moved": _signed(p.moved_sigmas) if told else "–",
+                "bar": min(1.0, size / 4.0) if told else 0.0,
+                "right": p.moved_sigmas >= 0,
                 "flag": flag,
-                "known": known and math.isfinite(moved),
-                "alarm": known and abs(moved) >= 3,
+                "known": told,
+                "alarm": known and size >= 3,
             }
         )
     return rows
 
 
-def _fit(errors: dict[str, ChannelError]) -> list[dict[str, Any]]:
+def _fit(errors: dict[str, ChannelError]) -> list[tuple[str, str, list[tuple[str, str, str]]]]:
+    """Errors by channel: its name and unit, and of each stage its key, value and noise levels."""
     rows = []
-    for channel, entry in errors.items():
-        sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-        unit, factor = words.display_unit(
-            UNITS.get(channel_of(channel), ""), max(sizes, default=math.nan)
-        )
-        noise = entry.noise
-        cells = []
-        for key in ("noise", "before", "refit", "after"):
-            value = entry[key]
-            good = words.is_number(value)
-            ratio = (
-                float(value) / float(noise)
-                if good and words.is_number(noise) and float(noise) > 0
-                else math.nan
-            )
-            times = "–" if math.isnan(ratio) else f"{words.format_number(ratio, 2)}×"
-            shown = words.format_number(float(value) * factor) if good else "–"
-            cells.append({"key": key, "value": shown, "times": "" if key == "noise" else times})
-        rows.append({"channel": words.spoken_name(channel), "unit": unit, "cells": cells})
+    for channel, unit, factor, entry in words.shown_errors(errors):
+        noise, cells = entry.noise, []
+        for key, value in entry.items():
+            known = words.is_number(value) and words.is_number(noise) and noise > 0
+            times = f"{words.format_number(value / noise, 2)}×" if known else "–"
+            shown = words.format_number(value * factor) if words.is_number(value) else "–"
+            cells.append((key, shown, "" if key == "noise" else times))
+        rows.append((words.spoken_name(channel), unit, cells))
     return rows
 
 
-def _fits(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
+def _fits(diagnosis: Findings) -> list[tuple[str, list[Any]]]:
     """The tables of errors with their titles."""
     tables = (
         ("Held-out recordings (not used for the fit)", _fit(diagnosis.fit.held_out)),
@@ -287,22 +212,19 @@ def _fits(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
     return [(title, rows) for title, rows in tables if rows]
 
 
-def _sets(diagnosis: Findings) -> list[tuple[str, str]]:
-    """The sets that are left, each with its probability: as the headline has it, by the one group
-    of blocks that is open, else that of the case.
+def _chance(diagnosis: Findings, names: list[str]) -> str:
+    """Probability of a set that is left: as the headline has it, by the one group of blocks that is
+    open, else that of the case.
     """
     is_open = [b for b in diagnosis.judged if len(b.ambiguity) > 1]
-    own = is_open[0].probabilities if len(is_open) == 1 else {}
-    found = []
-    for names in diagnosis.ambiguity:
-        chance = words.chance_of(own, names)
-        if not words.is_number(chance):
-            chance = words.chance_of(diagnosis.probabilities, names)
-        found.append((words.set_label(names), words.format_probability(chance)))
-    return found
+    own = words.chance_of(is_open[0].probabilities if len(is_open) == 1 else {}, names)
+    known = words.is_number(own)
+    return words.format_probability(
+        own if known else words.chance_of(diagnosis.probabilities, names)
+    )
 
 
-def _free_run(diagnosis: Findings) -> list[dict[str, Any]]:
+def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
     """Errors of free runs beside those of the cut chain, channel by channel."""
     rows = []
     for run in diagnosis.free_run or []:
@@ -311,21 +233,8 @@ def _free_run(diagnosis: Findings) -> list[dict[str, Any]]:
             sizes = [abs(v) for v in every if words.is_number(v)]
             unit, factor = words.display_unit(error.unit, max(sizes, default=math.nan))
             cells = [words.format_number(v * factor) if words.is_number(v) else "–" for v in every]
-            rows.append(
-                {
-                    "recording": run.recording if k == 0 else "",
-                    "channel": words.spoken_name(channel),
-                    "unit": unit,
-                    "cells": cells,
-                }
-            )
+            rows.append((run.recording if k == 0 else "", words.spoken_name(channel), unit, cells))
     return rows
-
-
-def _free_notes(diagnosis: Findings) -> list[str]:
-    """What is missing among the free runs, and why."""
-    notes = [f"{run.recording}: {run.note}" for run in diagnosis.free_run or [] if run.note]
-    return [*notes, *([diagnosis.free_run_note] if diagnosis.free_run_note else [])]
 
 
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
@@ -411,11 +320,6 @@ def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
     return facts
 
 
-def _excitation(diagnosis: Findings) -> list[tuple[str, str]]:
-    content = diagnosis.next_experiment.excitation
-    return [(words.label(str(k)), _value(v)) for k, v in content.items()]
-
-
 def _value(value: object) -> str:
     """A value of an excitation; of several chains by their names."""
     if isinstance(value, Mapping):
@@ -429,27 +333,6 @@ def _separating(diagnosis: Findings) -> str | None:
     """The curves of the next experiment, where it was simulated."""
     curves = diagnosis.next_experiment.curves
     return figures.separating_curves(curves) if curves else None
-
-
-def _pairs(diagnosis: Findings) -> list[tuple[str, str]]:
-    """What tells each two hypotheses that are left open apart."""
-    return [
-        (" or ".join(words.hypothesis_label(name) for name in pair.between), text)
-        for pair, text in words.told_pairs(diagnosis)
-    ]
-
-
-def _ranking(diagnosis: Findings) -> list[dict[str, str]]:
-    """The experiments that were compared, the most telling first."""
-    return [
-        {
-            "name": words.label(entry.name)
-            + (f" with {words.label(entry.sensor)}" if entry.sensor else ""),
-            "bits": words.format_number(entry.bits, 2),
-            "effort": f"{entry.effort_s / 60.0:.1f} min",
-        }
-        for entry in diagnosis.next_experiment.ranking
-    ]
 
 
 def render(diagnosis: Findings) -> str:
@@ -479,10 +362,11 @@ def render(diagnosis: Findings) -> str:
     )
     bits = diagnosis.next_experiment.expected_information_bits
     shown = diagnosis.condition_map.block if diagnosis.condition_map else ""
-    warnings = [*losses.told, *diagnosis.warnings]
-    return render_page(
+    page = partial(
+        render_page,
         Path(__file__).with_name("template.html.j2"),
         d=diagnosis,
+        w=words,
         badge=_badge(
             diagnosis.verdict,
             wrong=bool(diagnosis.wrong_parameters),
@@ -490,34 +374,30 @@ def render(diagnosis: Findings) -> str:
         ),
         headline=_typeset(words.claim(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
-        warnings=(warnings[:WARNINGS_SHOWN], warnings[WARNINGS_SHOWN:]),
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
-        conditions=[condition.text for condition in diagnosis.where.conditions],
         map_block=words.spoken_name(shown or diagnosis.where.block or ""),
-        budget_note=words.BUDGET_NOTE,
-        experiment=diagnosis.next_experiment.text,
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
         recordings=recordings,
         hidden=hidden,
-        timings=[(words.label(k), f"{float(v):.1f} s") for k, v in diagnosis.timings.items()],
         data=". ".join(
             text
             for text in (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis))
             if text
         ),
-        model=diagnosis.model,
+        guarded=lambda what, caller: losses.part(f"the table of {what}", caller, ""),
+        cells={"unit": _unit, "span": _span, "share": _share, "value": _value},
+        verdict=_verdict,
+        missed=_missed,
+        chance=partial(_chance, diagnosis),
         **pictures,
         **tables,
     )
-
-
-def _budgets(diagnosis: Findings) -> list[str]:
-    """What takes the mismatch of each block, in words."""
-    return [
-        f"{words.spoken_name(block)}: {sentence}"
-        for block, sentence in words.budget_sentences(diagnosis)
-    ]
+    known = len(losses.told)
+    text = page(warnings=[*losses.told, *diagnosis.warnings], most=WARNINGS_SHOWN)
+    if len(losses.told) == known:
+        return text
+    return page(warnings=[*losses.told, *diagnosis.warnings], most=WARNINGS_SHOWN)
 
 
 #: What the template calls each, and what makes it.
@@ -532,20 +412,8 @@ _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
     "facts": _facts,
     "intervals": _intervals,
     "free_run": _free_run,
-    "free_notes": _free_notes,
     "probabilities": _probabilities,
-    "effects": _effects,
-    "verdicts": _blocks,
-    "not_judged": _not_judged,
-    "budgets": _budgets,
     "wrong": _wrong,
-    "kept": lambda diagnosis: [words.kept_details(u) for u in diagnosis.unexplained],
-    "considered": lambda d: [words.considered_sentence(asked) for asked in d.considered],
-    "ambiguity": _sets,
-    "tested": _tested,
-    "excitation": _excitation,
-    "ranking": _ranking,
-    "pairs": _pairs,
     "fits": _fits,
     "parameters": _parameters,
 }

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import html
-import math
 import textwrap
 from typing import Final
 
-from pamrs.channels import unit_of
 from pamrs.findings import Findings
 from pamrs.report import text as words
 from pamrs.units import with_unit
@@ -144,18 +142,11 @@ def _fit(diagnosis: Findings) -> list[str]:
         return []
     title = "held-out error" if diagnosis.fit.held_out else "error (fit)"
     lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
-    for channel, entry in channels.items():
-        sizes = [abs(float(v)) for v in entry.values() if words.is_number(v)]
-        unit, factor = words.display_unit(unit_of(channel), max(sizes, default=math.nan))
-        unit = unit.replace("°", "deg")
-        row = f"{channel} [{unit}]" if unit else channel
-        for key in ("noise", "before", "refit", "after"):
-            value = entry[key]
-            shown = float(value) * factor if words.is_number(value) else None
-            row = (
-                f"{row:<22}" if key == "noise" else row
-            ) + f"{words.format_number(shown, unicode=False):>11}"
-        lines.append(row)
+    for channel, unit, factor, entry in words.shown_errors(channels):
+        name = with_unit(channel, f"[{unit.replace('°', 'deg')}]" if unit else "")
+        shown = [float(v) * factor if words.is_number(v) else None for v in entry.values()]
+        cells = (f"{words.format_number(v, unicode=False):>11}" for v in shown)
+        lines.append(f"{name:<22}{''.join(cells)}")
     gap = diagnosis.fit.gap_closed
     if words.is_number(gap):
         lines.append(

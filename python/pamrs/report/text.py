@@ -5,15 +5,17 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, TypeGuard
 
+from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
 from pamrs.findings import (
     HEALTHY,
     BlockVerdict,
     BudgetTerm,
+    ChannelError,
     Considered,
     EffectFound,
     EffectParameterFound,
@@ -62,6 +64,7 @@ __all__ = [
     "off_sentence",
     "ranked_probabilities",
     "sentence_of",
+    "shown_errors",
     "set_label",
     "span95",
     "spoken_block",
@@ -165,6 +168,15 @@ def display_unit(unit: str, magnitude: float) -> tuple[str, float]:
         if not math.isfinite(magnitude) or abs(magnitude) >= least:
             return name, factor
     return unit, 1.0
+
+
+def shown_errors(
+    errors: Mapping[str, ChannelError],
+) -> Iterator[tuple[str, str, float, ChannelError]]:
+    """Each channel with the unit that its errors are shown in, the factor from SI, and them."""
+    for channel, entry in errors.items():
+        sizes = [abs(v) for v in entry.values() if is_number(v)]
+        yield channel, *display_unit(unit_of(channel), max(sizes, default=math.nan)), entry
 
 
 def _power(exponent: int, unicode: bool) -> str:

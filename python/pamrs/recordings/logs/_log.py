@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_SIZE
 from pamrs.errors import RecordingError
 from pamrs.recordings._gate import check_size
+from pamrs.recordings._stamps import TIME_UNITS
 from pamrs.recordings.table import Table
+from pamrs.units import parse_unit
 
 __all__ = ["Log", "Series", "TextFormat", "collected", "numbers_of", "table_of"]
 
@@ -221,16 +223,8 @@ def collected(
 
 
 _MOST_SAID: Final = 8  # names that are there again, and are said
-_SECONDS: Final = frozenset({"sec", "secs", "second", "seconds", "s"})
-_BEYOND: Final = {
-    word: scale
-    for scale, words in {
-        1e-9: "nanosec nanosecs nanosecond nanoseconds nsec nsecs nanos ns",
-        1e-6: "microsec microsecs microsecond microseconds usec usecs micros us",
-        1e-3: "millisec millisecs millisecond milliseconds msec msecs millis ms",
-    }.items()
-    for word in words.split()
-}
+_SECONDS: Final = frozenset(word for word, unit in TIME_UNITS.items() if unit == "s")
+_BEYOND: Final = {word: parse_unit(unit).scale for word, unit in TIME_UNITS.items() if unit != "s"}
 
 
 def _parted(name: str) -> tuple[str, str]:
