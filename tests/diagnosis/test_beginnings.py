@@ -10,7 +10,8 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import Outcome, counted, outcome_of
+from pamrs.diagnosis.next_experiment._choice import Outcome, outcome_of
+from pamrs.diagnosis.next_experiment._differences import counted
 from pamrs.diagnosis.prepare import (
     Block,
     Prepared,

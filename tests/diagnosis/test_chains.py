@@ -15,8 +15,9 @@ from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
 from pamrs.diagnosis.next_experiment import _planning as plan
-from pamrs.diagnosis.next_experiment import measurable, noise_of, propose
+from pamrs.diagnosis.next_experiment import measurable, propose
 from pamrs.diagnosis.next_experiment._asked import _Question, _telling
+from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError

@@ -11,7 +11,9 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.next_experiment import entropy, information, propose, taken, usual_noise
+from pamrs.diagnosis.next_experiment import propose
+from pamrs.diagnosis.next_experiment._choice import entropy, information
+from pamrs.diagnosis.next_experiment._differences import taken, usual_noise
 from pamrs.diagnosis.result import schema
 from pamrs.experiments import library
 from tests.diagnosis import synthetic

@@ -16,20 +16,17 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.next_experiment import (
-    _choice,
-    entropy,
+from pamrs.diagnosis.next_experiment import _choice, measurable, propose
+from pamrs.diagnosis.next_experiment._asked import _pair, _Question, _telling
+from pamrs.diagnosis.next_experiment._choice import entropy, outcome_of
+from pamrs.diagnosis.next_experiment._differences import (
     linear,
-    measurable,
     misfit,
     noise_of,
-    outcome_of,
     problem_of,
-    propose,
     taken,
     usual_noise,
 )
-from pamrs.diagnosis.next_experiment._asked import _pair, _Question, _telling
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import term_of
 from pamrs.errors import DiagnosisError, RigError

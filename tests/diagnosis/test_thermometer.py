@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis.next_experiment import _planning, checked_channels, measurable
+from pamrs.diagnosis.next_experiment import _planning, measurable
 from pamrs.diagnosis.next_experiment._choice import outcome_of
+from pamrs.diagnosis.next_experiment._differences import checked_channels
 from pamrs.diagnosis.prepare import available_blocks, thermometers_of
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.experiments import library

@@ -8,7 +8,6 @@ import contextlib
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
@@ -174,6 +173,16 @@ class _Question:
         made = self._made(tuple(names))
         return telling.text if made is None else made.text, telling.shows, made
 
+    def answer(self, begin: str, block: Block, names: Iterable[str] = ()) -> NextExperiment:
+        """What to record about a block, behind the words that say why."""
+        what, shows, experiment = self.experiment(block, names)
+        kind = {"kind": _telling(block, self.nominal, names).kind, "block": block.name}
+        text = f"{begin}: {what}; {shows}."
+        if experiment is None:
+            return NextExperiment(text, kind)
+        excitation = kind | experiment.excitation
+        return NextExperiment(text, excitation, protocol=protocol_of(experiment))
+
     def _made(self, names: tuple[str, ...]) -> Experiment | None:
         """The first experiment of some names that the library makes for this rig; None where it
         makes none of them.
@@ -276,22 +285,11 @@ def _told(
         return NextExperiment(_measured(measurable) + ".")
     settled = not ambiguity and verdict != "unlisted"
     block = missing[0] if missing and not ambiguity else asked.place(names or [verdict])
-    what, shows, experiment = asked.experiment(block, names)
-    begin = "The name is settled. For the rest of the residual in the" if settled else "For the"
-    rest = (
-        " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
-        if settled
-        else spoken_name(block.name)
-    )
-    text = f"{begin} {rest}: {what}; {shows}."
-    excitation: dict[str, Any] = {
-        "kind": _telling(block, asked.nominal, names).kind,
-        "block": block.name,
-    }
-    if experiment is None:
-        return NextExperiment(text, excitation)
-    excitation |= experiment.excitation
-    return NextExperiment(text, excitation, protocol=protocol_of(experiment))
+    if not settled:
+        return asked.answer(f"For the {spoken_name(block.name)}", block, names)
+    rest = " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
+    begin = f"The name is settled. For the rest of the residual in the {rest}"
+    return asked.answer(begin, block, names)
 
 
 def _of_whole(asked: _Question, channel: str) -> NextExperiment:
@@ -303,12 +301,7 @@ def _of_whole(asked: _Question, channel: str) -> NextExperiment:
             f"{begin}: record the channels between it and the commands as well, so that "
             "the blocks that were not judged can be."
         )
-    what, shows, experiment = asked.experiment(block)
-    text = f"{begin}. For the {spoken_name(block.name)}: {what}; {shows}."
-    kind = {"kind": _telling(block, asked.nominal).kind, "block": block.name}
-    if experiment is None:
-        return NextExperiment(text, kind)
-    return NextExperiment(text, kind | experiment.excitation, protocol=protocol_of(experiment))
+    return asked.answer(f"{begin}. For the {spoken_name(block.name)}", block)
 
 
 def _pairs(

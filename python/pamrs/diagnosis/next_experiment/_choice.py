@@ -256,9 +256,7 @@ def outcome_of(
     return outcome if ranking else outcome.exactly(pairs, probabilities)
 
 
-def ranked(
-    outcomes: Sequence[Outcome], probabilities: Sequence[float], resolution: float
-) -> list[Outcome]:
+def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[Outcome]:
     """Outcomes by what they tell, the most telling first; of those that tell the same, the
     cheapest. What takes something that the rig file does not say to be there comes last.
 
@@ -268,14 +266,12 @@ def ranked(
         Of the same hypotheses.
     probabilities : sequence of float
         Of these hypotheses, which may have changed since.
-    resolution : float
-        Difference of information that counts [bit].
     """
     return sorted(
         outcomes,
         key=lambda o: (
             bool(o.experiment.needs),
-            -round(information(probabilities, o.distance) / resolution),
+            -round(information(probabilities, o.distance) / _RESOLUTION),
             o.effort,
         ),
     )
@@ -386,16 +382,13 @@ def propose(
             f"{', '.join(own) or 'no channel'}"
         )
     probabilities = [p for _, _, p in chosen]
-    best_first = ranked(found, probabilities, _RESOLUTION)
+    best_first = ranked(found, probabilities)
     pairs = list(itertools.permutations(range(len(chosen)), 2))
     best = best_first[0] = best_first[0].exactly(pairs, probabilities)
+    added = {"sensor": best.sensor} if best.sensor else {}
     return NextExperiment(
-        text=_text(best, chosen, uncertainty, _HOPELESS_SHARE)
-        + _with_more(best, best_first, _RESOLUTION),
-        excitation={
-            **best.experiment.excitation,
-            **({"sensor": best.sensor} if best.sensor else {}),
-        },
+        text=_text(best, chosen, uncertainty) + _with_more(best, best_first),
+        excitation=best.experiment.excitation | added,
         expected_information_bits=round(best.bits, 3),
         ranking=[
             RankedExperiment(
@@ -404,7 +397,7 @@ def propose(
             for o in best_first[:_MOST_SHOWN]
         ],
         curves=_curves(best, chosen),
-        pairs=_pairs(best_first, chosen, _RESOLUTION),
+        pairs=_pairs(best_first, chosen),
         protocol=protocol_of(best.experiment),
     )
 
@@ -442,15 +435,13 @@ def _nested(one: Rig, other: Rig) -> bool:
     return first <= second or second <= first
 
 
-def _pairs(
-    outcomes: Sequence[Outcome], hypotheses: Sequence[Hypothesis], resolution: float
-) -> list[PairExperiment]:
+def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Hypothesis]) -> list[PairExperiment]:
     """For every two hypotheses the experiment that tells most of these two, by what is there."""
     there = [o for o in outcomes if not (o.experiment.needs or o.sensor)] or list(outcomes)
     found = []
     for i, j in itertools.combinations(range(len(hypotheses)), 2):
         alone = [replace(o, distance=o.distance[np.ix_([i, j], [i, j])]) for o in there]
-        chosen = ranked(alone, [0.5, 0.5], resolution)[0]
+        chosen = ranked(alone, [0.5, 0.5])[0]
         outcome = there[alone.index(chosen)]
         if outcome is not outcomes[0]:
             outcome = outcome.exactly([(i, j), (j, i)], [p for _, _, p in hypotheses])
@@ -468,25 +459,21 @@ def _pairs(
 def _missed(outcome: Outcome, i: int, j: int) -> str:
     """What hypothesis j misses of what hypothesis i predicts, in words."""
     channel, size = _largest(outcome, i, j)
-    return f"{_plain(channel)} by {size:.2g} times the noise level"
+    return f"{spoken_name(channel)} by {size:.2g} times the noise level"
 
 
 def _told(outcome: Outcome) -> str:
     """What to record, and with which further sensor, in words."""
     text = outcome.experiment.text
-    sensor = f", with one more channel: {_plain(outcome.sensor)}" if outcome.sensor else ""
+    sensor = f", with one more channel: {spoken_name(outcome.sensor)}" if outcome.sensor else ""
     return f"{text[:1].upper()}{text[1:]}{sensor}"
 
 
-def _plain(channel: str) -> str:
-    return spoken_name(channel)
-
-
-def _with_more(best: Outcome, best_first: Sequence[Outcome], resolution: float) -> str:
+def _with_more(best: Outcome, best_first: Sequence[Outcome]) -> str:
     """What an experiment would tell that takes something which the rig file does not list, where
     that is more; else nothing.
     """
-    others = [o for o in best_first if o.experiment.needs and o.bits > best.bits + resolution]
+    others = [o for o in best_first if o.experiment.needs and o.bits > best.bits + _RESOLUTION]
     if best.experiment.needs or not others:
         return ""
     most = max(others, key=lambda o: o.bits)
@@ -559,9 +546,7 @@ def spoken(label: str) -> str:
     return " with ".join(told(part) for part in label.split("+"))
 
 
-def _text(
-    best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float, hopeless: float
-) -> str:
+def _text(best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float) -> str:
     # of the leading pair: what the second one cannot explain of what the first one does
     j = min(range(1, len(hypotheses)), key=lambda k: (-round(hypotheses[k][2], 2), k))
     said = (
@@ -570,7 +555,7 @@ def _text(
         f"parameters. The expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of "
         "uncertainty."
     )
-    if best.bits < hopeless * uncertainty:
+    if best.bits < _HOPELESS_SHARE * uncertainty:
         said += " No standard experiment does better with these channels: consider another sensor."
     return said
 

@@ -40,6 +40,7 @@ from pamrs.simulation import Simulation, core_rig, has_frame, reading
 __all__ = [
     "Left",
     "Linear",
+    "bins_of_fit",
     "checked_channels",
     "counted",
     "difference",
@@ -348,11 +349,34 @@ def difference(
     return _left(problem, values, other, weights)
 
 
+def bins_of_fit(
+    problem: Problem,
+    prepared: Prepared,
+    block: Block,
+    found: Residual,
+    weights: Mapping[Key, float],
+) -> tuple[Array, float]:
+    """Sensitivities of a block in bins of the fit, and what makes noise levels of their units, as
+    many independent ones as the recording counts for.
+    """
+    jacobian = found.jacobian
+    slope, counts = binned(
+        np.zeros((found.value.size, 0)) if jacobian is None else jacobian,
+        found.rows,
+        bin_width(prepared, FIT_BIN_TIME),
+    )
+    key = (block.name, prepared.recording.name)
+    noise_level = weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
+    size = counted(prepared, block, problem.settings)
+    # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in coarse
+    # ones
+    return slope, math.sqrt(size / max(1, int((counts > 0).sum()))) / noise_level
+
+
 def _left(
     problem: Problem, values: Mapping[Key, Array], model: Linear, weights: Mapping[Key, float]
 ) -> Left:
     spread = np.array(list(model.free.values()))
-    own_settings = problem.settings
     rows, slopes, scales = [], [], []
     keys: list[Key] = []
     sizes: dict[Key, float] = {}
@@ -361,17 +385,9 @@ def _left(
         for block in problem.blocks:
             key = (block.name, prepared.recording.name)
             r = model.found[key]
-            mean, counts = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
-            slope, _ = binned(
-                np.zeros((values[key].size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
-            )
-            noise_level = (
-                weights[key] * prepared.noise[block.channel] / math.sqrt(bins_of(prepared))
-            )
-            # what differs is smooth over a bin of 0.1 s: its mean square in fine bins is that in
-            # coarse ones
-            sizes[key] = counted(prepared, block, own_settings)
-            scale = math.sqrt(sizes[key] / max(1, int((counts > 0).sum()))) / noise_level
+            mean, _ = binned(np.where(r.rows, values[key], 0.0), r.rows, width)
+            slope, scale = bins_of_fit(problem, prepared, block, r, weights)
+            sizes[key] = counted(prepared, block, problem.settings)
             rows.append(mean * scale)
             slopes.append(-slope * spread * scale)
             scales.append(scale)

@@ -200,9 +200,7 @@ class Plan:
             "groups": [list(group) for group in self.groups],
             "additions": [
                 {
-                    "kind": a.kind,
-                    "name": a.name,
-                    "text": a.text,
+                    **vars(a),
                     "seen": list(a.seen),
                     "separated": [list(pair) for pair in a.separated],
                     "bits": round(a.bits, 3),

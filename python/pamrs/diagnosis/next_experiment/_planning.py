@@ -38,8 +38,8 @@ from pamrs.diagnosis.fit import (
     starts_of,
 )
 from pamrs.diagnosis.next_experiment._differences import (
+    bins_of_fit,
     checked_channels,
-    counted,
     measurable,
     noise_of,
     taken,
@@ -48,7 +48,6 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._words import words
-from pamrs.diagnosis.noise import bins_of
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, info_of, term_of
@@ -429,13 +428,7 @@ def _parts(
     scale, slopes, moved = {}, {}, {}
     for block in blocks:
         key = (block.name, experiment.name)
-        r = base[key]
-        slope, counts = binned(
-            np.zeros((r.value.size, 0)) if r.jacobian is None else r.jacobian, r.rows, width
-        )
-        noise_level = weights[key] * noise[block.channel] / math.sqrt(bins_of(prepared))
-        effective = counted(prepared, block, settings)
-        scale[key] = math.sqrt(effective / max(1, int((counts > 0).sum()))) / noise_level
+        slope, scale[key] = bins_of_fit(problem, prepared, block, base[key], weights)
         slopes[key] = slope * spread * scale[key]
         moved[key] = np.zeros((slope.shape[0], len(starts)))
     for index, start in enumerate(starts):
