@@ -30,6 +30,7 @@ __all__ = [
     "read_toml",
     "resolved",
     "shown",
+    "toml_document",
 ]
 
 MOST_BYTES: Final = 512 << 20
@@ -147,6 +148,18 @@ def read_toml(path: Path) -> str:
         If it is no text in UTF-8.
     """
     return read_file(path, most=MOST_TOML_BYTES).decode("utf-8-sig").replace("\r\n", "\n")
+
+
+def toml_document(path: Path, error: type[Exception]) -> dict[str, Any]:
+    """A description in TOML; what is wrong with the file is an error of the type that is given."""
+    try:
+        return parse_toml(read_toml(path))
+    except OSError as why:
+        raise error(f"{path}: cannot be read ({why.strerror or why})") from why
+    except UnicodeDecodeError as why:
+        raise error(f"{path}: not a text file in UTF-8") from why
+    except tomllib.TOMLDecodeError as why:
+        raise error(f"{path}: not valid TOML: {why}") from why
 
 
 def parse_toml(text: str) -> dict[str, Any]:

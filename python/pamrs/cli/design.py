@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
@@ -39,6 +39,7 @@ def _root() -> None:
 
 @design_app.command("joint")
 def _joint(
+    context: typer.Context,
     muscle: Annotated[
         str, typer.Option(help="A muscle of the library, or a rig file (TOML) with one.")
     ],
@@ -101,8 +102,7 @@ def _joint(
     problem = _problem(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
     )
-    search = _Search(method, evaluations, mutation, seed)
-    found = _found(problem, search, pressures=minimise_pressure, compare=compare, pareto=pareto)
+    found = _found(context, problem)
     title = f"{count} {muscle}, {torque} from {min_angle} to {max_angle}"
     caption = f"{title}: {bar_and_psi(found.design.problem.pressure)}"
 
@@ -124,16 +124,6 @@ def _joint(
 
 
 @dataclass(frozen=True)
-class _Search:
-    """How the designs are searched."""
-
-    method: str
-    evaluations: int
-    mutation: float
-    seed: int
-
-
-@dataclass(frozen=True)
 class _Found:
     """The design, and what else was asked for."""
 
@@ -144,55 +134,42 @@ class _Found:
     front: ParetoFront | None = None
 
 
-def _found(
-    problem: JointProblem, search: _Search, *, pressures: bool, compare: bool, pareto: bool
-) -> _Found:
-    """The design, at the least pressure where that is asked for, with the comparison and the
-    front.
+def _found(context: typer.Context, problem: JointProblem) -> _Found:
+    """The design, at the least pressure where that is asked for (by repeated searches and by a
+    direct one), with the comparison and the front.
     """
-    from pamrs.design import Genetic, compare_methods, pareto_front
+    from pamrs.design import (
+        Genetic,
+        compare_methods,
+        least_pressure,
+        minimum_pressure,
+        optimise,
+        pareto_front,
+    )
 
-    found = _least_pressure(problem, search) if pressures else _design(problem, search)
+    given = context.params
+    method, evaluations, seed = (given[key] for key in ("method", "evaluations", "seed"))
+    options = {"evaluations": evaluations, "seed": seed}
+    genetic = Genetic(mutation=given["mutation"])
+    if given["minimise_pressure"]:
+        with _bar("pressures") as bar:
+            lowest = minimum_pressure(problem, method, genetic=genetic, **options, progress=bar)
+        with _bar("designs") as bar:
+            strict = least_pressure(problem, seed=seed, progress=bar)
+        found = _Found(lowest.design, lowest, strict)
+    else:
+        with _bar("designs") as bar:
+            found = _Found(optimise(problem, method, genetic=genetic, **options, progress=bar))
     problem = found.design.problem
-    if compare:
-        settings = Genetic(mutation=search.mutation, tolerance=None)
-        with _bar("runs") as progress:
-            comparison = compare_methods(
-                problem, evaluations=search.evaluations, genetic=settings, progress=progress
-            )
-        found = replace(found, comparison=comparison)
-    if pareto:
-        with _bar("generations") as progress:
-            front = pareto_front(problem, seed=search.seed, progress=progress)
-        found = replace(found, front=front)
+    if given["compare"]:
+        lasting = replace(genetic, tolerance=None)
+        with _bar("runs") as bar:
+            runs = compare_methods(problem, evaluations=evaluations, genetic=lasting, progress=bar)
+        found = replace(found, comparison=runs)
+    if given["pareto"]:
+        with _bar("generations") as bar:
+            found = replace(found, front=pareto_front(problem, seed=seed, progress=bar))
     return found
-
-
-def _design(problem: JointProblem, search: _Search) -> _Found:
-    """The best design at the pressure of the problem."""
-    from pamrs.design import optimise
-
-    with _bar("designs") as progress:
-        return _Found(optimise(problem, search.method, **_options(search), progress=progress))
-
-
-def _least_pressure(problem: JointProblem, search: _Search) -> _Found:
-    """The design that needs the least pressure, by repeated searches and by a direct one."""
-    from pamrs.design import least_pressure, minimum_pressure
-
-    with _bar("pressures") as progress:
-        lowest = minimum_pressure(problem, search.method, **_options(search), progress=progress)
-    with _bar("designs") as progress:
-        strict = least_pressure(problem, seed=search.seed, progress=progress)
-    return _Found(lowest.design, lowest, strict)
-
-
-def _options(search: _Search) -> dict[str, Any]:
-    """What both searches take."""
-    from pamrs.design import Genetic
-
-    genetic = Genetic(mutation=search.mutation)
-    return {"evaluations": search.evaluations, "seed": search.seed, "genetic": genetic}
 
 
 # ------------------------------------------------------------------------- inputs

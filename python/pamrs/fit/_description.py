@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from pamrs._files import is_inside, parse_toml, read_toml
+from pamrs._files import is_inside, toml_document
 from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
@@ -90,7 +89,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     RecordingError
         With every problem found in it.
     """
-    document = _document(file)
+    document = toml_document(file, RecordingError)
     reader = Reader()
     reader.unknown_keys("", document, _TOP)
     if document.get("schema") != SCHEMA:
@@ -156,17 +155,6 @@ def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
         },
         **block,
     }
-
-
-def _document(file: Path) -> dict[str, Any]:
-    try:
-        return parse_toml(read_toml(file))
-    except OSError as error:
-        raise RecordingError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        raise RecordingError(f"{file}: not a text file in UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise RecordingError(f"{file}: not valid TOML: {error}") from error
 
 
 def _text(reader: Reader, document: Mapping[str, Any], key: str) -> str:

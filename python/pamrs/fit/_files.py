@@ -16,7 +16,7 @@ from pamrs.fit._bench import from_recording
 from pamrs.fit._data import ForceMap
 from pamrs.recordings import load_recording
 from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
-from pamrs.recordings.dialect import decimal_of, dialect_of
+from pamrs.recordings.dialect import check_marks, decimal_of, dialect_of
 from pamrs.recordings.logs import read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, read_text, stem_of
 from pamrs.units import parse_unit, same_dimension, to_si
@@ -93,7 +93,7 @@ def read_map(
         )
     if file.is_dir():
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
-    _one_character(delimiter, decimal, source)
+    check_marks(delimiter, decimal, source)
     delimiter, table = _table(file, delimiter, decimal, columns)
     headings, lines = _renamed(table, columns, source)
     found, strange = _understood(headings, lines, source)
@@ -155,18 +155,6 @@ def _left_over(table: Table, strange: Sequence[str]) -> list[str]:
     """Notes on what of a table is not used: columns of unknown meaning, and rows."""
     notes = [f"columns not used: {', '.join(strange)}"] if strange else []
     return [*notes, *table.remarks]
-
-
-def _one_character(delimiter: str | None, decimal: str | None, source: str) -> None:
-    if delimiter and len(delimiter) != 1:
-        raise RecordingError(
-            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed, like "
-            "',' or ';' or '\\t' (tabulator)"
-        )
-    if decimal and decimal not in (".", ","):
-        raise RecordingError(
-            f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
-        )
 
 
 def _texts(table: Table, found: Mapping[str, _Column]) -> list[Sequence[str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import tomllib
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -12,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
+from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of
 from pamrs.declared import accepts, unknown_key
 from pamrs.effects import find_parameter
@@ -195,18 +194,11 @@ def model_and_case(file: Path) -> tuple[Rig, Path]:
 def _document(file: Path, given: Path) -> dict[str, Any]:
     if not given.exists():
         raise CaseError(f"{given}: no such case folder")
-    try:
-        return parse_toml(read_toml(file))
-    except FileNotFoundError:
+    if not file.exists():
         below = next(iter(sorted([*given.glob("*/case.toml"), *given.glob("*/*/case.toml")])), None)
         hint = "" if below is None else f"; did you mean {str(below.parent)!r}?"
-        raise CaseError(f"{given}: not a case folder, it has no case.toml{hint}") from None
-    except OSError as error:
-        raise CaseError(f"{file}: cannot be read ({error.strerror or error})") from error
-    except UnicodeDecodeError as error:
-        raise CaseError(f"{file}: not a text file in UTF-8") from error
-    except tomllib.TOMLDecodeError as error:
-        raise CaseError(f"{file}: not valid TOML: {error}") from error
+        raise CaseError(f"{given}: not a case folder, it has no case.toml{hint}")
+    return toml_document(file, CaseError)
 
 
 def _text(problems: list[str], document: Mapping[str, Any], key: str, default: str) -> str:

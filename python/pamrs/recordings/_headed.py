@@ -16,6 +16,7 @@ from pamrs.recordings._doubts import unit_trouble
 from pamrs.recordings._from_log import check_asked, completed, recordings_of
 from pamrs.recordings._mapping import Clock, Source
 from pamrs.recordings._recording import Issue, Recording
+from pamrs.recordings.dialect import check_marks
 from pamrs.recordings.logs import Log, Series, read_log, table_of
 from pamrs.recordings.table import Table, is_text, read_table, stem_of, thousands_of
 from pamrs.units import measured_from
@@ -78,14 +79,7 @@ def load_recording(
     file = Path(path)
     source = str(file)
     check_asked(source, role, sample_time)
-    if len(delimiter) != 1:
-        raise RecordingError(
-            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed"
-        )
-    if decimal not in (".", ","):
-        raise RecordingError(
-            f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
-        )
+    check_marks(delimiter, decimal, source)
     marks = {thousands} if isinstance(thousands, str) else set((thousands or {}).values())
     if decimal == "," and decimal in marks:  # a column whose points part thousands has no fractions
         raise RecordingError(

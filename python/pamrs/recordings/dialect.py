@@ -10,7 +10,15 @@ from pamrs.errors import RecordingError
 from pamrs.recordings._dates import is_moment
 from pamrs.recordings.table import NO_VALUE, split_rows, usual_width
 
-__all__ = ["BESIDE_COMMAS", "Dialect", "decimal_of", "dialect_of", "is_number", "is_useful"]
+__all__ = [
+    "BESIDE_COMMAS",
+    "Dialect",
+    "check_marks",
+    "decimal_of",
+    "dialect_of",
+    "is_number",
+    "is_useful",
+]
 
 _PAIRS: Final = tuple((mark, decimal) for mark in ("\t", ";", ",", "|", " ") for decimal in ".,")
 _LINES: Final = 400  # in which the dialect is looked for
@@ -27,6 +35,25 @@ class Dialect(NamedTuple):
 
     delimiter: str
     decimal: str
+
+
+def check_marks(delimiter: str | None, decimal: str | None, source: str) -> None:
+    """Refuse marks that separate no cells or mark no decimals.
+
+    Raises
+    ------
+    RecordingError
+        Naming the argument, its value and what is allowed.
+    """
+    if delimiter is not None and len(delimiter) != 1:
+        raise RecordingError(
+            f"{source}: delimiter = {delimiter!r} is not allowed: one character is needed, like "
+            "',' or ';' or '\\t' (tabulator)"
+        )
+    if decimal not in (None, ".", ","):
+        raise RecordingError(
+            f"{source}: decimal = {decimal!r} is not allowed: '.' or ',' is needed"
+        )
 
 
 def is_number(cell: str, decimal: str, thousands: str | None) -> bool:

@@ -512,11 +512,14 @@ def same_width(
     many = max(1, len(counts) // _CUT)
     if strict and len(odd) > many:
         above = f" as the first row has, {headings[0][0][:60]!r}, ..." if headings else ""
-        both = " (commas cannot both part the cells and mark the decimals)"
+        reasons = {
+            ",": " (commas cannot both part the cells and mark the decimals)",
+            " ": " (a heading with a blank in it counts as two cells: write time[s])",
+        }
         raise RecordingError(
             f"{source}: {len(odd)} of {len(counts)} rows do not have {width} cells{above}: row "
             f"{body.numbers[odd[0]]} has {counts[odd[0]]} with the delimiter {body.delimiter!r}"
-            f"{both * (body.delimiter == ',')}. The first row must hold the headings; give "
+            f"{reasons.get(body.delimiter, '')}. The first row must hold the headings; give "
             "delimiter and decimal, like delimiter = ';' and decimal = ','"
         )
     if len(short) > many:
