@@ -105,12 +105,9 @@ def stroked(role: str, seed: int, drift: float, gauge: float) -> Recording:
     return noisy(f"r{seed}", role, 0.05, channels, noise, [3, seed])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    ("effect", "sizes"),
-    [
-        pytest.param("load_cell_drift", (40.0, -25.0), marks=pytest.mark.slow),
-        ("gauge_drift", (1.5e4, -1e4)),
-    ],
+    ("effect", "sizes"), [("load_cell_drift", (40.0, -25.0)), ("gauge_drift", (1.5e4, -1e4))]
 )
 def test_each_recording_has_a_drift_of_its_own(effect: str, sizes: tuple[float, float]) -> None:
     cell = effect == "load_cell_drift"
