@@ -48,7 +48,7 @@ def test_every_packaged_rig_is_compared() -> None:
 
 @pytest.mark.parametrize("name", RUNS)
 def test_packaged_rigs(name: str) -> None:
-    run = RUNS[name]
+    run = RUNS[name].lasting(61)  # the whole is among the golden vectors
     want, got = run.reference(1e-10), run.core(2e-5)
     assert not stops(got)
     assert set(BOOKS) < set(want)
@@ -58,7 +58,7 @@ def test_packaged_rigs(name: str) -> None:
         if channel.partition(".")[0] in ("joint_angle", "length", "muscle_pressure")
     ]
     if name != "sealed_chamber":
-        assert all(np.ptp(want[channel]) > 0.03 * np.abs(want[channel]).max() for channel in moved)
+        assert all(np.ptp(want[channel]) > 0.01 * np.abs(want[channel]).max() for channel in moved)
     assert not beyond(misses(got, want), SMOOTH)
 
 
@@ -171,8 +171,8 @@ def test_a_regulator_behind_another_supply(kind: str, dead_band: float, line: bo
     """It is set above and below what its inlet has, is drawn from and takes back."""
     own = {"tank": {"volume": 2e-3}, "constant": {}}[kind]
     rig = bottled({"kind": kind, "initial_pressure": 5e5, **own}, dead_band, line=line)
-    rows = 201
-    set_to = np.repeat([3e5, 8e5, 2e5, 6e5, 1e5], 41)[:rows]
+    rows = 101
+    set_to = np.repeat([3e5, 8e5, 2e5, 6e5, 1e5], 21)[:rows]
     commands = {"supply_command.regulator": set_to}
     if not line:
         commands["valve_command"] = 5.0 + 4.0 * np.sin(0.2 + 0.15 * np.arange(rows))
