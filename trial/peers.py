@@ -1,11 +1,10 @@
-"""Other methods on cases of a trial: how much of the error each closes by stratum, and what
-a user can read from them.
+"""Other methods on cases of a trial: how much of the error each closes, and what a user
+can read from them.
 """
 
 from __future__ import annotations
 
 import json
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,12 +23,9 @@ METHODS = {
     "pamrs": "pamrs",
 }
 LEARNING = ("sindy", "gp")
-STRATA = ("strength", "model error", "truth", "effects", "form", "block", "rig")
 WORSE = 1.05
 """Held-out error over that of the refit from which a correction has made it worse."""
 NOTHING = "no correction"
-TERM = re.compile(r"(?<=\s)[+-]\d")
-"""Where a term of an equation of SINDy begins."""
 ALONE = "one free log"
 ALIKE = 0.05
 """Difference of two shares of a gap from which one is larger."""
@@ -53,8 +49,6 @@ class Beside:
         Blocks in which an effect acts or a parameter is wrong.
     silent : dict of str to bool
         Whether a learning method corrects nothing.
-    terms : int
-        Terms of all equations of SINDy.
     alarm : bool
         Whether the refit's chi-square raises an alarm.
     seconds : float
@@ -67,7 +61,6 @@ class Beside:
     block: dict[str, str]
     acts: tuple[str, ...]
     silent: dict[str, bool]
-    terms: int
     alarm: bool
     seconds: float
 
@@ -104,7 +97,6 @@ def _one(mark: Mark, key: dict[str, Any], told: dict[str, Any]) -> Beside:
         off = _noises(held, m)
         best = max(off, key=lambda name, off=off: off[name])  # type: ignore[misc]
         block[m] = best if off[best] > 0.0 else ""
-    equations = [t for t in told["models"]["sindy"].values() if t != NOTHING]
     kinds = ("effect", "parameter")
     return Beside(
         mark,
@@ -113,7 +105,6 @@ def _one(mark: Mark, key: dict[str, Any], told: dict[str, Any]) -> Beside:
         block,
         tuple(sorted({str(t["block"]) for t in key["terms"] if t["kind"] in kinds})),
         {m: set(told["models"][m].values()) == {NOTHING} for m in LEARNING},
-        sum(len(TERM.findall(text.partition("=")[2])) for text in equations),
         bool(told["detected"]["refit"]),
         sum(told["seconds"].values()),
     )
@@ -168,29 +159,14 @@ def _gap_line(name: str, cases: Sequence[Beside]) -> tuple[str, ...] | None:
     return (name, str(len(whole)), *(f"{v:.2f}" for v in middle))
 
 
-def _order(value: str) -> tuple[float, str]:
-    try:
-        return float(value.split(" ")[0]), value
-    except ValueError:
-        return 1e9, value
-
-
-def _gaps(cases: Sequence[Beside]) -> list[str]:
+def _gaps(cases: Sequence[Beside]) -> str:
     every = [c for c in cases if not c.healthy]
-    ill = [c for c in every if not c.alone]
-    head = ("cases", *METHODS.values())
     lines = [
-        _gap_line("with recordings held out", ill),
+        _gap_line("with recordings held out", [c for c in every if not c.alone]),
         _gap_line("one recording, judged on what was fitted", [c for c in every if c.alone]),
     ]
-    parts = [table(("all that lack something", *head), filter(None, lines))]
-    for name in STRATA:
-        values = sorted({v for c in ill for v in c.mark.tags.get(name, ())}, key=_order)
-        lines = [_gap_line(v, [c for c in ill if v in c.mark.tags.get(name, ())]) for v in values]
-        rows = [line for line in lines if line is not None]
-        if rows:
-            parts += ["", table((name, *head), rows)]
-    return parts
+    head = ("all that lack something", "cases", *METHODS.values())
+    return table(head, [line for line in lines if line is not None])
 
 
 def _pairs(cases: Sequence[Beside]) -> str:
@@ -248,12 +224,8 @@ def _read(cases: Sequence[Beside]) -> str:
 
 
 def peers_page(cases: Sequence[Beside], head: str = "") -> str:
-    """Markdown: gaps closed by stratum, what can be read, every case; `head` closes the first
-    paragraph.
-    """
-    lengths = [c.terms for c in cases if not c.silent["sindy"]]
+    """Markdown: gaps closed, case by case, what can be read; `head` closes the first paragraph."""
     spent = [c.seconds for c in cases]
-    said = f"median {median(lengths):.0f}, most {max(lengths)}" if lengths else "none"
     parts = [
         "# Other methods on cases of a trial\n",
         f"{len(cases)} cases, the recordings that the diagnosis had. A refit of the parameters "
@@ -262,38 +234,22 @@ def peers_page(cases: Sequence[Beside], head: str = "") -> str:
         "learn what that refit leaves, from measured signals, and correct it only where this helps "
         "on recordings left out one at a time (with one recording to fit SINDy corrects nothing, "
         "and the Gaussian process always)." + head + "\n",
-        "What was cut to keep it short: SINDy has 3 libraries, orders 0 to 2 and 2 thresholds, on "
-        "means over 0.02 s; the Gaussian process has 600 points (300 for its lengths). No case has "
-        "a limit of time, and none needed one.\n",
         "## Gap closed, median\n",
         "Share of the way from the error after a refit inside the tolerances to the noise, on "
         "held-out recordings, all channels in noises together; 0 where a method makes it worse. "
         "Cases without an effect and without a wrong value are left out, and those whose refit "
-        "leaves no gap. A case may stand in several lines. With one recording nothing is held out, "
-        "and a method is judged on what it learned from: those cases have one line, and are in no "
-        "other table but that of alarms.\n",
-        *_gaps(cases),
+        "leaves no gap. With one recording nothing is held out: those cases stand in no other "
+        "table but that of alarms.\n",
+        _gaps(cases),
         "\n## Case by case\n",
         _pairs(cases),
         "\n## What a user can read from them\n",
         _read(cases),
         "\nThe refits give parameters, and say nothing when those are absurd. SINDy gives an "
-        f"equation of the residual in measured signals ({said} terms in a case); its block is "
-        "that of the residual, its terms are signals such as `dp` or `|q|`, and one effect "
-        "appears under several of them. The Gaussian process gives lengths of a kernel. An alarm "
-        "of SINDy or the Gaussian process is that it corrects anything; they have no test.\n",
-        "## Every case\n",
-        table(
-            ("case", "truth", *METHODS.values(), "pamrs said"),
-            [_case_line(c) for c in cases],
-        ),
-        f"\nMedian {median(spent):.0f} s for all other methods on a case, longest {max(spent):.0f} "
+        "equation of the residual in measured signals such as `dp` or `|q|`; one effect appears "
+        "under several of them. The Gaussian process gives lengths of a kernel. An alarm of SINDy "
+        "or the Gaussian process is that it corrects anything; they have no test.\n",
+        f"Median {median(spent):.0f} s for all other methods on a case, longest {max(spent):.0f} "
         f"s, {sum(spent) / 60.0:.0f} min together.",
     ]
     return "\n".join(parts) + "\n"
-
-
-def _case_line(case: Beside) -> tuple[str, ...]:
-    values = (case.gaps[m] for m in METHODS)
-    shown = ("-" if v is None else f"{v:.2f}" for v in values)
-    return (case.mark.case, case.mark.truth, *shown, case.mark.said)
