@@ -186,9 +186,7 @@ def _share(name: str, recording: Recording) -> float:
 
 
 @pytest.mark.skipif(not DATA.exists(), reason="the recordings of ../shared are absent")
-@pytest.mark.parametrize(
-    ("name", "leaks"), [("Ultimaker_015", True), ("Ultimaker_020", True), ("Aluminium", False)]
-)
+@pytest.mark.parametrize(("name", "leaks"), [("Ultimaker_015", True), ("Aluminium", False)])
 def test_printed_chambers(name: str, leaks: bool) -> None:
     found = pamrs.diagnose(CHAMBERS / name, allow_outside=True)
     leak = found.probabilities.get("leak_muscle", 0.0)

@@ -117,7 +117,7 @@ def test_an_effect_is_known_from_itself(pool) -> None:
 def test_recordings_say_the_channels_the_clock_and_the_pressure() -> None:
     rig = pamrs.rigs.sealed_chamber()
     leak = rig.with_effect("leak_muscle", {"conductance": 1e-13})
-    run = pamrs.simulate(rig, duration=60.0, sample_time=0.2, initial={"muscle_pressure": 4e5})
+    run = pamrs.simulate(rig, duration=20.0, sample_time=0.2, initial={"muscle_pressure": 4e5})
     prepared = taken(run, rig, "hold", NOISE, SETTINGS)
     found = propose(
         rig, [("none", rig, 0.6), ("leak_muscle", leak, 0.4)], {"muscle_pressure": 50.0}, [prepared]

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings, _capped, _unsettled
+from pamrs.diagnosis import _capped, _unsettled
 from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
 from pamrs.diagnosis.evidence import Group
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
 from tests.diagnosis.noisy import whole
 from tests.tables import rows_of
-
-SETTINGS = DiagnosisSettings()
 
 ROOT = Path(__file__).parents[2]
 RIGS = ROOT / "python" / "pamrs" / "rigs"
@@ -105,7 +103,7 @@ def test_the_channels_decide_what_can_be_told_apart(
 
 
 def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
-    found = pamrs.diagnose(case(rig, rig))
+    found = pamrs.diagnose(case(rig, rig, n=1000))
     assert found.verdict in ("none", "parameters")
     assert set(found.residuals) == {"supply", "chamber.flexor", "chamber.extensor", "arm.elbow"}
     assert [b["blocks"] for b in found.blocks] == [

@@ -54,10 +54,8 @@ def case(true: pamrs.Rig, nominal: pamrs.Rig, **options: float) -> pamrs.Case:
     return pamrs.Case("case", nominal, found, Path())
 
 
-@pytest.mark.parametrize(
-    ("name", "factor"),
-    [("chamber.dead_volume", 2.4), pytest.param("arm.payload", 0.75, marks=pytest.mark.slow)],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "factor"), [("chamber.dead_volume", 2.4), ("arm.payload", 0.75)])
 def test_a_wrong_value_is_named_with_an_interval_that_holds_it(name: str, factor: float) -> None:
     rig = pamrs.rigs.shoulder()
     true = rig.parameter(name).value * factor
