@@ -1,6 +1,6 @@
 //! Where a simulation begins.
 
-use crate::description::{dotted, ChamberSpec};
+use crate::description::dotted;
 use crate::error::check_range;
 use crate::plant::Rig;
 use crate::simulate::drive::LEAST_PRESSURE;
@@ -54,14 +54,16 @@ impl Initial {
     /// [`Error::Model`] for a name that the rig does not have, [`Error::Parameter`] for an
     /// impossible value.
     pub fn with(mut self, rig: &Rig, name: &str, value: f64) -> Result<Self> {
-        if let Some(gas) = gas_of(rig, name) {
+        if let Some((gas, _)) = temperatures(rig).find(|(_, n)| n == name) {
             let full = format!("initial.{name}");
             let kelvin = check_range(&full, value, COLDEST, HOTTEST, "K")?;
+            self.temperatures.retain(|(other, _)| *other != gas);
             self.temperatures.push((gas, kelvin));
             return Ok(self);
         }
         let Some(k) = rig.names.initial.iter().position(|(n, _)| n == name) else {
-            let names: Vec<_> = rig.names.initial.iter().map(|(n, _)| n.as_str()).collect();
+            let names = rig.names.initial.iter().map(|(n, _)| n.clone());
+            let names: Vec<_> = names.chain(temperatures(rig).map(|(_, n)| n)).collect();
             return Err(Error::Model(format!(
                 "initial has the unknown entry '{name}'; there are: {}",
                 names.join(", ")
@@ -132,10 +134,10 @@ impl Initial {
     }
 }
 
-/// The gas of a chamber with an energy balance that a name is the temperature of.
-fn gas_of(rig: &Rig, name: &str) -> Option<usize> {
+/// Gases that keep a balance of energy, and what their temperatures are called.
+fn temperatures(rig: &Rig) -> impl Iterator<Item = (usize, String)> + '_ {
     let chambers = rig.spec().chambers.iter().enumerate();
-    let named = |(_, chamber): &(usize, &ChamberSpec)| dotted("temperature", &chamber.name) == name;
-    let (gas, _) = chambers.into_iter().find(named)?;
-    rig.wiring.gases[gas].has_energy().then_some(gas)
+    chambers
+        .filter(|(gas, _)| rig.wiring.gases[*gas].has_energy())
+        .map(|(gas, chamber)| (gas, dotted("temperature", &chamber.name)))
 }

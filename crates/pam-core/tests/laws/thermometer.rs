@@ -157,3 +157,20 @@ fn what_cannot_be_is_refused_by_name() {
         assert!(text.contains("anchors"), "{text}");
     }
 }
+
+/// A gas begins at the temperature that was given last, and a name that is not known says which are.
+#[test]
+fn the_last_temperature_of_a_gas_counts() {
+    let rig = rig(vec![]);
+    let begun = |kelvins: &[f64]| {
+        let start = kelvins.iter().fold(Initial::rest(&rig), |start, kelvin| {
+            start.with(&rig, "temperature", *kelvin).unwrap()
+        });
+        let timing = Timing { sample_time: DT, substeps: 10 }.stable(&rig).unwrap();
+        let command = command(3);
+        simulate(&rig, 3, &[("valve_command", &command)], timing, &start).unwrap().channels
+    };
+    assert_eq!(begun(&[350.0, 310.0]), begun(&[310.0]));
+    let text = Initial::rest(&rig).with(&rig, "pressure", 1e5).unwrap_err().to_string();
+    assert!(text.contains("temperature"), "{text}");
+}
