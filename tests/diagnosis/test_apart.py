@@ -9,19 +9,29 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Attempts, Candidate, Group, case_verdict, judge, weigh
+from pamrs.diagnosis.evidence import (
+    Attempts,
+    BlockGroup,
+    Candidate,
+    Weighing,
+    case_verdict,
+    judge,
+    weigh,
+)
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.diagnosis.search._hypotheses import _apart, _Terms
+from pamrs.diagnosis.search._hypotheses import _split_by_names
+from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.simulation import core_rig
+from tests.diagnosis.terms import terms
 
 SETTINGS = DiagnosisSettings()
 
 RIG = pamrs.rigs.shoulder()
 CHANNELS = ("supply_pressure", "muscle_pressure", "valve_command", "joint_angle")
 BLOCKS = [b for b in available_blocks(RIG, CHANNELS) if b.kind != "arm"]
-TERMS = _Terms(0.985, 30.0, {})
+WEIGHING = Weighing(0.985, 30.0, SETTINGS)
 TRIAL = Attempts(
     Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
     Problem(BLOCKS, [], core_rig(RIG), SETTINGS),
@@ -34,11 +44,12 @@ TRIAL = Attempts(
 
 def candidate(key: str, supply: float, chamber: float, **values: float) -> Candidate:
     """A made-up hypothesis that leaves these excess variances."""
-    names = [name for name in key.split("+") if name]
-    effects, wrong = tuple(n for n in names if "." not in n), tuple(n for n in names if "." in n)
+    own = Hypothesis.parse(key).terms
+    effects = tuple(term for term in own if term.is_effect)
+    wrong = tuple(term.id for term in own if term.is_value)
     model = RIG
     for effect in effects:
-        model = model.with_effect(effect)
+        model = model.with_effect(effect.id)
     fit = Fit(
         effects,
         model,
@@ -58,11 +69,11 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
     return Candidate(effects, fit, left, left, 0.0, wrong=wrong)
 
 
-def group(*found: Candidate) -> Group:
+def group(*found: Candidate) -> BlockGroup:
     start = candidate("", 2.5, 64.0)
-    probabilities = weigh([start, *found], BLOCKS, 0.985, 30.0, SETTINGS)
+    probabilities = weigh([start, *found], BLOCKS, Weighing(0.985, 30.0, SETTINGS))
     chamber = next(b for b in BLOCKS if b.name == "chamber")
-    return Group(
+    return BlockGroup(
         BLOCKS, start.fitted, start.fitted, [start, *found], probabilities, chamber, {}, BLOCKS
     )
 
@@ -76,15 +87,15 @@ def test_a_leak_of_the_tank_is_named_beside_a_chamber_without_a_name() -> None:
         leak(0.02, 64.0),
         candidate("valve_hysteresis", 2.4, 58.0, **{"valve_hysteresis.half_width": 0.01}),
     )
-    assert whole.probabilities["unlisted"] > 0.95
-    tank, chamber = _apart(whole, TRIAL, TERMS)
+    assert whole.probabilities[UNLISTED] > 0.95
+    tank, chamber = _split_by_names(whole, TRIAL, WEIGHING)
     assert ([b.name for b in tank.blocks], [b.name for b in chamber.blocks]) == (
         ["supply"],
         ["chamber"],
     )
     judged = judge([tank, chamber], SETTINGS)
     assert [(j.verdict, j.named) for j in judged] == [
-        ("effects", ("supply_leak",)),
+        ("effects", terms("supply_leak")),
         ("unlisted", ()),
     ]
     assert case_verdict(judged) == "effects"
@@ -97,7 +108,7 @@ def test_a_valve_that_explains_the_tank_alone_is_no_name() -> None:
     whole = group(
         candidate("valve_hysteresis", 0.02, 60.0, **{"valve_hysteresis.half_width": 0.01})
     )
-    assert _apart(whole, TRIAL, TERMS) == []
+    assert _split_by_names(whole, TRIAL, WEIGHING) == []
 
 
 def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -106,14 +117,14 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
     asked: list[list[str]] = []
 
     def united(self: Attempts, candidates: list[Candidate]) -> Fit:
-        asked.append(sorted(c.key for c in candidates))
-        return replace(candidates[0].fit, effects=("heat_transfer",))
+        asked.append(sorted(str(c.hypothesis) for c in candidates))
+        return replace(candidates[0].fit, effects=terms("heat_transfer"))
 
     monkeypatch.setattr(Attempts, "united", united)
-    parts = _apart(group(volume, heat), TRIAL, TERMS)
+    parts = _split_by_names(group(volume, heat), TRIAL, WEIGHING)
     assert asked == [["heat_transfer", "supply.volume"]]
     judged = judge(parts, SETTINGS)
-    assert {name for j in judged for name in (*j.named, *j.wrong)} == {
+    assert {str(term) for j in judged for term in j.added} == {
         "supply.volume",
         "heat_transfer",
     }

@@ -11,12 +11,13 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, Group, judge
+from pamrs.diagnosis.evidence import BlockGroup, Candidate, judge
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.fit import Problem, fit, residuals
 from pamrs.diagnosis.model._conclude import _merged, _settled
 from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.diagnosis.screen import stand_of
+from pamrs.diagnosis.screen import tangent_of
+from pamrs.effects import UNDECIDED
 from pamrs.errors import DiagnosisError
 from pamrs.experiments import library
 from pamrs.findings import ChannelError
@@ -132,7 +133,7 @@ def test_one_zero_serves_both_groups_and_the_others_are_fitted_beside_it() -> No
     )
     candidates = [Candidate((), found, {}, {}, 0.0) for found in (first, last)]
     groups = [
-        Group([blocks[n]], {}, {}, [c], {"": 1.0}, None, {}, [])
+        BlockGroup([blocks[n]], {}, {}, [c], {UNDECIDED: 1.0}, None, {}, [])
         for n, c in zip(("chamber", "arm"), candidates, strict=True)
     ]
     judged = judge(groups, SETTINGS)
@@ -187,7 +188,7 @@ def test_parameters_that_are_all_at_their_walls_explain_nothing() -> None:
     found = fit(arm, rig, (), {}, {"arm": 1.0})
     walls = SETTINGS.most_tolerances
     stuck = replace(found, moved=dict.fromkeys(found.moved, walls))
-    free, held = (stand_of(one, arm, {"arm": 1.0}) for one in (found, stuck))
+    free, held = (tangent_of(one, arm, {"arm": 1.0}) for one in (found, stuck))
     assert free.basis.shape[1] > 0
     assert held.basis.shape == (held.rows.size, 0)
     np.testing.assert_array_equal(held.left, held.rows)

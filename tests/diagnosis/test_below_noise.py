@@ -12,12 +12,14 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, share_left, weigh
+from pamrs.diagnosis.evidence import Candidate, Weighing, share_left, weigh
 from pamrs.diagnosis.fit import Events, Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block, available_blocks
 from pamrs.diagnosis.search import _hypotheses
+from pamrs.effects import Term
 from tests.diagnosis.noisy import whole
+from tests.diagnosis.terms import by_text, terms
 
 SETTINGS = DiagnosisSettings()
 
@@ -112,7 +114,7 @@ def test_a_payload_on_a_cord_is_named_with_its_length() -> None:
     assert abs(found.effects[0]["parameters"]["length"]["value"] - 0.23) < 0.01
 
 
-def candidate(effects: tuple[str, ...], left: float, **values: float) -> Candidate:
+def candidate(effects: tuple[Term, ...], left: float, **values: float) -> Candidate:
     """A made-up set that leaves an excess of a block, fitted and held out."""
     exact, scales = np.zeros((len(values), len(values))), dict.fromkeys(values, 1.0)
     fit = Fit(effects, pamrs.rigs.shoulder(), values, {}, exact, 0.0, {}, scales=scales)
@@ -131,18 +133,13 @@ def weighed(*sets: Candidate, start: Candidate | None = None) -> dict[str, float
     """Probabilities beside a baseline that leaves ten times the noise's variance in the chamber, of
     recordings of 30 s.
     """
-    return weigh(
-        [start or candidate((), 10.0), *sets],
-        chamber(),
-        0.985,
-        30.0,
-        SETTINGS,
-    )
+    every = [start or candidate((), 10.0), *sets]
+    return by_text(weigh(every, chamber(), Weighing(0.985, 30.0, SETTINGS)))
 
 
 def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> None:
     right = candidate(
-        ("heat_transfer",),
+        terms("heat_transfer"),
         0.0,
         **{
             "heat_transfer.heat_transfer_coefficient": 50.0,
@@ -150,20 +147,20 @@ def test_a_set_that_explains_nothing_says_nothing_against_one_that_does() -> Non
             "heat_transfer.share": 0.5,
         },
     )
-    wrong = candidate(("pressure_lag",), 9.0, **{"pressure_lag.time_constant": 1e-3})
+    wrong = candidate(terms("pressure_lag"), 9.0, **{"pressure_lag.time_constant": 1e-3})
     alone, both = weighed(right), weighed(right, wrong)
     assert alone["heat_transfer"] > 0.98
     assert abs(both["heat_transfer"] - alone["heat_transfer"]) < 0.01
 
 
 def test_a_smaller_rest_tells_among_single_effects_and_asks_for_no_second() -> None:
-    rough = candidate(("joint_end_stop",), 0.35, **{"joint_end_stop.stiffness": 100.0})
+    rough = candidate(terms("joint_end_stop"), 0.35, **{"joint_end_stop.stiffness": 100.0})
     close = candidate(
-        ("pam_crowding_contact",), 0.02, **{"pam_crowding_contact.contact_area": 1e-3}
+        terms("pam_crowding_contact"), 0.02, **{"pam_crowding_contact.contact_area": 1e-3}
     )
     assert weighed(rough, close)["pam_crowding_contact"] > 0.75
     both = candidate(
-        ("joint_end_stop", "payload_swing"),
+        terms("joint_end_stop", "payload_swing"),
         0.02,
         **{"joint_end_stop.stiffness": 100.0, "payload_swing.length": 0.2},
     )
@@ -172,21 +169,23 @@ def test_a_smaller_rest_tells_among_single_effects_and_asks_for_no_second() -> N
 
 def test_what_explains_a_mismatch_has_to_take_most_of_it() -> None:
     hardly = candidate((), 0.48)
-    little = candidate(("joint_end_stop",), 0.43, **{"joint_end_stop.stiffness": 100.0})
-    most = candidate(("joint_end_stop",), 0.05, **{"joint_end_stop.stiffness": 100.0})
+    little = candidate(terms("joint_end_stop"), 0.43, **{"joint_end_stop.stiffness": 100.0})
+    most = candidate(terms("joint_end_stop"), 0.05, **{"joint_end_stop.stiffness": 100.0})
     assert weighed(little, start=hardly)["joint_end_stop"] < 0.2
     assert weighed(most, start=hardly)["joint_end_stop"] > 0.9
 
 
 def test_a_clock_that_does_not_drift_gives_way_to_a_lag() -> None:
     lag = candidate(
-        ("input_path_lag",),
+        terms("input_path_lag"),
         0.05,
         **{"input_path_lag.delay": 3e-3, "input_path_lag.time_constant": 1e-4},
     )
-    still = candidate(("clock_skew",), 0.0, **{"clock_skew.offset": 3e-3, "clock_skew.rate": 1e-6})
+    still = candidate(
+        terms("clock_skew"), 0.0, **{"clock_skew.offset": 3e-3, "clock_skew.rate": 1e-6}
+    )
     drifting = candidate(
-        ("clock_skew",), 0.0, **{"clock_skew.offset": 3e-3, "clock_skew.rate": 3e-4}
+        terms("clock_skew"), 0.0, **{"clock_skew.offset": 3e-3, "clock_skew.rate": 3e-4}
     )
     assert weighed(lag, still)["input_path_lag"] > 0.75
     assert weighed(lag, still)["clock_skew"] > 0.05  # but it stays possible
@@ -195,10 +194,12 @@ def test_a_clock_that_does_not_drift_gives_way_to_a_lag() -> None:
 
 def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
     seen = candidate(
-        ("muscle_creep",), 1.0, **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 8.0}
+        terms("muscle_creep"),
+        1.0,
+        **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 8.0},
     )
     unseen = candidate(
-        ("muscle_creep",),
+        terms("muscle_creep"),
         1.0,
         **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 300.0},
     )
@@ -207,7 +208,7 @@ def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
 
 
 def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect() -> None:
-    def uneven(effects: tuple[str, ...], fitted: float, held: float, **values: float) -> Candidate:
+    def uneven(effects: tuple[Term, ...], fitted: float, held: float, **values: float) -> Candidate:
         ratio = {
             left: {"chamber": Excess(1.0 + left, 0.0, 0.0, 1.0, 1.0, LIMIT)}
             for left in (fitted, held)
@@ -217,7 +218,9 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
         )
 
     def named(fitted: float, held: float) -> float:
-        swing = uneven(("payload_swing",), fitted, held, **{"payload_swing.swinging_share": 0.04})
+        swing = uneven(
+            terms("payload_swing"), fitted, held, **{"payload_swing.swinging_share": 0.04}
+        )
         return weighed(swing, start=uneven((), 14.8, 0.35))["payload_swing"]
 
     assert named(0.0, 0.65) > 0.9  # scatter of a noise level
@@ -228,10 +231,10 @@ def test_held_out_recordings_that_hardly_show_a_mismatch_do_not_veto_its_effect(
 def test_events_have_to_explain_fitted_and_held_out_recordings_alike() -> None:
     # their times and sizes were found in both, so that neither is a prediction
     event = {"torque": 4.0, "time": 3.0, "duration": 1.0}
-    events = Events("external_torque", {"run": event})
+    events = Events(Term("external_torque"), {"run": event})
 
     def left(fitted: float, held: float, happened: Events | None) -> Candidate:
-        found = candidate(("external_torque",), fitted)
+        found = candidate(terms("external_torque"), fitted)
         ratio = {"chamber": Excess(1.0 + held, 0.0, 0.0, 1.0, 1.0, LIMIT)}
         return replace(found, held_out=ratio, fit=replace(found.fit, events=happened))
 

@@ -17,7 +17,7 @@ from pamrs.diagnosis.noise import NoiseLevel, excess, inflation, noise_levels
 from pamrs.diagnosis.prepare import Block, available_blocks, prepare
 from pamrs.diagnosis.search import find_closure
 from pamrs.diagnosis.search._closure import _MOST_TERMS
-from pamrs.effects import CATALOGUE, EFFECTS, MEMORY_OF, TERMS
+from pamrs.effects import CATALOGUE, CLOSURE_TERMS, EFFECTS, MEMORY_OF, Term
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.recordings import Recording
 from pamrs.report.forms import form_sentence
@@ -124,8 +124,8 @@ def test_closures_are_no_names_and_their_dictionaries_are_those_of_the_core() ->
     assert {c.id for c in CLOSURES} | set(CATALOGUE) == set(EFFECTS)
     for closure in CLOSURES:
         coefficients = [p.name for p in closure.parameters if p.neutral == 0.0]
-        assert coefficients == [term.name for term in TERMS[closure.id]]
-        kinds = {term.kind for term in TERMS[closure.id]}
+        assert coefficients == [term.name for term in CLOSURE_TERMS[closure.id]]
+        kinds = {term.kind for term in CLOSURE_TERMS[closure.id]}
         assert {p.name for p in closure.parameters if p.neutral is None} == {
             MEMORY_OF[k] for k in kinds & set(MEMORY_OF)
         }
@@ -193,7 +193,7 @@ def test_a_null_keeps_no_excess_and_next_to_no_terms(
     # a form that is asked for all the same mends what the smoothing of the drives does at
     # reversals: hundredths of the arm's torque
     found = case.found(monkeypatch, case.blocks)
-    assert found is None or set(found.effects) == {"closure_torque"}
+    assert found is None or set(found.effects) == {Term("closure_torque")}
     assert (
         found is None
         or sum(abs(v) for n, v in found.values.items() if n.startswith("closure_torque.")) < 0.25
@@ -212,7 +212,7 @@ def test_what_does_not_fit_together_is_named(monkeypatch: pytest.MonkeyPatch) ->
     with pytest.raises(RigError, match="no sum of terms"):
         core_rig(NOMINAL).closure_terms(*given)
     terms = _core.Rig(NOMINAL.with_effect("closure_torque").to_json()).closure_terms(*given)
-    assert terms.shape == (ROWS, len(TERMS["closure_torque"]))
+    assert terms.shape == (ROWS, len(CLOSURE_TERMS["closure_torque"]))
     np.testing.assert_array_equal(terms[:, 0], 1.0)
     angle = prepared.signals["joint_angle"][0]
     assert np.abs(terms[:, 1] - angle).max() < 0.2

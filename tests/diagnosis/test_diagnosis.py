@@ -37,7 +37,7 @@ def test_every_parameter_of_the_catalogue_is_one_that_a_fit_can_move() -> None:
         name = "regulated_joint" if "regulator" in effect.supplies else "shoulder"
         rig = pamrs.rigs.named("blow_down_tank" if effect.at == "line" else name)
         names = core_rig(rig.with_effect(effect.id)).parameter_names
-        assert set(effect.dotted()) <= set(names)
+        assert set({f"{effect.id}.{p.name}" for p in effect.parameters}) <= set(names)
 
 
 @pytest.mark.parametrize("laminar", [0.0, 1.0])

@@ -13,6 +13,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Events, Problem, residuals
 from pamrs.diagnosis.fit._lines import lines_of
 from pamrs.diagnosis.prepare import Residual, available_blocks, prepare
+from pamrs.effects import Term
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import SHOULDER, noisy
@@ -141,7 +142,7 @@ def test_a_recording_without_the_event_has_no_slope_in_it() -> None:
     blocks = [
         b for b in available_blocks(rig, tuple(prepared[0].recording.channels)) if b.name == "arm"
     ]
-    happened = Events("payload_change", {"lift": {"mass_change": 0.4, "time": 2.0}})
+    happened = Events(Term("payload_change"), {"lift": {"mass_change": 0.4, "time": 2.0}})
     names = ["arm.payload", "payload_change.mass_change"]
     found = residuals(Problem(blocks, prepared, core_rig(rig), SETTINGS), rig, names, happened)
     with_event, without = found["arm", "lift"].jacobian, found["arm", "lower"].jacobian

@@ -13,15 +13,17 @@ from typing import cast
 import pytest
 
 import pamrs
-from pamrs.diagnosis.evidence import Attempts, Candidate, significant
+from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, significant
 from pamrs.diagnosis.fit import Problem, fit, form_in, starts_of
 from pamrs.diagnosis.model import owners_of_effects
 from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.diagnosis.screen import screen
-from pamrs.diagnosis.search._sets import _STRONG_RATIO, far_above_noise, in_best_forms
+from pamrs.diagnosis.screen import Screen, screen
+from pamrs.diagnosis.search._sets import _STRONG_RATIO, Search, far_above_noise, in_best_forms
+from pamrs.effects import Term
 from pamrs.simulation import core_rig
 from tests.diagnosis.again import case
 from tests.diagnosis.held import RIG, SETTINGS, attempts
+from tests.diagnosis.terms import terms
 
 SHOULDER = pamrs.rigs.shoulder()
 LEAKY = RIG.with_effect("leak_muscle", {"conductance": 5e-12, "exponent": 1.6}, form="power")
@@ -35,9 +37,14 @@ def trial() -> Attempts:
     return attempts(LEAKY, (8e5, 5e5, 3e5), 60.0)
 
 
+def search_with(trial: Attempts, screened: Screen, start: Candidate, told: list[str]) -> Search:
+    """What hypotheses are found with, and what is said meanwhile."""
+    return Search(trial, screened, start, Weighing(0.985, 60.0, SETTINGS), told.append)
+
+
 def hurried(trial: Attempts, evaluations: int) -> Candidate:
     """A leak in its first form and the heat of the wall, fitted in so many evaluations."""
-    starts = [starts_of(effect, sealed=True)[0] for effect in ("leak_muscle", "heat_transfer")]
+    starts = [starts_of(effect, sealed=True)[0] for effect in terms("leak_muscle", "heat_transfer")]
     free = {name: value for start in starts for name, value in start.free.items()}
     held = {name: value for start in starts for name, value in start.held.items()}
     effects = tuple(start.effect for start in starts)
@@ -47,7 +54,7 @@ def hurried(trial: Attempts, evaluations: int) -> Candidate:
 
 def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
     begun = hurried(trial, 1)
-    ended = trial.without(begun, "heat_transfer")
+    ended = trial.without(begun, Term("heat_transfer"))
     assert ended is not None
     first, last = trial.autocorrelation(begun.fit), trial.autocorrelation(ended.fit)
     for block, left in last.items():
@@ -60,17 +67,17 @@ def test_an_effect_gets_the_form_that_leaves_least_beside_the_others(trial: Atte
     assert any(significant(kept) for kept in base.fitted.values())
     start = fit(trial.inner, RIG, (), {}, trial.white)
     screened = screen(
-        trial.inner, start, ["leak_muscle", "heat_transfer"], trial.white, sealed=True
+        trial.inner, start, list(terms("leak_muscle", "heat_transfer")), trial.white, sealed=True
     )
     told: list[str] = []
-    found = in_best_forms(trial, screened, base, told.append)
+    found = in_best_forms(search_with(trial, screened, base, told), base)
     assert told[0] == "trying other forms of leak_muscle in leak_muscle+heat_transfer"
-    assert form_in(found.fit.rig, "leak_muscle") == "power"
+    assert form_in(found.fit.rig, Term("leak_muscle")) == "power"
     assert found.misfit < base.misfit
     assert found.fit.values["leak_muscle.exponent"] == pytest.approx(1.6, abs=0.1)
     # once is enough
     again: list[str] = []
-    assert in_best_forms(trial, screened, found, again.append) is found
+    assert in_best_forms(search_with(trial, screened, base, again), found) is found
     assert not again
 
 
@@ -91,16 +98,16 @@ def test_what_is_far_above_the_noise_is_so_by_its_size_or_its_power(trial: Attem
 def group(std: dict[str, float], *effects: str) -> Candidate:
     """A fit that knows its parameters so well."""
     own = SimpleNamespace(values=dict.fromkeys(std, 1.0), std=std)
-    return cast("Candidate", SimpleNamespace(fit=own, effects=effects))
+    return cast("Candidate", SimpleNamespace(fit=own, effects=terms(*effects)))
 
 
 def test_the_group_that_knows_an_effect_best_has_its_values() -> None:
     chamber = group({"clock_skew.offset": 2e-3, "clock_skew.rate": 1e-4}, "clock_skew")
     arm = group({"clock_skew.offset": math.inf, "clock_skew.rate": math.inf}, "clock_skew")
     vague = group({"clock_skew.offset": 0.1, "clock_skew.rate": 1e-2}, "clock_skew")
-    assert owners_of_effects([chamber, arm]) == {"clock_skew": 0}
-    assert owners_of_effects([arm, chamber]) == {"clock_skew": 1}
-    assert owners_of_effects([vague, chamber, vague]) == {"clock_skew": 1}
+    assert owners_of_effects([chamber, arm]) == {Term("clock_skew"): 0}
+    assert owners_of_effects([arm, chamber]) == {Term("clock_skew"): 1}
+    assert owners_of_effects([vague, chamber, vague]) == {Term("clock_skew"): 1}
 
 
 def test_what_no_residual_depends_on_is_not_known() -> None:
@@ -116,7 +123,7 @@ def test_what_no_residual_depends_on_is_not_known() -> None:
     found = fit(
         problem,
         SHOULDER,
-        ("clock_skew",),
+        terms("clock_skew"),
         {"clock_skew.offset": 0.01, "clock_skew.rate": 1e-4},
         {"arm": 1.0},
         fixed={"clock_skew.angle_share": 1.0},

@@ -19,6 +19,7 @@ from pamrs.diagnosis.model import _free_run
 from pamrs.diagnosis.prepare import available_blocks, averaged, begun_alike, prepare
 from pamrs.diagnosis.prove import valid_result
 from pamrs.diagnosis.result import schema
+from pamrs.effects import Term
 from pamrs.errors import SimulationError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, parse_rig
@@ -176,7 +177,7 @@ def test_what_happened_in_one_recording_is_in_its_free_run_only() -> None:
     records = [recorded(rig, name, "fit", seed=k) for k, name in enumerate("ab")]
     problem = problem_of(rig, records)
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
-    events = Events("external_torque", {"a": event})
+    events = Events(Term("external_torque"), {"a": event})
     runs, _ = _free_run.free_run(problem, found, rig, final, events)
     assert runs is not None
     pushed, quiet = (run.channels["joint_angle"] for run in runs)

@@ -14,7 +14,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Fit, Problem, fit, residuals, stacked
 from pamrs.diagnosis.prepare import available_blocks, prepare
-from pamrs.diagnosis.screen import left_out
+from pamrs.diagnosis.screen import predicted_by_others
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.held import hold as held_chamber
@@ -67,7 +67,7 @@ def test_one_step_is_what_a_fit_to_the_others_predicts() -> None:
         )
     )
     found = leaking(everything)
-    away = left_out(everything, found, {b.name: 1.0 for b in everything.blocks})
+    away = predicted_by_others(everything, found, {b.name: 1.0 for b in everything.blocks})
     for k, name in enumerate(names):
         others = replace(
             everything, recordings=[p for i, p in enumerate(everything.recordings) if i != k]
@@ -86,7 +86,7 @@ def test_of_one_recording_each_piece_is_predicted_by_the_others() -> None:
     single = problem(bumpy)
     found = leaking(single)
     key = (single.blocks[0].name, "one")
-    own, away = found.residuals[key], left_out(single, found, {key[0]: 1.0})[key]
+    own, away = found.residuals[key], predicted_by_others(single, found, {key[0]: 1.0})[key]
     # the last fifth against a linear fit to the first four
     rows, slope = stacked(single, found.residuals, {key[0]: 1.0})
     assert slope is not None
@@ -107,7 +107,7 @@ def test_of_one_recording_each_piece_is_predicted_by_the_others() -> None:
 def test_what_one_recording_alone_tells_is_taken_from_it() -> None:
     together = problem(hold("long", 2e-11, 200.0), hold("short", 2e-11, 4.0, seed=1))
     found = leaking(together)
-    away = left_out(together, found, {b.name: 1.0 for b in together.blocks})
+    away = predicted_by_others(together, found, {b.name: 1.0 for b in together.blocks})
     key = (together.blocks[0].name, "long")
     assert rms(away, key) < 1.01 * rms(found.residuals, key)
 

@@ -16,6 +16,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, fits, look_for_events, residuals
 from pamrs.diagnosis.next_experiment import propose
 from pamrs.diagnosis.prepare import available_blocks, implausible, prepare
+from pamrs.effects import Term
 from pamrs.errors import SimulationError
 from pamrs.experiments import library
 from pamrs.recordings import Recording
@@ -173,7 +174,9 @@ def test_a_mass_that_changes_is_looked_for_and_found() -> None:
         core_rig(RIG),
         SETTINGS,
     )
-    found = look_for_events("payload_change", problem, RIG, residuals(problem, RIG), {"load": 1.0})
+    found = look_for_events(
+        Term("payload_change"), problem, RIG, residuals(problem, RIG), {"load": 1.0}
+    )
     assert found is not None
     (values,) = found.values.values()
     assert values["mass_change"] == pytest.approx(-2.0, rel=0.2)

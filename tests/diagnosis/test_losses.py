@@ -20,6 +20,7 @@ from pamrs.diagnosis.model import _conclude
 from pamrs.diagnosis.next_experiment import _choice
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _hypotheses
+from pamrs.effects import Term
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.report import html
@@ -70,7 +71,7 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
     right = _candidates.fit
 
     def fit(problem: Any, nominal: Any, effects: Any, *rest: Any, **options: Any) -> Any:
-        return (broken if "heat_transfer" in effects else right)(
+        return (broken if Term("heat_transfer") in effects else right)(
             problem, nominal, effects, *rest, **options
         )
 
@@ -83,7 +84,7 @@ def test_a_hypothesis_that_fails_costs_itself(monkeypatch: pytest.MonkeyPatch) -
 
 
 FAILING = {
-    _hypotheses: ("freed", "inclusion", "beside_wrong", "considered"),
+    _hypotheses: ("free_suspects", "inclusion_shares", "with_freed_values", "fit_considered"),
     _conclude: ("budget", "free_run"),
     pamrs.diagnosis: ("next_to_record",),
     _assemble: ("describe",),
@@ -107,19 +108,19 @@ def test_steps_that_fail_cost_themselves(monkeypatch: pytest.MonkeyPatch, tmp_pa
 
 @pytest.mark.usefixtures("lenient")
 def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.MonkeyPatch) -> None:
-    right = _hypotheses._begun_with
+    right = _hypotheses._begin_part
 
     def begun(fitted: Any, held: Any, nominal: Any, blocks: Any, say: Any) -> Any:
         work = right if blocks[0].mechanical else broken
         return work(fitted, held, nominal, blocks, say)
 
-    monkeypatch.setattr(_hypotheses, "_begun_with", begun)
+    monkeypatch.setattr(_hypotheses, "_begin_part", begun)
     found = pamrs.diagnose(shoulder())
     verdicts = {b: entry.verdict for entry in found.blocks for b in entry.blocks}
     assert verdicts.pop("arm") != "not_judged"
     assert verdicts == {"supply": "not_judged", "chamber": "not_judged"}
     assert found.warnings[0].startswith("the judgement of supply and chamber failed")
-    monkeypatch.setattr(_hypotheses, "_begun_with", broken)
+    monkeypatch.setattr(_hypotheses, "_begin_part", broken)
     with pytest.raises(DiagnosisError, match="Singular matrix"):
         pamrs.diagnose(leaking())
 
@@ -128,7 +129,7 @@ def test_blocks_whose_judgement_fails_cost_themselves(monkeypatch: pytest.Monkey
 def test_a_search_for_units_or_offsets_that_fails_costs_itself(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(pamrs.diagnosis, "misread", broken)
+    monkeypatch.setattr(pamrs.diagnosis, "find_misread", broken)
     monkeypatch.setattr(pamrs.diagnosis, "_on_time", broken)
     found = pamrs.diagnose(leaking())
     assert found.verdict == "effects"

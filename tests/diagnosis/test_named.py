@@ -12,10 +12,11 @@ import pytest
 import pamrs
 from pamrs.diagnosis import _capped, _unsettled
 from pamrs.diagnosis.__init__ import _UNKNOWN_GEOMETRY_PROBABILITY
-from pamrs.diagnosis.evidence import Group
+from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.prepare import available_blocks
 from pamrs.recordings import Recording
 from tests.diagnosis.noisy import whole
+from tests.diagnosis.terms import by_text, of_texts
 from tests.tables import rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -136,17 +137,17 @@ def test_no_confident_name_beside_unknown_geometry(
     arm = available_blocks(
         bare, tuple(recorded(rig, 1, "fit", pressures_only=True, n=40).channels)
     )[0]
-    group = Group(
+    group = BlockGroup(
         [arm],
         {},
         {},
         [],
-        {"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05},
+        of_texts({"muscle_hysteresis": 0.9, "muscle_creep": 0.05, "unlisted": 0.05}),
         arm,
         {},
         [arm],
     )
-    capped = _capped(group, _UNKNOWN_GEOMETRY_PROBABILITY).probabilities
+    capped = by_text(_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY).probabilities)
     assert capped["muscle_hysteresis"] < 0.5
     assert sum(capped.values()) == pytest.approx(1.0)
     assert capped["unlisted"] > 0.5

@@ -28,7 +28,7 @@ from pamrs.diagnosis.next_experiment._differences import (
     usual_noise,
 )
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.effects import term_of
+from pamrs.effects import Hypothesis, Term
 from pamrs.errors import DiagnosisError, RigError
 from pamrs.experiments import Experiment, library
 from pamrs.recordings import Recording
@@ -94,7 +94,7 @@ def test_rivals_are_told_apart_as_predicted(pair: str) -> None:
     rivals, labels = [], []
     for effect, values, *at in both:
         rivals.append(rig.with_effect(effect, values, at=at[0] if at else ""))
-        labels.append(term_of(effect, *at))
+        labels.append(str(Term(effect, *at)))
     hypotheses = [(label, rival, 0.5) for label, rival in zip(labels, rivals, strict=True)]
     pool = library(rig, OWN, sample_time=0.01, highest=4e5, only=names)
     noise, channels = noise_of(rig), measurable(rig)
@@ -302,14 +302,14 @@ def test_a_pair_that_nothing_simulates_is_told_in_words(driven: bool) -> None:
         cut = re.sub(r"(?m)^\[(supply|valve).*\n(?:(?!\[).*\n)*", "", rig.to_toml_text())
         rig = parse_rig(cut)
     blocks = available_blocks(rig, measurable(rig))
-    from pamrs.diagnosis.evidence import Candidate, Group, Judged
+    from pamrs.diagnosis.evidence import BlockGroup, Candidate, Judged
     from pamrs.diagnosis.fit import Fit
 
     fit = Fit((), rig, {}, {}, np.zeros((0, 0)), 0.0, {})
     start = Candidate((), fit, {}, {}, 0.0)
-    sets = [["muscle_creep"], ["muscle_hysteresis"]]
+    sets = [Hypothesis.parse("muscle_creep"), Hypothesis.parse("muscle_hysteresis")]
     arm = blocks[-1]
-    group = Group([arm], {}, {}, [start], {}, arm, {}, [arm])
+    group = BlockGroup([arm], {}, {}, [start], {}, arm, {}, [arm])
     judged = [Judged(group, "effects", {}, sets, start)]
     problem = Problem(blocks, [], core_rig(rig), SETTINGS)
     asked = _Question(rig, judged, blocks, [], problem)

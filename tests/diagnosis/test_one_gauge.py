@@ -13,6 +13,7 @@ import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.prepare import available_blocks
+from pamrs.effects import Term
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import noisy
 
@@ -45,8 +46,8 @@ def test_the_chamber_simulates_a_regulator_that_has_no_gauge() -> None:
     assert blocks["chamber"].beside == ("supply",)
     assert blocks["chamber"].covers == "regulator, line and chamber"
     assert "supply.time_constant" in blocks["chamber"].parameters
-    assert acts_in("supply_regulator_deadband", blocks["chamber"])
-    assert not acts_in("supply_regulator_deadband", blocks["arm"])
+    assert acts_in(Term("supply_regulator_deadband"), blocks["chamber"])
+    assert not acts_in(Term("supply_regulator_deadband"), blocks["arm"])
     both = available_blocks(RIG, (*CHANNELS, "supply_pressure"))
     assert {b.name: b.beside for b in both} == {"supply": (), "chamber": (), "arm": ()}
 

@@ -15,19 +15,15 @@ import pytest
 import pamrs
 from pamrs import cli
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Attempts, Candidate, weigh
+from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, weigh
 from pamrs.diagnosis.fit import Fit, Problem, acts_in, places_of, residuals, starts_of
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
 from pamrs.effects import (
     CATALOGUE,
-    exclude,
+    Term,
     find_parameter,
-    id_of,
-    info_of,
-    place_of,
-    term_of,
 )
 from pamrs.findings import BlockVerdict
 from pamrs.recordings import Recording
@@ -35,6 +31,7 @@ from pamrs.report.text import headline, label, told_apart
 from pamrs.simulation import core_rig
 from tests.diagnosis import again, synthetic
 from tests.diagnosis.noisy import noisy
+from tests.diagnosis.terms import by_text, terms
 
 SETTINGS = DiagnosisSettings()
 PAIR = pamrs.rigs.antagonistic_joint()
@@ -109,18 +106,21 @@ def test_an_effect_can_be_at_each_block_that_the_channels_tell_from_the_others()
     ],
 )
 def test_an_effect_at_one_place_acts_in_the_blocks_that_depend_on_it(term, acting) -> None:
-    assert {b.name for b in blocks_of(PAIR) if acts_in(term, b)} == acting
+    assert {b.name for b in blocks_of(PAIR) if acts_in(Term.parse(term), b)} == acting
 
 
 def test_names_with_a_place() -> None:
-    assert term_of("leak_muscle") == "leak_muscle"
-    assert info_of("leak_muscle@flexor") is info_of("leak_muscle")
+    everywhere, flexor, extensor = terms(
+        "leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"
+    )
+    assert everywhere == Term("leak_muscle")
+    assert flexor.info is everywhere.info
     one, other = (find_parameter(f"leak_muscle{at}.conductance") for at in ("", "@flexor"))
     assert one is other
-    assert exclude("leak_muscle", ["leak_muscle@flexor"])
-    assert exclude("leak_muscle@flexor", ["leak_muscle"])
-    assert exclude("leak_muscle@flexor", ["leak_muscle@flexor"])
-    assert not exclude("leak_muscle@flexor", ["leak_muscle@extensor", "valve_area"])
+    assert everywhere.excluded_by([flexor])
+    assert flexor.excluded_by([everywhere])
+    assert flexor.excluded_by([flexor])
+    assert not flexor.excluded_by([extensor, Term("valve_area")])
     assert (
         label("leak_muscle@flexor+valve_area") == f"{label('leak_muscle')} at flexor + valve area"
     )
@@ -133,7 +133,9 @@ def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
     """Against a finite difference, for one instance of an effect and for two."""
     prepared = prepare(recorded(PAIR, "one", "fit", 0, n=400), PAIR, SETTINGS)
     problem = Problem(blocks_of(PAIR), [prepared], core_rig(PAIR), SETTINGS)
-    here, there = (starts_of(f"leak_muscle@{at}", sealed=False)[0] for at in ("flexor", "extensor"))
+    here, there = (
+        starts_of(Term("leak_muscle", at), sealed=False)[0] for at in ("flexor", "extensor")
+    )
     name, step = "leak_muscle@flexor.conductance", 1e-13
 
     for begun in (PAIR, there.applied(PAIR)):
@@ -156,38 +158,40 @@ def test_sensitivities_are_those_of_the_effect_at_its_place() -> None:
 
 def made_up(term: str, left: float, places: int) -> Candidate:
     """A hypothesis that leaves such a ratio of either chamber, fitted and held out."""
-    rig = PAIR.with_effect(id_of(term), at=place_of(term)) if term else PAIR
-    names = [f"{term}.{info_of(term).leading.name}"] if term else []
+    effects = terms(term) if term else ()
+    rig = PAIR
+    for effect in effects:
+        rig = rig.with_effect(effect.id, at=effect.at)
+    names = [f"{effect}.{effect.info.leading.name}" for effect in effects]
     values = dict.fromkeys(names, 1e-11)
     spread = {name: 0.1 * value for name, value in values.items()}
     covariance = np.diag([std**2 for std in spread.values()])
     scales = dict.fromkeys(names, 1.0)
-    found = Fit((term,), rig, values, spread, covariance, 0.0, {}, scales=scales)
+    found = Fit(effects, rig, values, spread, covariance, 0.0, {}, scales=scales)
     kept = {
         b.name: Excess(left, left**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
         for b in blocks_of(PAIR)
         if b.kind == "chamber"
     }
-    effects = (term,) if term else ()
     return Candidate(effects, found, kept, kept, 0.0, places=math.log(places))
 
 
 def weighed(*found: Candidate) -> dict[str, float]:
     chambers = [b for b in blocks_of(PAIR) if b.kind == "chamber"]
-    return weigh([made_up("", 40.0, 1), *found], chambers, 0.985, 30.0, SETTINGS)
+    return by_text(weigh([made_up("", 40.0, 1), *found], chambers, Weighing(0.985, 30.0, SETTINGS)))
 
 
 def test_an_effect_at_many_places_is_no_more_probable_for_it() -> None:
     blocks = blocks_of(PAIR)
     problem = Problem(blocks, [], core_rig(PAIR), SETTINGS)
     trial = Attempts(problem, problem, PAIR, {}, {}, blocks)
-    terms = ["leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"]
-    assert trial.terms_of("leak_muscle") == terms
-    assert trial.terms_of("supply_leak") == ["supply_leak"]
+    names = ["leak_muscle", "leak_muscle@flexor", "leak_muscle@extensor"]
+    assert trial.terms_of("leak_muscle") == list(terms(*names))
+    assert trial.terms_of("supply_leak") == [Term("supply_leak")]
     rival = made_up("valve_area", 3.0, 1)
     alone = weighed(made_up("leak_muscle", 3.0, 1), rival)
-    shared = weighed(*(made_up(term, 3.0, len(terms)) for term in terms), rival)
-    assert [shared[term] for term in terms] == pytest.approx([alone["leak_muscle"] / 3.0] * 3)
+    shared = weighed(*(made_up(name, 3.0, len(names)) for name in names), rival)
+    assert [shared[name] for name in names] == pytest.approx([alone["leak_muscle"] / 3.0] * 3)
     assert shared["valve_area"] == pytest.approx(alone["valve_area"])
 
 
@@ -226,9 +230,9 @@ def test_a_leak_of_one_muscle_of_a_pair_is_named_with_its_place(leaking) -> None
     low, high = effect.parameters["conductance"].interval
     assert low < LEAK < high
     assert high - low < LEAK
-    terms = [t for t in leaking.budget if t.kind == "effect"]
-    assert [(t.block, t.id, t.at) for t in terms] == [("chamber.flexor", "leak_muscle", "flexor")]
-    assert terms[0].share > 0.8
+    steps = [t for t in leaking.budget if t.kind == "effect"]
+    assert [(t.block, t.id, t.at) for t in steps] == [("chamber.flexor", "leak_muscle", "flexor")]
+    assert steps[0].share > 0.8
 
 
 def test_a_channel_that_was_right_stays_right(leaking) -> None:
@@ -249,7 +253,7 @@ def test_its_place_is_said_in_text_page_and_json(leaking, tmp_path) -> None:
 
 
 def effect_words() -> str:
-    return info_of("leak_muscle").name
+    return Term("leak_muscle").info.name
 
 
 def test_the_model_has_it_there_and_is_replayed(leaking, tmp_path) -> None:

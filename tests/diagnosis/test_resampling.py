@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Start
-from pamrs.diagnosis.screen import Screen, Stand, inclusion
+from pamrs.diagnosis.screen import Screen, Tangent, inclusion_shares
+from pamrs.effects import Term
+from tests.diagnosis.terms import by_text
 
 SETTINGS = DiagnosisSettings()
 
@@ -25,7 +29,7 @@ def screened(
     count = slopes.shape[1]
     normal = slopes.T @ slopes + np.eye(count)
     left = rows - slopes @ np.linalg.solve(normal, slopes.T @ rows + moved)
-    stand = Stand(
+    tangent = Tangent(
         rows,
         left,
         slopes,
@@ -34,12 +38,17 @@ def screened(
         slopes @ np.linalg.cholesky(np.linalg.inv(normal)),
     )
     return Screen(
-        stand,
+        tangent,
         [
-            (e, Start(e, {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s)
+            (Term(e), Start(Term(e), {f"{e}.size": 1.0}, {}, (f"{e}.size",), False), s)
             for e, s in signatures.items()
         ],
     )
+
+
+def shares(*given: Any) -> dict[str, float]:
+    """How often each effect is taken."""
+    return by_text(inclusion_shares(*given))
 
 
 def waves(count: int) -> list[Array]:
@@ -51,7 +60,7 @@ def waves(count: int) -> list[Array]:
 def test_an_effect_that_is_there_is_always_taken_and_one_that_is_not_hardly_ever() -> None:
     there, absent = waves(2)
     rows = np.random.default_rng(5).normal(size=ROWS) - 0.3 * there
-    found = inclusion(screened(rows, {"there": there, "absent": absent}), 12.0, 0.01, SETTINGS)
+    found = shares(screened(rows, {"there": there, "absent": absent}), 12.0, 0.01, SETTINGS)
     assert found["there"] == 1.0
     assert found.get("absent", 0.0) < 0.1
 
@@ -59,9 +68,9 @@ def test_an_effect_that_is_there_is_always_taken_and_one_that_is_not_hardly_ever
 def test_a_second_effect_is_taken_beside_the_first() -> None:
     first, second = waves(2)
     rows = np.random.default_rng(6).normal(size=ROWS) - 0.5 * first - 0.3 * second
-    both = inclusion(screened(rows, {"first": first, "second": second}), 12.0, 0.01, SETTINGS)
+    both = shares(screened(rows, {"first": first, "second": second}), 12.0, 0.01, SETTINGS)
     assert min(both.values()) == 1.0
-    assert inclusion(screened(rows, {"first": first, "second": second}), 12.0, 1.0, SETTINGS) == {
+    assert shares(screened(rows, {"first": first, "second": second}), 12.0, 1.0, SETTINGS) == {
         "first": 1.0
     }
 
@@ -69,7 +78,7 @@ def test_a_second_effect_is_taken_beside_the_first() -> None:
 def test_twins_share_the_resamples() -> None:
     common, own, other = waves(3)
     rows = np.random.default_rng(7).normal(size=ROWS) - 0.5 * common
-    found = inclusion(
+    found = shares(
         screened(rows, {"one": common + 0.02 * own, "twin": common + 0.02 * other}),
         12.0,
         1.0,
@@ -85,12 +94,12 @@ def test_what_a_parameter_does_is_no_effect_unless_it_is_held() -> None:
     # a parameter with little prior information has taken the signal up: the residual is noise, the
     # pull of its prior is nothing
     taken = screened(noise, {"effect": signal}, 50.0 * signal[:, None])
-    assert inclusion(taken, 12.0, 1.0, SETTINGS).get("effect", 0.0) < 0.05
-    assert inclusion(
+    assert shares(taken, 12.0, 1.0, SETTINGS).get("effect", 0.0) < 0.05
+    assert shares(
         screened(noise - signal, {"effect": signal}, 1e-3 * signal[:, None]), 12.0, 1.0, SETTINGS
     ) == {"effect": 1.0}
 
 
 def test_nothing_to_choose_from_is_nothing() -> None:
-    assert inclusion(screened(np.zeros(0), {}), 12.0, 0.01, SETTINGS) == {}
-    assert inclusion(screened(np.ones(ROWS), {}), 12.0, 0.01, SETTINGS) == {}
+    assert shares(screened(np.zeros(0), {}), 12.0, 0.01, SETTINGS) == {}
+    assert shares(screened(np.ones(ROWS), {}), 12.0, 0.01, SETTINGS) == {}

@@ -16,13 +16,14 @@ import pytest
 import pamrs
 from pamrs import report
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, Group, determined, judge, put_aside
+from pamrs.diagnosis.evidence import BlockGroup, Candidate, drop_undetermined, judge, put_aside
 from pamrs.diagnosis.fit import Events, Problem, fit, known_parameters, residuals
 from pamrs.diagnosis.model import _conclude, _free_run
 from pamrs.diagnosis.model._free_run import _OFF_NOISES
 from pamrs.diagnosis.next_experiment._asked import _telling, next_to_record
 from pamrs.diagnosis.prepare import available_blocks, prepare, unjudged_blocks
 from pamrs.diagnosis.result import schema
+from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 from pamrs.experiments import experiments_of
 from pamrs.findings import (
     BlockVerdict,
@@ -33,9 +34,11 @@ from pamrs.findings import (
 )
 from pamrs.report import text as words
 from pamrs.simulation import core_rig
+from tests.diagnosis.terms import by_text, of_texts, terms
 from tests.diagnosis.test_assemble import NAMES, recorded
 from tests.report.test_words import group, seen, stages
 
+LEAK = terms("leak_muscle")
 SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
 
@@ -165,7 +168,7 @@ def test_the_next_experiment_of_a_rig_that_is_off_is_no_end() -> None:
     base = Candidate(
         (), fit(problem, RIG, (), {}, dict.fromkeys(("supply", "chamber", "arm"), 1.0)), {}, {}, 0.0
     )
-    quiet = judge([Group(blocks, {}, {}, [base], {"": 1.0}, None, {}, [])], SETTINGS)
+    quiet = judge([BlockGroup(blocks, {}, {}, [base], {UNDECIDED: 1.0}, None, {}, [])], SETTINGS)
 
     def told(problem: Problem, *off: str) -> str:
         return next_to_record("none", [], [], RIG, quiet, problem, problem, off).text
@@ -181,8 +184,8 @@ def test_what_may_leak_is_shut_in_inside_the_pressures_that_were_recorded() -> N
     blocks = available_blocks(RIG, NAMES)
     (chamber,) = (b for b in blocks if b.name == "chamber")
     assert _telling(chamber, RIG).kind == "step_and_shut"
-    assert _telling(chamber, RIG, ["pressure_lag"]).kind == "step_and_shut"
-    leak = _telling(chamber, RIG, ["leak_muscle"])
+    assert _telling(chamber, RIG, terms("pressure_lag")).kind == "step_and_shut"
+    leak = _telling(chamber, RIG, terms("leak_muscle"))
     assert leak.kind == "sealed_hold"
     assert "inside those that are already recorded" in leak.text
     record = recorded(RIG, "a", "fit")
@@ -234,7 +237,7 @@ def test_shares_that_cancel_are_told_together() -> None:
     assert "more than the nominal model has unexplained: 3.0 noise levels" in worse
 
 
-def leak_group(strength: float) -> tuple[Problem, Group]:
+def leak_group(strength: float) -> tuple[Problem, BlockGroup]:
     """A chamber's group with the leak that its log has, fitted, and a companion beside it."""
     true = RIG.with_effect("leak_muscle", {"conductance": strength})
     prepared = prepare(recorded(true, "all", "fit"), RIG, SETTINGS)
@@ -242,59 +245,63 @@ def leak_group(strength: float) -> tuple[Problem, Group]:
     problem = Problem([chamber], [prepared], core_rig(RIG), SETTINGS)
     free = {"leak_muscle.conductance": strength}
     base = fit(problem, RIG, (), {}, {"chamber": 1.0})
-    found = fit(problem, RIG, ("leak_muscle",), free, {"chamber": 1.0})
-    candidates = [Candidate((), base, {}, {}, 0.0), Candidate(("leak_muscle",), found, {}, {}, 1.0)]
-    chances = {"leak_muscle": 0.9, "unlisted": 0.1}
-    return problem, Group([chamber], {}, {}, candidates, chances, chamber, {}, [chamber])
+    found = fit(problem, RIG, LEAK, free, {"chamber": 1.0})
+    candidates = [Candidate((), base, {}, {}, 0.0), Candidate(LEAK, found, {}, {}, 1.0)]
+    chances = of_texts({"leak_muscle": 0.9, "unlisted": 0.1})
+    return problem, BlockGroup([chamber], {}, {}, candidates, chances, chamber, {}, [chamber])
 
 
 def test_a_name_that_is_determined_stands() -> None:
     problem, own = leak_group(3e-9)
-    assert determined(own, problem).probabilities == own.probabilities
+    assert drop_undetermined(own, problem).probabilities == own.probabilities
 
 
 def test_a_name_whose_value_is_not_determined_does_not_lead() -> None:
     problem, own = leak_group(1e-13)  # far below what the log could tell
-    after = determined(own, problem)
-    assert after.probabilities == pytest.approx({"leak_muscle": 0.45, "unlisted": 0.55})
+    after = drop_undetermined(own, problem)
+    assert by_text(after.probabilities) == pytest.approx({"leak_muscle": 0.45, "unlisted": 0.55})
     (judged,) = judge([after], SETTINGS)
     assert judged.verdict == "unlisted"
     # a companion that is not told from none stands in no set: its set falls to the rest
     base, leak = own.candidates
-    pair = replace(leak, effects=("leak_muscle",), wrong=("chamber.dead_volume",))
+    pair = replace(leak, effects=LEAK, wrong=("chamber.dead_volume",))
     alone = replace(base, wrong=("chamber.dead_volume",))
-    chances = {pair.key: 0.6, alone.key: 0.3, "unlisted": 0.1}
+    chances = {pair.hypothesis: 0.6, alone.hypothesis: 0.3, UNLISTED: 0.1}
     both = replace(own, candidates=[base, leak, pair, alone], probabilities=chances)
-    after = determined(both, problem)
-    assert after.probabilities == pytest.approx({pair.key: 0.0, alone.key: 0.9, "unlisted": 0.1})
+    after = drop_undetermined(both, problem)
+    assert after.probabilities == pytest.approx(
+        {pair.hypothesis: 0.0, alone.hypothesis: 0.9, UNLISTED: 0.1}
+    )
 
 
 def test_events_of_another_effect_determine_no_value() -> None:
     problem, own = leak_group(1e-13)
     leak = own.candidates[1]
-    happened = Events("external_torque", {problem.recordings[0].recording.name: {"torque": 1.0}})
+    happened = Events(
+        Term("external_torque"), {problem.recordings[0].recording.name: {"torque": 1.0}}
+    )
     beside = replace(leak, fit=replace(leak.fit, events=happened))
-    after = determined(replace(own, candidates=[own.candidates[0], beside]), problem)
-    assert after.probabilities["leak_muscle"] == pytest.approx(0.45)
+    after = drop_undetermined(replace(own, candidates=[own.candidates[0], beside]), problem)
+    assert after.probabilities[Hypothesis(LEAK)] == pytest.approx(0.45)
     # what happened itself is known by its times
-    happened = replace(happened, effect="leak_muscle")
+    happened = replace(happened, effect=Term("leak_muscle"))
     beside = replace(leak, fit=replace(leak.fit, events=happened))
-    after = determined(replace(own, candidates=[own.candidates[0], beside]), problem)
+    after = drop_undetermined(replace(own, candidates=[own.candidates[0], beside]), problem)
     assert after.probabilities == own.probabilities
 
 
 def test_a_name_that_spoils_a_channel_is_put_aside() -> None:
     _, own = leak_group(3e-9)
     (judged,) = judge([own], SETTINGS)
-    assert judged.named == ("leak_muscle",)
+    assert judged.named == LEAK
     assert _conclude._blamed([judged], ["muscle_pressure"]) == {0}
     assert _conclude._blamed([judged], ["joint_angle"]) == set()  # it acts nowhere there
-    after = put_aside(own, "leak_muscle")
-    assert after.probabilities == {"unlisted": 1.0}
-    assert [c.key for c in after.candidates] == [""]
-    more = replace(own, probabilities=own.probabilities | {"x": 0.3})
-    assert put_aside(more, "leak_muscle").probabilities == pytest.approx(
+    after = put_aside(own, Hypothesis(LEAK))
+    assert after.probabilities == {UNLISTED: 1.0}
+    assert [c.hypothesis for c in after.candidates] == [UNDECIDED]
+    more = replace(own, probabilities=own.probabilities | of_texts({"x": 0.3}))
+    assert by_text(put_aside(more, Hypothesis(LEAK)).probabilities) == pytest.approx(
         {"unlisted": 0.25, "x": 0.75}
     )
-    below = replace(own, probabilities={"leak_muscle": 1.0}, below_noise=True)
-    assert put_aside(below, "leak_muscle").probabilities == {"": 1.0}
+    below = replace(own, probabilities={Hypothesis(LEAK): 1.0}, below_noise=True)
+    assert put_aside(below, Hypothesis(LEAK)).probabilities == {UNDECIDED: 1.0}

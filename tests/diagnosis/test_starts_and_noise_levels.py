@@ -5,6 +5,7 @@ it scatters.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from scipy.stats import t
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Candidate, significant, weigh
+from pamrs.diagnosis.evidence import Candidate, Weighing, significant, weigh
 from pamrs.diagnosis.fit import Fit, Problem, residuals
 from pamrs.diagnosis.noise import Excess, excess, noise_levels
 from pamrs.diagnosis.prepare import (
@@ -23,8 +24,10 @@ from pamrs.diagnosis.prepare import (
     noise_level,
     prepare,
 )
+from pamrs.effects import Term
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import whole
+from tests.diagnosis.terms import by_text, terms
 
 SETTINGS = DiagnosisSettings()
 
@@ -143,7 +146,7 @@ def test_noise_exceeds_its_limit_as_seldom_however_it_scatters(scatter: float) -
 
 
 def named(
-    effects: tuple[str, ...], ratio: float, values: dict[str, float], scatter: float = 0.05
+    effects: tuple[Term, ...], ratio: float, values: dict[str, float], scatter: float = 0.05
 ) -> Candidate:
     """A set of effects that leaves so many times the noise level."""
     left = {"arm": Excess(ratio, 0.0, 0.5, 1.0, 1.0, 1.1 * np.exp(2.6 * scatter), scatter)}
@@ -151,20 +154,25 @@ def named(
     return Candidate(effects, fit, left, left, 0.0)
 
 
+def weighed(*given: Any) -> dict[str, float]:
+    """Probabilities by the text of each hypothesis."""
+    return by_text(weigh(*given))
+
+
 def test_of_a_mismatch_near_the_noise_the_noise_says_how_much_may_be_left() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, right, wrong = (
         named((), 1.4, {}),
-        named(("leak_muscle",), 1.0, {}),
-        named(("supply_leak",), 1.25, {}),
+        named(terms("leak_muscle"), 1.0, {}),
+        named(terms("supply_leak"), 1.25, {}),
     )
-    odds = weigh([start, right, wrong], blocks, 0.985, 30.0, SETTINGS)
+    odds = weighed([start, right, wrong], blocks, Weighing(0.985, 30.0, SETTINGS))
     assert odds["leak_muscle"] > 20.0 * odds["supply_leak"]
     # where the noise scatters as much, it says nothing
     noisy = [
         named(c.effects, c.fitted["arm"].ratio, {}, scatter=0.5) for c in (start, right, wrong)
     ]
-    odds = weigh(noisy, blocks, 0.985, 30.0, SETTINGS)
+    odds = weighed(noisy, blocks, Weighing(0.985, 30.0, SETTINGS))
     assert odds["leak_muscle"] < 6.0 * odds["supply_leak"]
 
 
@@ -172,11 +180,11 @@ def test_what_is_still_more_than_noise_is_not_explained() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, little, most = (
         named((), 1.4, {}, 0.03),
-        named(("leak_muscle",), 1.27, {}, 0.03),
-        named(("leak_muscle",), 1.1, {}, 0.03),
+        named(terms("leak_muscle"), 1.27, {}, 0.03),
+        named(terms("leak_muscle"), 1.1, {}, 0.03),
     )
-    assert weigh([start, little], blocks, 0.985, 30.0, SETTINGS)["unlisted"] > 0.8
-    assert weigh([start, most], blocks, 0.985, 30.0, SETTINGS)["unlisted"] < 0.2
+    assert weighed([start, little], blocks, Weighing(0.985, 30.0, SETTINGS))["unlisted"] > 0.8
+    assert weighed([start, most], blocks, Weighing(0.985, 30.0, SETTINGS))["unlisted"] < 0.2
 
 
 def test_every_joint_of_an_arm_starts_where_it_was() -> None:
@@ -243,29 +251,29 @@ def test_a_value_that_nobody_has_published_costs_odds() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
     start, rival = (
         named((), 3.0, {}),
-        named(("base_flexibility",), 1.0, {"base_flexibility.natural_frequency": 7.0}),
+        named(terms("base_flexibility"), 1.0, {"base_flexibility.natural_frequency": 7.0}),
     )
     for length, least, most in ((0.3, 0.5, 2.0), (0.005, 10.0, 60.0)):
-        odds = weigh(
-            [start, rival, named(("payload_swing",), 1.0, {"payload_swing.length": length})],
+        odds = weighed(
+            [start, rival, named(terms("payload_swing"), 1.0, {"payload_swing.length": length})],
             blocks,
-            0.985,
-            30.0,
-            SETTINGS,
+            Weighing(0.985, 30.0, SETTINGS),
         )
         assert least < odds["base_flexibility"] / odds["payload_swing"] < most
 
 
 def test_what_acts_over_most_of_the_motion_is_no_end_stop() -> None:
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.name == "arm"]
-    start, rival = named((), 3.0, {}), named(("muscle_creep",), 1.0, {})
+    start, rival = named((), 3.0, {}), named(terms("muscle_creep"), 1.0, {})
     odds = []
     for angle in (1.2, 0.35):
         rig = RIG.with_effect("joint_end_stop", {"angle": angle})
-        stop = named(("joint_end_stop",), 1.0, {})
+        stop = named(terms("joint_end_stop"), 1.0, {})
         stop = replace(stop, fit=replace(stop.fit, rig=rig))
-        found = weigh(
-            [start, rival, stop], blocks, 0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)}
+        found = weighed(
+            [start, rival, stop],
+            blocks,
+            Weighing(0.985, 30.0, SETTINGS, {"joint_angle": (0.3, 1.4)}),
         )
         odds.append(found["joint_end_stop"] / found["muscle_creep"])
     assert odds[0] == pytest.approx(1.0)
@@ -281,11 +289,11 @@ def test_what_relaxes_at_once_is_another_stiffness() -> None:
     at, scales = {"muscle.modulus_scale": 0.7}, {"muscle.modulus_scale": 0.03}
     freed = replace(value.fit, values=at, scales=scales, moved=moved, freed=tuple(moved))
     value = replace(value, fit=freed)
-    creep = named(("muscle_creep",), 1.0, {"muscle_creep.time_constant": 2.0})
+    creep = named(terms("muscle_creep"), 1.0, {"muscle_creep.time_constant": 2.0})
 
     def odds(std: float) -> dict[str, float]:
         told = replace(creep, fit=replace(creep.fit, std={"muscle_creep.time_constant": std}))
-        return weigh([start, told, value], blocks, 0.985, 30.0, SETTINGS)
+        return weighed([start, told, value], blocks, Weighing(0.985, 30.0, SETTINGS))
 
     seen, unseen = odds(0.2), odds(3.0)
     assert seen["muscle_creep"] > 0.8

@@ -13,7 +13,7 @@ from pamrs.diagnosis.fit import acts_in
 from pamrs.diagnosis.next_experiment import _planning as plan
 from pamrs.diagnosis.next_experiment._differences import _PRESSURE_NOISE
 from pamrs.diagnosis.prepare import available_blocks, prepare, residual
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, Term
 from pamrs.experiments import library
 from pamrs.recordings import Recording
 from pamrs.rig import Rig, load_rig
@@ -48,8 +48,8 @@ def test_every_gauge_is_a_boundary() -> None:
     assert "valve.vent_conductance" in blocks["chamber"].parameters
     assert "line.diameter" in blocks["line"].parameters & blocks["chamber"].parameters
     assert "chamber.dead_volume" not in blocks["line"].parameters
-    assert acts_in("valve_dead_zone", blocks["line"])
-    assert not acts_in("muscle_hysteresis", blocks["line"])
+    assert acts_in(Term("valve_dead_zone"), blocks["line"])
+    assert not acts_in(Term("muscle_hysteresis"), blocks["line"])
 
 
 def test_the_inlet_drives_the_chamber_where_the_valve_cannot() -> None:

@@ -9,21 +9,21 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import pamrs
-from pamrs.diagnosis import DiagnosisSettings
+from pamrs.diagnosis import DiagnosisSettings, evidence
 from pamrs.diagnosis.evidence import (
+    BlockGroup,
     Candidate,
-    Group,
     Judged,
-    case_ambiguity,
-    case_probabilities,
     case_verdict,
     judge,
 )
 from pamrs.diagnosis.fit import Fit
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block, available_blocks
+from pamrs.effects import Hypothesis, Term
 from pamrs.findings import Unexplained, WrongParameter
 from pamrs.report.text import kept_sentence, sentence_of
+from tests.diagnosis.terms import by_text, of_texts, terms
 
 SETTINGS = DiagnosisSettings()
 
@@ -35,8 +35,9 @@ HEALTHY = ("none", "parameters", "unlisted")
 
 def candidate(key: str, moved: dict[str, float] | None = None) -> Candidate:
     """A hypothesis by its key, without a fit behind it."""
-    names = [name for name in key.split("+") if name]
-    effects, wrong = tuple(n for n in names if "." not in n), tuple(n for n in names if "." in n)
+    own = Hypothesis.parse(key).terms
+    effects = tuple(term for term in own if term.is_effect)
+    wrong = tuple(term.id for term in own if term.is_value)
     none = Fit(effects, RIG, {}, {}, None, 0.0, {}, moved or {})  # type: ignore[arg-type]
     return Candidate(effects, none, {}, {}, 0.0, wrong=wrong)
 
@@ -47,25 +48,40 @@ def group(
     *,
     moved: dict[str, float] | None = None,
     shifted: bool = False,
-) -> Group:
+) -> BlockGroup:
     """A group of one block with given probabilities."""
     block: Block = BLOCKS[name]
     keys = [key for key in probabilities if key not in ("", "unlisted")]
     size = Excess(4.0 if shifted else 1.0, 1.0, 0.0, 1.0, 1.0, 1.1)
     mismatch = None if set(probabilities) == {""} else block
-    return Group(
+    return BlockGroup(
         [block],
         {name: size},
         {name: size},
         [candidate("", moved), *(candidate(k) for k in keys)],
-        probabilities,
+        of_texts(probabilities),
         mismatch,
         {},
         [],
     )
 
 
-def said(*groups: Group) -> tuple[list[Judged], str]:
+def case_probabilities(judged: list[Judged]) -> dict[str, float]:
+    """Those of the case, by the text of each hypothesis."""
+    return by_text(evidence.case_probabilities(judged))
+
+
+def left_open(found: list[Hypothesis]) -> list[list[str]]:
+    """Hypotheses by their words."""
+    return [hypothesis.words for hypothesis in found]
+
+
+def case_ambiguity(judged: list[Judged]) -> list[list[str]]:
+    """What a case leaves open, by words."""
+    return left_open(evidence.case_ambiguity(judged))
+
+
+def said(*groups: BlockGroup) -> tuple[list[Judged], str]:
     judged = judge(groups, SETTINGS)
     return judged, case_verdict(judged)
 
@@ -78,9 +94,9 @@ def test_one_block_without_a_name_takes_nothing_from_a_name_in_another() -> None
     )
     assert verdict == "effects"
     assert [j.verdict for j in judged] == ["effects", "unlisted"]
-    assert judged[0].named == ("valve_dead_zone",)
-    assert judged[0].probability("valve_dead_zone") == pytest.approx(
-        alone[0].probability("valve_dead_zone")
+    assert judged[0].named == terms("valve_dead_zone")
+    assert judged[0].probability(Term("valve_dead_zone")) == pytest.approx(
+        alone[0].probability(Term("valve_dead_zone"))
     )
     found = case_probabilities(judged)
     assert max(found, key=lambda key: found[key]) == "valve_dead_zone"
@@ -92,12 +108,12 @@ def test_an_effect_of_two_groups_is_judged_once() -> None:
     gas = {"pressure_lag": 0.5, "input_path_lag": 0.45, "unlisted": 0.05}
     judged, _ = said(group("chamber", gas), group("arm", {"pressure_lag": 0.9, "unlisted": 0.1}))
     # what the arm tells of it counts in the chamber too
-    assert judged[0].probability("pressure_lag") > 0.8
+    assert judged[0].probability(Term("pressure_lag")) > 0.8
     assert case_probabilities(judged)["pressure_lag"] > 0.7
-    assert judged[1].probability("pressure_lag") > 0.9
+    assert judged[1].probability(Term("pressure_lag")) > 0.9
 
 
-def with_encoder(found: Group, size: float) -> Group:
+def with_encoder(found: BlockGroup, size: float) -> BlockGroup:
     """The group with a value of the encoder's error in its hypothesis."""
     fit = found.candidates[0].fit
     values = {"encoder_error.sine": size}
@@ -105,7 +121,7 @@ def with_encoder(found: Group, size: float) -> Group:
         replace(
             c, fit=replace(fit, effects=c.effects, values=values, std=dict.fromkeys(values, 0.01))
         )
-        if c.names == ("encoder_error",)
+        if c.terms == terms("encoder_error")
         else c
         for c in found.candidates
     ]
@@ -122,9 +138,9 @@ def test_what_two_groups_have_is_paid_for_once() -> None:
             with_encoder(group("chamber", gas), size if other is None else other),
             with_encoder(group("arm", arm), size),
         )
-        return judged[1].probability("encoder_error")
+        return judged[1].probability(Term("encoder_error"))
 
-    alone = judge([group("arm", arm)], SETTINGS)[0].probability("encoder_error")
+    alone = judge([group("arm", arm)], SETTINGS)[0].probability(Term("encoder_error"))
     usual, rare = of_arm(0.0), of_arm(0.2)  # 20 standard deviations of what is usual
     assert alone < usual < 0.5 < rare
     # values that differ are two effects
@@ -168,12 +184,16 @@ def test_a_name_that_is_more_probable_than_not_is_given() -> None:
         [group("arm", {"muscle_creep": 0.35, "muscle_creep+payload_swing": 0.25, "unlisted": 0.4})],
         SETTINGS,
     )
-    assert (one.verdict, one.named) == ("effects", ("muscle_creep",))
-    assert one.ambiguity == [["unlisted"], ["muscle_creep"], ["muscle_creep", "payload_swing"]]
+    assert (one.verdict, one.named) == ("effects", terms("muscle_creep"))
+    assert left_open(one.ambiguity) == [
+        ["unlisted"],
+        ["muscle_creep"],
+        ["muscle_creep", "payload_swing"],
+    ]
     (two,) = judge(
         [group("arm", {"muscle_creep": 0.45, "muscle_hysteresis": 0.4, "unlisted": 0.15})], SETTINGS
     )
-    assert (two.verdict, two.named) == ("effects", ("muscle_creep",))
+    assert (two.verdict, two.named) == ("effects", terms("muscle_creep"))
     (none,) = judge(
         [group("arm", {"muscle_creep": 0.35, "muscle_hysteresis": 0.25, "unlisted": 0.4})], SETTINGS
     )
@@ -190,7 +210,7 @@ def test_healthy_groups() -> None:
     )
     assert verdict == "parameters"
     # a parameter at its wall, and nobody knows why
-    assert judged[0].ambiguity == [["parameters"], ["unlisted"]]
+    assert left_open(judged[0].ambiguity) == [["parameters"], ["unlisted"]]
     judged, _ = said(
         group("chamber", {"": 1.0}, moved={"chamber.alpha": 3.0}),
         group("arm", {"": 1.0}, moved={"arm.payload": 3.0}),
@@ -232,7 +252,7 @@ def test_probabilities_add_to_one_and_verdicts_follow_them(
         assert (
             j.ambiguity == []
             if best >= 0.9
-            else all(j.probabilities[k] >= 0.05 for k in ("+".join(s) for s in j.ambiguity))
+            else all(j.probabilities[h] >= 0.05 for h in j.ambiguity)
         )
     sets = case_ambiguity(judged)
     assert len({tuple(s) for s in sets}) == len(sets)
@@ -273,5 +293,5 @@ def test_a_wrong_value_is_named_beside_an_effect() -> None:
         group("chamber", {"clock_skew+valve.discharge_area_max": 0.9, "unlisted": 0.1})
     )
     assert verdict == "effects"
-    assert judged[0].named == ("clock_skew",)
+    assert judged[0].named == terms("clock_skew")
     assert judged[0].wrong == ("valve.discharge_area_max",)

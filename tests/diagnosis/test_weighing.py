@@ -11,14 +11,15 @@ import pytest
 
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.evidence import Attempts, Candidate, room_beside, weigh
-from pamrs.diagnosis.evidence._weighing import _trusted_parts, unlikely
+from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence._weighing import _share_by_trust, loss_by_values
 from pamrs.diagnosis.fit import Events, Fit, Problem, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
+from tests.diagnosis.terms import by_text, terms
 
 SETTINGS = DiagnosisSettings()
 RIG = pamrs.rigs.shoulder()
@@ -49,13 +50,13 @@ def hypothesis(
         correlation + (1.0 - correlation) * np.eye(len(spreads))
     )
     scales = dict.fromkeys(values, 1.0)
-    fit = Fit(tuple(effects), RIG, values, std, covariance, 0.0, {}, scales=scales, events=events)
+    fit = Fit(terms(*effects), RIG, values, std, covariance, 0.0, {}, scales=scales, events=events)
     kept = {"arm": Excess(1.0 + left * (BEFORE - 1.0), 0.0, 0.5, 1.0, 1.0, 1.2, 0.05)}
-    return Candidate(tuple(effects), fit, kept, kept, 0.0)
+    return Candidate(terms(*effects), fit, kept, kept, 0.0)
 
 
 def weighed(*found: Candidate) -> dict[str, float]:
-    return weigh([hypothesis({}, 1.0), *found], ARM, 0.985, 30.0, SETTINGS)
+    return by_text(weigh([hypothesis({}, 1.0), *found], ARM, Weighing(0.985, 30.0, SETTINGS)))
 
 
 def test_an_effect_that_is_not_told_from_none_names_nothing() -> None:
@@ -82,7 +83,7 @@ def test_a_value_far_from_its_prior_is_rare_and_not_ruled_out() -> None:
     prior = 0.035
     for times in (0.0, 1.0, 10.0):
         found = hypothesis({"com_offset": {"angle": (times * prior, 1e-4)}}, 0.0)
-        assert unlikely(found, {}) == pytest.approx(math.log1p(times**2))
+        assert loss_by_values(found, {}) == pytest.approx(math.log1p(times**2))
 
 
 @pytest.mark.parametrize(
@@ -172,7 +173,7 @@ def test_room_beside_is_what_a_perfect_companion_could_gain() -> None:
     evidence = SETTINGS
     start = hypothesis({}, 1.0)
     rooms = [
-        room_beside(hypothesis(CREEP, left), start, ARM, evidence)
+        possible_gain(hypothesis(CREEP, left), start, ARM, evidence)
         for left in (0.0, 1e-4, 1e-3, 1e-2, 0.1)
     ]
     assert rooms[0] == pytest.approx(0.0, abs=1e-9)
@@ -185,7 +186,7 @@ def test_what_a_set_is_not_trusted_with_falls_to_its_part() -> None:
     """A push beside a damping may be anything: it is not trusted, and takes nothing from the
     damping, which by itself explains more than half.
     """
-    pushes = Events("external_torque", {}, {})
+    pushes = Events(Term("external_torque"), {}, {})
     alone = hypothesis(DAMPING, 0.4)
     beside = hypothesis({**DAMPING, "external_torque": {}}, 0.2, events=pushes)
     other = hypothesis({**CREEP, "external_torque": {}}, 0.2, events=pushes)
@@ -211,10 +212,12 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
     """Other events and wrong values beside them are not fitted."""
     problem = Problem(BLOCKS, [], core_rig(RIG), SETTINGS)
     trial = Attempts(problem, problem, RIG, {}, {}, BLOCKS)
-    pushed = hypothesis({"external_torque": {}}, 0.2, events=Events("external_torque", {}, {}))
+    pushed = hypothesis(
+        {"external_torque": {}}, 0.2, events=Events(Term("external_torque"), {}, {})
+    )
     wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
-    assert trial.transient("payload_change", pushed) is None
-    assert trial.transient("payload_change", wrong) is None
+    assert trial.transient(Term("payload_change"), pushed) is None
+    assert trial.transient(Term("payload_change"), wrong) is None
 
 
 def with_wrong(found: Candidate, *names: str) -> Candidate:
@@ -273,8 +276,8 @@ def test_what_is_not_trusted_goes_to_the_part_that_leads(other: float) -> None:
     both = hypothesis({**CREEP, **DAMPING}, 0.0)
     weights = {leads: 0.9, follows: 0.1, both: 50.0}
     trusted = {leads: 0.90, follows: other, both: 0.1}
-    found = _trusted_parts(weights, trusted)
+    found = by_text(_share_by_trust(weights, trusted))
     untrusted = (50.0 / 51.0) * 0.9
     assert found["muscle_creep"] == pytest.approx((0.9 / 51.0 + untrusted * 0.9) * 0.9)
-    backwards = _trusted_parts(dict(reversed(weights.items())), trusted)
+    backwards = by_text(_share_by_trust(dict(reversed(weights.items())), trusted))
     assert backwards == pytest.approx(found)

@@ -15,7 +15,7 @@ from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.result import schema
 from pamrs.diagnosis.search import _wrong_parameters as wrong_parameters
-from pamrs.diagnosis.search import suspected
+from pamrs.diagnosis.search import suspects_at_wall
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 
@@ -125,7 +125,7 @@ def test_pairs_of_one_mistake_are_suspected_with_either_at_its_wall() -> None:
     (arm,) = (b for b in available_blocks(rig, NAMES) if b.name == "arm")
     problem = Problem([arm], prepared, core_rig(rig), SETTINGS)
     baseline = fit(problem, rig, (), {}, {"arm": 1.0}, evaluations=20)
-    found = suspected(baseline, [arm])
+    found = suspects_at_wall(baseline, [arm])
     assert ("arm.payload",) in found
     assert ("arm.payload", "arm.first_moment") in found
     assert all(abs(baseline.moved[name]) <= 3.0 + 1e-9 for name in baseline.moved)
@@ -207,7 +207,7 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
         ("chamber.dead_volume", "valve.discharge_area_max"),
     ]
     gains = dict.fromkeys(pairs, 1e6) | {("muscle.modulus_scale",): 50.0, ("arm.viscous",): 3.0}
-    monkeypatch.setattr(wrong_parameters, "suspected", lambda *_: list(gains))
+    monkeypatch.setattr(wrong_parameters, "suspects_at_wall", lambda *_: list(gains))
     monkeypatch.setattr(wrong_parameters, "_predicted_gain", lambda *_: gains)
     asked: list[tuple[str, ...]] = []
 

@@ -13,7 +13,7 @@ import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import same_data_in, starts_of
-from pamrs.effects import EFFECTS
+from pamrs.effects import EFFECTS, Term
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.rig.schema import ACTS
@@ -195,7 +195,7 @@ def test_the_core_takes_every_bound_of_the_table(effect: str) -> None:
 def test_the_diagnosis_knows_where_an_effect_acts_and_where_to_begin(effect: str) -> None:
     assert EFFECTS[effect].acts_in or ACTS[EFFECTS[effect].block]
     for sealed in (True, False):
-        starts = starts_of(effect, sealed=sealed)
+        starts = starts_of(Term(effect), sealed=sealed)
         usual, lasting = EFFECTS[effect].forms[:1], EFFECTS[effect].lasting
         assert {start.form or usual[0].name for start in starts} == {
             form.name for form in lasting or usual
@@ -329,7 +329,7 @@ def test_a_step_that_leaves_the_range_behind_a_hose_is_an_error_and_no_panic():
 
 def test_a_late_clock_is_the_dead_time_of_what_the_commands_go_to() -> None:
     other = {
-        name: same_data_in(getattr(pamrs.rigs, name)(), "clock_skew")
+        name: same_data_in(getattr(pamrs.rigs, name)(), Term("clock_skew"))
         for name in ("shoulder", "regulated_joint", "sealed_chamber")
     }
     assert other["sealed_chamber"] is None

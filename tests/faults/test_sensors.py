@@ -18,7 +18,7 @@ from pamrs.diagnosis.fit import Problem, fit
 from pamrs.diagnosis.noise import excess, noise_levels
 from pamrs.diagnosis.prepare import available_blocks, prepare, without_rails
 from pamrs.diagnosis.result import schema
-from pamrs.diagnosis.search import misread
+from pamrs.diagnosis.search import find_misread
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Case, Recording
@@ -161,7 +161,7 @@ def test_kgf_labelled_bar_is_told_beside_a_gain() -> None:
 )
 def test_a_gain_is_a_unit_only_where_the_list_has_it(gains: dict[str, float], told: bool) -> None:
     problem, rig = _problem(_in_bar(gains))
-    assert (misread(problem, rig) is not None) is told
+    assert (find_misread(problem, rig) is not None) is told
 
 
 def _problem(case: Case) -> tuple[Problem, pamrs.Rig]:

@@ -13,6 +13,7 @@ from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.fit import Problem, _fitting, fit
 from pamrs.diagnosis.prepare import available_blocks, prepare
 from pamrs.diagnosis.search import refitted
+from pamrs.effects import Term
 from pamrs.recordings import Recording
 from pamrs.simulation import core_rig
 from tests.diagnosis.held import held
@@ -100,7 +101,7 @@ def test_work_of_the_refit_and_of_an_effect_of_a_shoulder(monkeypatch: pytest.Mo
     }
     counts |= work.of(
         "hysteresis of the arm",
-        lambda: fit(problem, rig, ("muscle_hysteresis",), starts, white, evaluations=30),
+        lambda: fit(problem, rig, (Term("muscle_hysteresis"),), starts, white, evaluations=30),
     )
     compare("shoulder", counts, tolerance=TOLERANCE)
 

@@ -62,7 +62,7 @@ def _of_effects(rig: Rig) -> dict[str, str]:
     """
     if not rig.effects:
         return {}
-    from pamrs.effects import info_of
+    from pamrs.effects import EFFECTS
     from pamrs.rig.schema import qualified
 
     shown = {}
@@ -71,7 +71,7 @@ def _of_effects(rig: Rig) -> dict[str, str]:
         own = entry["id"]
         full = qualified(own, entry.get("at", ""))
         spread = rig.effect_std.get(own if several.count(own) == 1 else full, {})
-        for p in info_of(own).form(entry.get("form", "")).parameters:
+        for p in EFFECTS[own].form(entry.get("form", "")).parameters:
             value = f"{entry['parameters'][p.name]:.6g}"
             std = f" ± {spread[p.name]:.3g}" if spread.get(p.name) else ""
             bounds = with_unit(f"{p.lower:g} to {p.upper:g}", p.unit)

@@ -25,7 +25,7 @@ from functools import partial
 from typing import Any
 
 from pamrs.channels import dotted
-from pamrs.diagnosis.evidence import Group, calibrated, is_parameter
+from pamrs.diagnosis.evidence import BlockGroup, calibrate
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
 from pamrs.diagnosis.model import conclude
@@ -60,9 +60,9 @@ from pamrs.diagnosis.prepare import (
     without_rails,
 )
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.diagnosis.search import examine, misread, reading_errors
+from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, EFFECTS, id_of, is_effect, place_of
+from pamrs.effects import CATALOGUE, EFFECTS, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty, NextExperiment
 from pamrs.recordings import Case, Recording, load_case
@@ -97,12 +97,12 @@ def _unsettled(rig: Rig) -> list[str]:
     return [name for name in unknown if name.partition(".")[0] in moving]
 
 
-def _capped(group: Group, factor: float) -> Group:
+def _capped(group: BlockGroup, factor: float) -> BlockGroup:
     """A group of joints whose names have a smaller probability, the rest going to ``unlisted``."""
     if group.mismatch is None or not group.mismatch.mechanical:
         return group
-    kept = {k: p if k in ("", "unlisted") else factor * p for k, p in group.probabilities.items()}
-    kept["unlisted"] = kept.get("unlisted", 0.0) + 1.0 - sum(kept.values())
+    kept = {h: factor * p if h.terms else p for h, p in group.probabilities.items()}
+    kept[UNLISTED] = kept.get(UNLISTED, 0.0) + 1.0 - sum(kept.values())
     return replace(group, probabilities=kept)
 
 
@@ -252,7 +252,7 @@ def diagnose(
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
     with _in_range(case.name):
         part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
-        read = part("the search for other units", lambda: misread(inner, case.rig))
+        read = part("the search for other units", lambda: find_misread(inner, case.rig))
         if read is not None:
             errors = {"fit": reading_errors(case.rig, inner, read), "held_out": {}}
             if outer is not inner:
@@ -297,7 +297,7 @@ def _physics(
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
     inner, outer = _judged_only(inner, outer, groups)
-    groups = [calibrated(group, inner.settings) for group in groups]
+    groups = [calibrate(group, inner.settings) for group in groups]
     unsettled = _unsettled(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
@@ -330,7 +330,9 @@ def _physics(
     return diagnosis, inner, unjudged
 
 
-def _judged_only(inner: Problem, outer: Problem, groups: list[Group]) -> tuple[Problem, Problem]:
+def _judged_only(
+    inner: Problem, outer: Problem, groups: list[BlockGroup]
+) -> tuple[Problem, Problem]:
     """Recordings without the blocks whose judgement failed."""
     judged = {block.name for group in groups for block in group.blocks}
     if not judged:
@@ -432,8 +434,8 @@ def _said_of_held(rig: Rig) -> list[str]:
     return said
 
 
-def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
-    """Sets of names that the caller asks for, checked."""
+def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
+    """What the caller asks for, checked, each hypothesis once."""
     if isinstance(consider, str):
         raise ValueError(
             f"consider = {consider!r} is not allowed: a list of such texts, [{consider!r}]"
@@ -441,34 +443,33 @@ def _asked(rig: Rig, consider: Sequence[str]) -> tuple[tuple[str, ...], ...]:
     free = [name for name, parameter in rig.parameters.items() if parameter.tol > 0.0]
     there = [e for e in CATALOGUE if fits(rig, e)]
     held = {entry["id"] for entry in rig.effects}
-    sets = [tuple(name.strip() for name in text.split("+")) for text in consider]
-    for text, names in zip(consider, sets, strict=True):
-        if len(set(names)) < len(names):
+    sets = (tuple(Term.parse(word.strip()) for word in text.split("+")) for text in consider)
+    asked = list(map(Hypothesis, sets))
+    for text, hypothesis in zip(consider, asked, strict=True):
+        if len(hypothesis.set) < len(hypothesis.terms):
             raise ValueError(f"consider: {text!r} is not allowed: it has a name twice")
-    for name in (name for names in sets for name in names):
-        if is_effect(name) and id_of(name) in held:
+    for term in (term for hypothesis in asked for term in hypothesis.terms):
+        if term.is_effect and term.id in held:
             raise ValueError(
-                f"consider: {name!r} is not allowed: the model holds it already, and it is refitted"
+                f"consider: {str(term)!r} is not allowed: the model holds it already, and it is "
+                "refitted"
             )
-        own, known = (name, free) if is_parameter(name) else (id_of(name), there)
-        if own not in known:
+        known = free if term.is_value else there
+        if term.id not in known:
             raise ValueError(
-                f"consider: {name!r} is neither an effect that this rig can have nor one of its "
-                f"parameters with a tolerance; {meant(name, known)}"
+                f"consider: {str(term)!r} is neither an effect that this rig can have nor one of "
+                f"its parameters with a tolerance; {meant(str(term), known)}"
             )
-        if is_effect(name) and place_of(name):
+        if term.at:
             try:
-                rig.with_effect(own, at=place_of(name))
+                rig.with_effect(term.id, at=term.at)
             except ParameterError as error:
-                raise ValueError(f"consider: {name!r} is not allowed: {error}") from error
-    once: dict[frozenset[str], tuple[str, ...]] = {}
-    for names in sets:
-        once.setdefault(frozenset(names), names)
-    return tuple(once.values())
+                raise ValueError(f"consider: {str(term)!r} is not allowed: {error}") from error
+    return tuple(dict.fromkeys(asked))
 
 
 def _problems(
-    case: Case, settings: DiagnosisSettings, asked: tuple[tuple[str, ...], ...]
+    case: Case, settings: DiagnosisSettings, asked: tuple[Hypothesis, ...]
 ) -> tuple[Problem, Problem, list[Unjudged], list[str]]:
     """Recordings to fit and held-out ones (the same where there are no others) by block, blocks
     that are not judged, and what is to be said of beginnings that nobody measured.

@@ -3,8 +3,8 @@ effect.
 
 Equations, parameters, bounds and sources stand in the core, one file for each effect
 (``crates/pam-core/src/effects``), and its words here in ``words/ID.toml``. Public are
-:data:`EFFECTS`, :data:`CATALOGUE`, the types of their entries, what an effect at one of several
-blocks is called (``term_of`` and its likes), and :mod:`pamrs.effects.text`.
+:data:`EFFECTS`, :data:`CATALOGUE`, the types of their entries, what is said to be missing
+(:class:`Term`, :class:`Hypothesis`), and :mod:`pamrs.effects.text`.
 """
 
 from __future__ import annotations
@@ -12,46 +12,48 @@ from __future__ import annotations
 from pamrs.effects._catalogue import (
     CATALOGUE,
     CLOSURE_OF,
+    CLOSURE_TERMS,
     EFFECTS,
     MEMORY_OF,
-    TERMS,
     WORDS,
     ports_of,
 )
-from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
-from pamrs.effects._terms import (
-    exclude,
+from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
+from pamrs.effects.hypotheses import (
+    NONE,
+    PARAMETERS,
+    UNDECIDED,
+    UNLISTED,
+    WITHOUT_NAME,
+    Hypothesis,
+    Term,
+    effect_of,
     find_parameter,
-    id_of,
-    info_of,
-    is_effect,
-    place_of,
-    term_in,
-    term_of,
     usual_values,
 )
 
 __all__ = [
     "CATALOGUE",
     "CLOSURE_OF",
+    "CLOSURE_TERMS",
     "EFFECTS",
     "MEMORY_OF",
-    "TERMS",
+    "NONE",
+    "PARAMETERS",
+    "UNDECIDED",
+    "UNLISTED",
+    "WITHOUT_NAME",
     "WORDS",
+    "ClosureTerm",
     "EffectInfo",
     "EffectParameter",
     "Form",
+    "Hypothesis",
     "SameData",
     "Term",
     "Words",
-    "exclude",
+    "effect_of",
     "find_parameter",
-    "id_of",
-    "info_of",
-    "is_effect",
-    "place_of",
     "ports_of",
-    "term_in",
-    "term_of",
     "usual_values",
 ]

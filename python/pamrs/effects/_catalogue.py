@@ -9,14 +9,14 @@ from importlib import resources
 from typing import Any, Final
 
 from pamrs import _core
-from pamrs.effects._info import EffectInfo, EffectParameter, Form, SameData, Term, Words
+from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
 
 __all__ = [
     "CATALOGUE",
     "CLOSURE_OF",
     "EFFECTS",
     "MEMORY_OF",
-    "TERMS",
+    "CLOSURE_TERMS",
     "WORDS",
     "ports_of",
 ]
@@ -84,7 +84,8 @@ def _info(told: dict[str, Any]) -> EffectInfo:
     """One effect, as the core tells it, with its words."""
     words = _words(told["id"])
     terms = tuple(
-        Term(**{**term, "variables": tuple(term["variables"])}) for term in words.get("terms", ())
+        ClosureTerm(**{**term, "variables": tuple(term["variables"])})
+        for term in words.get("terms", ())
     )
     meanings = {
         **{term.name: f"coefficient of {term.formula}" for term in terms},
@@ -143,15 +144,15 @@ CATALOGUE: Final[dict[str, EffectInfo]] = {
     name: effect for name, effect in EFFECTS.items() if effect.catalogue
 }
 """Those that a diagnosis may name."""
-TERMS: Final[dict[str, tuple[Term, ...]]] = {
+CLOSURE_TERMS: Final[dict[str, tuple[ClosureTerm, ...]]] = {
     name: effect.terms for name, effect in EFFECTS.items() if effect.terms
 }
 """Terms of each sum, in the order of its parameters."""
 CLOSURE_OF: Final[dict[str, str]] = {
-    ("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in TERMS
+    ("arm" if EFFECTS[name].at == "joint" else EFFECTS[name].at): name for name in CLOSURE_TERMS
 }
 """Sum of terms of each block of the cut chain."""
-WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in TERMS}
+WORDS: Final[dict[str, Words]] = {name: _of_words(name) for name in CLOSURE_TERMS}
 """How each sum of terms is put into words."""
 MEMORY_OF: Final[dict[str, str]] = {"time": "memory_time", "distance": "memory_angle"}
 """Shape that a term of a kind with memory depends on."""

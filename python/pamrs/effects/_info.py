@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "Term", "Words"]
+__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "ClosureTerm", "Words"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +131,7 @@ class SameData:
 
 
 @dataclass(frozen=True, slots=True)
-class Term:
+class ClosureTerm:
     """One term of a sum that stands where no name does.
 
     Attributes
@@ -247,7 +247,7 @@ class EffectInfo:
     same_data : tuple of SameData
         Other effects whose recordings it leaves where a parameter is zero, each in rigs that have
         what that one acts on; of several in one rig the first.
-    terms : tuple of Term
+    terms : tuple of ClosureTerm
         Of a sum of terms, in the order of its parameters; behind them stand the shapes of its
         memories.
     label : str
@@ -294,7 +294,7 @@ class EffectInfo:
     rivals: tuple[str, ...] = ()
     catalogue: bool = True
     same_data: tuple[SameData, ...] = ()
-    terms: tuple[Term, ...] = ()
+    terms: tuple[ClosureTerm, ...] = ()
     label: str = ""
     stated_by: tuple[str, ...] = ()
     acts_in: tuple[str, ...] = ()

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from pamrs.effects import EFFECTS, TERMS, WORDS, Term
+from pamrs.effects import CLOSURE_TERMS, EFFECTS, WORDS, ClosureTerm
 from pamrs.findings import Form
 
 __all__ = ["form_sentence"]
@@ -36,7 +36,7 @@ def form_sentence(form: Form) -> str:
         and standard deviations.
     """
     closure, told, shape = form.closure, WORDS[form.closure], form.memory
-    used = {term.name: term for term in TERMS[closure] if term.name in form.terms}
+    used = {term.name: term for term in CLOSURE_TERMS[closure] if term.name in form.terms}
     size, unit = _readable(form.effective, EFFECTS[closure].parameters[0].unit)
     variables = list(dict.fromkeys(v for term in used.values() for v in term.variables))
     words = [
@@ -84,7 +84,7 @@ def _readable(size: float, unit: str) -> tuple[float, str]:
     return _UNITS[unit][-1] if len(_UNITS[unit]) > 1 else _UNITS[unit][0]
 
 
-def _formula(form: Form, used: dict[str, Term], size: float) -> str:
+def _formula(form: Form, used: dict[str, ClosureTerm], size: float) -> str:
     text = ""
     for name, term in used.items():
         value, std = (number / size for number in form.terms[name])
@@ -101,7 +101,7 @@ def _number(value: float) -> str:
     return f"{value:.0f}" if 999.5 <= value < 1e6 else f"{value:.3g}"
 
 
-def _legend(used: dict[str, Term], shape: Mapping[str, float | None]) -> str:
+def _legend(used: dict[str, ClosureTerm], shape: Mapping[str, float | None]) -> str:
     formulas = " ".join(term.formula for term in used.values())
     notes = ""
     if "_T" in formulas:

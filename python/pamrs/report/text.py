@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, TypeGuard
 
 from pamrs.channels import unit_of
-from pamrs.effects import EFFECTS, id_of, info_of, is_effect, place_of, term_of
+from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis, Term, effect_of
 from pamrs.findings import (
     HEALTHY,
     BlockVerdict,
@@ -122,23 +122,26 @@ def label(identifier: str) -> str:
     effect at one block of several has its name behind an ``@``.
     """
 
-    def told(part: str) -> str:
-        own, at = id_of(part), place_of(part)
-        return _LABELS.get(own, own.replace("_", " ")) + (f" at {at.replace('_', ' ')}" * bool(at))
+    def readable(word: str) -> str:
+        term = Term.parse(word)
+        at = f" at {term.at.replace('_', ' ')}" if term.at else ""
+        return _LABELS.get(term.id, term.id.replace("_", " ")) + at
 
-    return " + ".join(told(part.strip()) for part in identifier.split("+"))
+    return " + ".join(map(readable, Hypothesis.parse(identifier).words))
 
 
 def set_label(identifiers: list[str]) -> str:
     """Readable name of a hypothesis: effects that act together, parameters that are wrong."""
     if not identifiers:
         return label("none")
-    return " + ".join(f"wrong {spoken_name(i)}" if "." in i else label(i) for i in identifiers)
+    return " + ".join(
+        f"wrong {spoken_name(i)}" if Term.parse(i).is_value else label(i) for i in identifiers
+    )
 
 
 def hypothesis_label(key: str) -> str:
     """Readable name of a hypothesis by its key, names joined by ``+``."""
-    return set_label(key.split("+"))
+    return set_label(Hypothesis.parse(key).words)
 
 
 def is_number(value: Any) -> TypeGuard[float]:
@@ -269,8 +272,8 @@ def blocks_label(block: BlockVerdict) -> str:
 
 def is_named(block: BlockVerdict, hypothesis: str) -> bool:
     """Whether `hypothesis` (an id, or ids joined by ``+``) is the one that a group names."""
-    named = {*block.effects, *block.wrong_parameters} or {block.verdict}
-    return set(hypothesis.replace(" ", "").split("+")) == named
+    named = [*block.effects, *block.wrong_parameters] or [block.verdict]
+    return Hypothesis.parse(hypothesis) == Hypothesis.of(named)
 
 
 def moved_parameters(diagnosis: Findings, least: float = 1.0) -> list[str]:
@@ -558,14 +561,14 @@ def _found(diagnosis: Findings, block: BlockVerdict, *others: BlockVerdict) -> s
         if where := _places(block, place):
             return where
         rivals = "these recordings cannot tell " + told_apart(block.ambiguity, block.probabilities)
-        healthy = any(s in (["none"], ["parameters"]) for s in block.ambiguity)
-        if all(
-            "." in name or name in ("none", "parameters") for s in block.ambiguity for name in s
-        ):
+        left = [Hypothesis.of(words) for words in block.ambiguity]
+        of_file = [term.is_value for hypothesis in left for term in hypothesis.terms]
+        healthy = NONE in left or PARAMETERS in left
+        if all(of_file) and not any(h.rest == UNLISTED.rest for h in left):
             return f"the rig file {'may be' if healthy else 'is'} wrong: {rivals}"
         if healthy:
             return f"physics may be missing{place}: {rivals}"
-        if any("." in name for s in block.ambiguity for name in s):
+        if any(of_file):
             return f"physics is missing{place}, or the rig file is wrong: {rivals}"
         return f"physics is missing{place}: {rivals}"
     told = {e.term: effect_name(e) for e in diagnosis.effects}
@@ -592,19 +595,20 @@ def _places(block: BlockVerdict, place: str) -> str:
     """That one effect is missing and only where it acts is open, with its probability wherever that
     is; empty where something else is open.
     """
-    sets = [s for s in block.ambiguity if s != ["unlisted"]]
-    names = [name for s in sets for name in s]
-    effect = id_of(names[0]) if names else ""
-    if len(names) != len(sets) or len(sets) < 2 or {id_of(n) for n in names} != {effect}:
+    left = [Hypothesis.of(words) for words in block.ambiguity if words != [UNLISTED.rest]]
+    terms = [term for hypothesis in left for term in hypothesis.terms]
+    several = len(terms) > 1 and all(len(hypothesis.words) == 1 for hypothesis in left)
+    if not several or len(terms) != len(left) or len({term.id for term in terms}) > 1:
         return ""
-    chances = [chance_of(block.probabilities, s) for s in sets]
-    told = [
-        f"at {place_of(n) or info_of(effect).everywhere} ({format_probability(p)})"
-        for n, p in zip(names, chances, strict=True)
+    chances = [chance_of(block.probabilities, hypothesis.words) for hypothesis in left]
+    info = terms[0].info
+    places = [
+        f"at {term.at or info.everywhere} ({format_probability(p)})"
+        for term, p in zip(terms, chances, strict=True)
     ]
     return (
-        f"the model leaves out: {info_of(effect).name}{place}{_how_sure(sum(chances))}, and "
-        f"these recordings cannot tell whether {', '.join(told[:-1])} or {told[-1]}"
+        f"the model leaves out: {info.name}{place}{_how_sure(sum(chances))}, and "
+        f"these recordings cannot tell whether {', '.join(places[:-1])} or {places[-1]}"
     )
 
 
@@ -612,8 +616,8 @@ def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float
     """Probability of a hypothesis by its names, in whatever order its key has them; NaN where it is
     not among them.
     """
-    wanted = set(names)
-    found = (float(p) for key, p in probabilities.items() if set(key.split("+")) == wanted)
+    wanted = Hypothesis.of(names)
+    found = (float(p) for key, p in probabilities.items() if Hypothesis.parse(key) == wanted)
     return next((p for p in found if is_number(p)), math.nan)
 
 
@@ -742,8 +746,9 @@ def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str
 
 def _spread(name: str, others: Collection[str]) -> str:
     """An effect that acts everywhere, with that said where it stands beside itself at one block."""
-    apart = is_effect(name) and any(id_of(o) == name and place_of(o) for o in others)
-    return term_of(name, info_of(name).everywhere) if apart else name
+    at_one = (term for other in others if (term := Term.parse(other)).at)
+    apart = name in EFFECTS and any(term.id == name for term in at_one)
+    return str(Term(name, EFFECTS[name].everywhere)) if apart else name
 
 
 def _answer(names: list[str], chance: float = math.nan) -> str:
@@ -756,7 +761,9 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
     text = (
         fixed[names[0]]
         if len(names) == 1 and names[0] in fixed
-        else " + ".join(f"a {set_label([name])}" if "." in name else label(name) for name in names)
+        else " + ".join(
+            f"a {set_label([name])}" if Term.parse(name).is_value else label(name) for name in names
+        )
     )
     return f"{text} ({format_probability(chance)})" if is_number(chance) else text
 
@@ -806,7 +813,7 @@ def judged_place(diagnosis: Findings) -> str:
 def _beside_held(diagnosis: Findings) -> str:
     """The effects that the model had before: `` in addition to the leak that the model holds``."""
     ids = [term.id for term in diagnosis.budget if term.kind == "held"]
-    ids += [name.partition(".")[0] for name in diagnosis.parameters]
+    ids += [effect.id for name in diagnosis.parameters if (effect := effect_of(name))]
     held = [f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS]
     return f" in addition to {' and '.join(held)} that the model holds" if held else ""
 
@@ -821,7 +828,7 @@ def _outside(diagnosis: Findings, place: str) -> str:
         for key, p in ranked_probabilities(diagnosis.probabilities, len(diagnosis.probabilities))
         if key not in (*HEALTHY, "unlisted")
     ]
-    others = " or ".join(_answer(key.split("+"), p) for key, p in rivals[:2])
+    others = " or ".join(_answer(Hypothesis.parse(key).words, p) for key, p in rivals[:2])
     return (
         f"Physics is missing{place}, and nothing is probable enough to be named: "
         f"{_answer(['unlisted'], chance)}{f', {others}' if others else ''}"
@@ -839,7 +846,7 @@ def term_label(term: BudgetTerm) -> str:
         return fixed[term.kind]
     held = ", in the model already" if term.kind == "held" else ""
     form = f" ({label(term.form)})" if term.form else ""
-    return set_label(term_of(term.id, term.at).split("+")) + form + held
+    return hypothesis_label(str(Term(term.id, term.at))) + form + held
 
 
 def budgets(diagnosis: Findings) -> dict[str, list[BudgetTerm]]:

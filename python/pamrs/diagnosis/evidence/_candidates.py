@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cache, partial
+from functools import cache, cached_property, partial
 from typing import TypeVar
 
 import numpy as np
@@ -39,9 +39,15 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.noise import CORRELATED_VARIANCE, Excess, NoiseLevel, excess, inflation
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.diagnosis.screen import left_out
+from pamrs.diagnosis.screen import predicted_by_others
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import find_parameter, id_of, info_of, ports_of, term_in, term_of
+from pamrs.effects import (
+    Hypothesis,
+    Term,
+    effect_of,
+    find_parameter,
+    ports_of,
+)
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
@@ -49,8 +55,8 @@ from pamrs.simulation import core_rig
 __all__ = [
     "Attempts",
     "Candidate",
-    "Group",
-    "doubted",
+    "BlockGroup",
+    "misses_only_held_out",
     "significant",
     "start_of",
     "without_autocorrelation",
@@ -79,13 +85,12 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """A hypothesis, fitted: a set of effects, or values of the rig file that are wrong.
+    """A fitted hypothesis: effects, and values of the rig file that are wrong.
 
     Attributes
     ----------
-    effects : tuple of str
-        Its effects, each with a place where it acts at one block of several; empty for the
-        baseline.
+    effects : tuple of Term
+        Its effects; empty for the baseline.
     fit : Fit
         On the recordings to fit.
     held_out : dict of str to Excess
@@ -109,7 +114,7 @@ class Candidate:
         Whether its effects were tried in other forms beside each other.
     """
 
-    effects: tuple[str, ...]
+    effects: tuple[Term, ...]
     fit: Fit
     held_out: dict[str, Excess]
     fitted: dict[str, Excess]
@@ -122,14 +127,14 @@ class Candidate:
     forms_tried: bool = False
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """What it names: effects, and parameters that are wrong; nothing for the baseline."""
-        return (*self.effects, *self.wrong)
+    def terms(self) -> tuple[Term, ...]:
+        """Effects, and parameters that are wrong; nothing for the baseline."""
+        return (*self.effects, *map(Term, self.wrong))
 
-    @property
-    def key(self) -> str:
-        """Its names joined by ``+``, as probabilities are listed."""
-        return "+".join(self.names)
+    @cached_property
+    def hypothesis(self) -> Hypothesis:
+        """What was fitted."""
+        return Hypothesis(self.terms)
 
     def outside(self, walls: float) -> float:
         """How far outside its tolerances what is wrong is: the logarithm of how many times the
@@ -170,7 +175,7 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False)
-class Group:
+class BlockGroup:
     """Blocks that are judged together, with everything found out about them.
 
     Attributes
@@ -181,10 +186,9 @@ class Group:
         Excess by block before and after the refit, on fitted recordings.
     candidates : list of Candidate
         The baseline first, then every set of effects tried.
-    probabilities : dict of str to float
-        Over the hypotheses (names joined by ``+``: ids of effects, dotted names of wrong
-        parameters), ``unlisted`` and ``""`` (nothing missing here, or parameters that are off
-        inside their tolerances).
+    probabilities : dict of Hypothesis to float
+        Over those that were fitted, `UNLISTED` and `UNDECIDED` (nothing missing here, or parameters
+        that are off inside their tolerances).
     mismatch : Block or None
         The block with the largest significant excess after the refit.
     noise_level : dict
@@ -202,9 +206,9 @@ class Group:
         which it acts.
     instead : tuple of str
         Parameters that would have to be far from their nominal values instead of it.
-    inclusion : dict of str to float
+    inclusion : dict of Term to float
         Share of resampled recordings in which the screen would have taken each persistent effect.
-    predicted_gain : dict of str to float
+    predicted_gain : dict of Term to float
         Share of the mismatch that each tested effect could take by its signature alone.
     """
 
@@ -212,7 +216,7 @@ class Group:
     nominal: dict[str, Excess]
     baseline: dict[str, Excess]
     candidates: list[Candidate]
-    probabilities: dict[str, float]
+    probabilities: dict[Hypothesis, float]
     mismatch: Block | None
     noise_level: dict[Key, NoiseLevel]
     suspects: list[Block]
@@ -220,16 +224,16 @@ class Group:
     sought: bool = False
     below_noise: bool = False
     instead: tuple[str, ...] = ()
-    inclusion: dict[str, float] = field(default_factory=dict)
-    predicted_gain: dict[str, float] = field(default_factory=dict)
+    inclusion: dict[Term, float] = field(default_factory=dict)
+    predicted_gain: dict[Term, float] = field(default_factory=dict)
 
     @property
     def best(self) -> Candidate:
         """The most probable hypothesis (the baseline when none is)."""
-        named = [c for c in self.candidates if c.names]
+        named = [c for c in self.candidates if c.terms]
         if self.mismatch is None or not named:
             return self.candidates[0]
-        return max(named, key=lambda c: self.probabilities.get(c.key, 0.0))
+        return max(named, key=lambda c: self.probabilities.get(c.hypothesis, 0.0))
 
 
 def significant(found: Excess, ratio: float = 1.0) -> bool:
@@ -239,7 +243,9 @@ def significant(found: Excess, ratio: float = 1.0) -> bool:
     return found.ratio > max(ratio, found.limit)
 
 
-def doubted(inside: dict[str, Excess], after: dict[str, Excess], *, same: bool) -> bool:
+def misses_only_held_out(
+    inside: dict[str, Excess], after: dict[str, Excess], *, same: bool
+) -> bool:
     """Whether a fit leaves noise in its own recordings and more in held-out ones, which parameters
     may bring that its own recordings do not tell (docs/decisions/0111).
     """
@@ -270,8 +276,8 @@ class Attempts:
         """Blocks by which hypotheses are compared: those with an excess, and others of their kind,
         which an effect at every block of a kind may spoil.
         """
-        kinds = {b.name.partition(".")[0] for b in self.suspects}
-        return [b for b in self.inner.blocks if b.name.partition(".")[0] in kinds]
+        kinds = {channel_of(b.name) for b in self.suspects}
+        return [b for b in self.inner.blocks if channel_of(b.name) in kinds]
 
     @property
     def held(self) -> set[str]:
@@ -292,24 +298,28 @@ class Attempts:
         """Weights of the autocorrelation that a fit leaves, and at the least that of the noise."""
         return autocorrelation_of(self.inner, found, self.noise_level)
 
-    def start_of(self, found: Fit, effect: str) -> Start:
+    def start_of(self, found: Fit, effect: Term) -> Start:
         """Where another fit goes on from an effect as it was fitted."""
         return start_of(found, effect, LEAST_START)
 
-    def transient(self, effect: str, beside: Candidate) -> Candidate | None:
+    def starts_of(self, candidate: Candidate) -> list[Start]:
+        """Where another fit goes on from each effect of a hypothesis."""
+        return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
+
+    def transient(self, effect: Term, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the
         effects of a candidate.
         """
-        if id_of(effect) in {id_of(e) for e in beside.effects}:
+        if effect.id in {e.id for e in beside.effects}:
             return None  # it would replace what it is to happen beside
         if beside.fit.events is not None or beside.wrong:
             return None  # what happens beside other events, or wrong values, is not fitted
         stiffest = _LEAST_STEP_SHARE * self.inner.core.stable_step
         if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
             return None  # it would take too long
-        return self._tried((*beside.names, effect), lambda: self._transient(effect, beside))
+        return self._tried((*beside.terms, effect), lambda: self._transient(effect, beside))
 
-    def _transient(self, effect: str, beside: Candidate) -> Candidate | None:
+    def _transient(self, effect: Term, beside: Candidate) -> Candidate | None:
         white = self.white
         model = with_effects_of(self.nominal, beside.fit.rig, self.held)
         found = fit_events(effect, self.inner, model, beside.fit, white)
@@ -323,7 +333,7 @@ class Attempts:
         bare = without_term(found.rig, effect)
         quiet = residuals(self.outer, bare)
         form = found.events.form if found.events else ""
-        known = {n: found.values[f"{effect}.{n}"] for n in info_of(effect).form(form).shared}
+        known = {n: found.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
         events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
             return self.judged(effects, found, quiet)
@@ -346,23 +356,19 @@ class Attempts:
             beside.fit, values=beside.fit.values | {n: found.values[n] for n in beside.fit.moved}
         )
         again = self._fit(
-            [self.start_of(beside.fit, e) for e in beside.effects],
+            self.starts_of(beside),
             autocorrelation,
             warm,
             events=found.events,
             evaluations=_EVALUATIONS_BESIDE,
         )
-        parts = {
-            n: (found.values[n], found.std[n])
-            for n in found.values
-            if n.partition(".")[0] == effect
-        }
+        names = [n for n in found.values if effect_of(n) == effect]
         return replace(
             again,
             effects=(*beside.effects, effect),
             rig=found.events.put_into(again.rig, next(iter(found.events.values))),
-            values=again.values | {n: v for n, (v, _) in parts.items()},
-            std=again.std | {n: s for n, (_, s) in parts.items()},
+            values=again.values | {n: found.values[n] for n in names},
+            std=again.std | {n: found.std[n] for n in names},
         )
 
     def excess(self, block: Block, problem: Problem, found: dict[Key, Residual]) -> Excess:
@@ -370,7 +376,7 @@ class Attempts:
         return excess(block, problem.recordings, found, self.noise_level, self.settings)
 
     def judged(
-        self, effects: tuple[str, ...], found: Fit, outside: dict[Key, Residual] | None = None
+        self, effects: tuple[Term, ...], found: Fit, outside: dict[Key, Residual] | None = None
     ) -> Candidate:
         """A fitted set on the held-out recordings, or on each recording as the others predict
         it.
@@ -379,12 +385,12 @@ class Attempts:
         inside = {b.name: self.excess(b, self.inner, found.residuals) for b in blocks}
         if outside is None:
             outside = (
-                left_out(self.inner, found, self.autocorrelation(found))
+                predicted_by_others(self.inner, found, self.autocorrelation(found))
                 if self.same
                 else residuals(self.outer, found.rig)
             )
         after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
-        if found.events is None and doubted(inside, after, same=self.same):
+        if found.events is None and misses_only_held_out(inside, after, same=self.same):
             outside = predicted_with_doubt(self.outer, found)
             after = {b.name: self.excess(b, self.outer, outside) for b in blocks}
         gaps = [
@@ -400,7 +406,7 @@ class Attempts:
             inside,
             gap,
             _scatter(effects, self.inner, found),
-            places=sum(math.log(len(self.terms_of(id_of(e)))) for e in effects),
+            places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
             densities=cache(partial(self._densities, found.residuals, outside)),
         )
 
@@ -415,10 +421,10 @@ class Attempts:
             self.noise_level,
         )
 
-    def terms_of(self, effect: str) -> list[str]:
+    def terms_of(self, effect: str) -> list[Term]:
         """An effect everywhere, and at each place that the blocks tell from the others."""
         places = places_of(self.nominal, effect, self.inner.blocks)
-        return [effect, *(term_of(effect, at) for at in places)]
+        return [Term(effect, at) for at in ("", *places)]
 
     def fitted(
         self,
@@ -434,7 +440,7 @@ class Attempts:
         step is not worth it.
         """
         effects = tuple(start.effect for start in starts)
-        if not self.held.isdisjoint(id_of(e) for e in effects):
+        if not self.held.isdisjoint(e.id for e in effects):
             return None  # it would replace what the model holds
         settings, sealed = self.settings, self.nominal.model["valve"] is None
         limit = _SEALED_EVALUATIONS if sealed else settings.effect_evaluations
@@ -456,7 +462,7 @@ class Attempts:
         see which of many are worth a whole fit; None where it cannot be run.
         """
         effects = tuple(start.effect for start in starts)
-        if not self.held.isdisjoint(id_of(e) for e in effects):
+        if not self.held.isdisjoint(e.id for e in effects):
             return None
 
         def found() -> Candidate:
@@ -465,7 +471,7 @@ class Attempts:
 
         return self._tried((*effects, *wrong), found)
 
-    def _tried(self, names: Iterable[str], work: Callable[[], Found]) -> Found | None:
+    def _tried(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """What an attempt at a hypothesis gives; None where it leaves the range in which the model
         holds, or fails.
         """
@@ -476,7 +482,7 @@ class Attempts:
             except SimulationError:
                 return None
 
-        return self.inner.losses.part(f"the hypothesis {' + '.join(names)}", inside)
+        return self.inner.losses.part(f"the hypothesis {' + '.join(map(str, terms))}", inside)
 
     def _fit(
         self,
@@ -610,12 +616,12 @@ class Attempts:
             return None
         return found
 
-    def without(self, larger: Candidate, needless: str) -> Candidate | None:
+    def without(self, larger: Candidate, needless: Term) -> Candidate | None:
         """A set of persistent effects and wrong parameters without one of its terms, fitted to its
         end from where the whole set stands; None where that cannot be run.
         """
         starts = [self.start_of(larger.fit, e) for e in larger.effects if e != needless]
-        wrong = tuple(name for name in larger.wrong if name != needless)
+        wrong = tuple(name for name in larger.wrong if Term(name) != needless)
         return self._to_its_end(starts, larger.fit, wrong)
 
     def _to_its_end(
@@ -662,7 +668,7 @@ class Attempts:
         """
         if any(c.fit.events is not None for c in candidates):
             return None
-        starts = [self.start_of(c.fit, effect) for c in candidates for effect in c.effects]
+        starts = [start for c in candidates for start in self.starts_of(c)]
         wrong = [name for c in candidates for name in c.wrong]
         warm = replace(
             candidates[0].fit,
@@ -683,8 +689,7 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        starts = [self.start_of(found, effect) for effect in candidate.effects]
-        polished = self._to_its_end(starts, found, candidate.wrong)
+        polished = self._to_its_end(self.starts_of(candidate), found, candidate.wrong)
         if polished is None:
             return candidate
         return replace(polished, gain=candidate.gain, forms_tried=candidate.forms_tried)
@@ -715,11 +720,11 @@ def autocorrelation_of(
 
 def parts_of(
     starts: Iterable[Start],
-) -> tuple[dict[str, float], dict[str, float], dict[str, str]]:
+) -> tuple[dict[str, float], dict[str, float], dict[Term, str]]:
     """Parameters of several effects that are free, those that are held, and the effects' forms."""
     free: dict[str, float] = {}
     held: dict[str, float] = {}
-    forms: dict[str, str] = {}
+    forms: dict[Term, str] = {}
     for start in starts:
         free |= start.free
         held |= start.held
@@ -727,7 +732,7 @@ def parts_of(
     return free, held, forms
 
 
-def start_of(found: Fit, effect: str, least: float) -> Start:
+def start_of(found: Fit, effect: Term, least: float) -> Start:
     """Where another fit goes on from an effect as it was fitted, held parameters included.
 
     ``least`` is the share of a typical size that a parameter has at the least.
@@ -735,7 +740,7 @@ def start_of(found: Fit, effect: str, least: float) -> Start:
     own = {
         name: _off_zero(name, value, least)
         for name, value in found.values.items()
-        if name.partition(".")[0] == effect
+        if effect_of(name) == effect
     }
     entry = entry_of(found.rig, effect)
     held = {
@@ -766,7 +771,7 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
     lag stands for how the chamber empties.
     """
     for entry in found.rig.effects:
-        if "reading" not in ports_of(entry) or term_in(entry) not in found.effects:
+        if "reading" not in ports_of(entry) or Term.of(entry) not in found.effects:
             continue
         lag = entry["parameters"]["time_constant"]
         for prepared in problem.recordings:
@@ -786,7 +791,7 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
     return False
 
 
-def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
+def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
     """Relative scatter of a single effect's size between recordings, beyond its uncertainty.
 
     One Gauss-Newton step of the effect's leading parameter alone in each recording: a wrong effect
@@ -794,7 +799,7 @@ def _scatter(effects: tuple[str, ...], problem: Problem, best: Fit) -> float:
     """
     if len(effects) != 1 or len(problem.recordings) < 2:
         return 0.0
-    info = info_of(effects[0])
+    info = effects[0].info
     leading = next((f"{effects[0]}.{p.name}" for p in info.parameters if p.same_everywhere), None)
     # of a transient effect one size was fitted to all recordings
     if info.transient or leading is None:

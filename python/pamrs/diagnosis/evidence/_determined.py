@@ -7,17 +7,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from pamrs.diagnosis.evidence._candidates import Candidate, Group
+from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate
 from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
-from pamrs.effects import info_of
+from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 
-__all__ = ["determined", "put_aside", "stated", "undetermined"]
+__all__ = ["drop_undetermined", "put_aside", "with_stated_std", "undetermined_effects"]
 
 # stated deviations within which a size is not determined; a stated one is twice the pieces'
 _DETERMINED_STDS = 1.0
 
 
-def stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
+def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -> Candidate:
     """A fit with standard deviations that hold for residuals that are no noise; and, of what no
     prior holds, for equations that are not quite the rig's.
     """
@@ -30,7 +30,7 @@ def stated(problem: Problem, group: Group, candidate: Candidate) -> Candidate:
     return replace(candidate, fit=replace(candidate.fit, std=std))
 
 
-def determined(group: Group, problem: Problem) -> Group:
+def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     """A group in which no name leads, and none stands beside another one, whose values are not told
     from none by the standard deviations that are stated.
 
@@ -40,38 +40,38 @@ def determined(group: Group, problem: Problem) -> Group:
 
     Parameters
     ----------
-    group : Group
+    group : BlockGroup
         Examined.
     problem : Problem
         Its recordings to fit.
 
     Returns
     -------
-    Group
+    BlockGroup
         With other probabilities; the same where every name is determined.
     """
     settings = problem.settings
     if group.mismatch is None:
         return group
-    keys = {frozenset(c.names): c.key for c in group.candidates if c.names}
+    known = {c.hypothesis.set: c.hypothesis for c in group.candidates if c.terms}
     found = dict(group.probabilities)
     for candidate in group.candidates:
-        chance = group.probabilities.get(candidate.key, 0.0)
+        chance = group.probabilities.get(candidate.hypothesis, 0.0)
         if not candidate.effects or chance < settings.in_set:
             continue
-        own = stated(problem, group, candidate)
-        unknown = set(undetermined(own))
+        own = with_stated_std(problem, group, candidate)
+        unknown = set(undetermined_effects(own))
         if not unknown:
             continue
-        rest = keys.get(frozenset(candidate.names) - unknown)
+        rest = known.get(candidate.hypothesis.set - unknown)
         moved = chance if rest else 0.5 * chance
-        found[candidate.key] -= moved
+        found[candidate.hypothesis] -= moved
         to = rest or _without_name(group)
         found[to] = found.get(to, 0.0) + moved
     return replace(group, probabilities=found)
 
 
-def undetermined(candidate: Candidate) -> list[str]:
+def undetermined_effects(candidate: Candidate) -> list[Term]:
     """Effects of a set whose sizes, all together, are not told from none by its standard
     deviations: with their shapes as uncertain as they are.
 
@@ -82,7 +82,7 @@ def undetermined(candidate: Candidate) -> list[str]:
     names, sealed = list(found.scales), found.rig.model["valve"] is None
     out = []
     for effect in (e for e in candidate.effects if e != happened):
-        form = info_of(effect).form(form_in(found.rig, effect))
+        form = effect.info.form(form_in(found.rig, effect))
         sizes = [
             f"{effect}.{p.name}"
             for p in form.parameters
@@ -105,21 +105,21 @@ def undetermined(candidate: Candidate) -> list[str]:
     return out
 
 
-def put_aside(group: Group, key: str) -> Group:
+def put_aside(group: BlockGroup, hypothesis: Hypothesis) -> BlockGroup:
     """A group without one of its hypotheses: the others are as probable as they are where it is
     known not to hold; ``unlisted`` where there is none, and nothing where no more than noise was
     left.
     """
-    found = {name: p for name, p in group.probabilities.items() if name != key}
+    found = {h: p for h, p in group.probabilities.items() if h != hypothesis}
     total = sum(found.values())
     if total > 0.0:
-        found = {name: p / total for name, p in found.items()}
+        found = {h: p / total for h, p in found.items()}
     else:
         found[_without_name(group)] = 1.0
-    kept = [c for c in group.candidates if c.key != key]
+    kept = [c for c in group.candidates if c.hypothesis != hypothesis]
     return replace(group, candidates=kept, probabilities=found)
 
 
-def _without_name(group: Group) -> str:
+def _without_name(group: BlockGroup) -> Hypothesis:
     """What is left of a name that does not hold: a signature below the noise is nothing then."""
-    return "" if group.below_noise else "unlisted"
+    return UNDECIDED if group.below_noise else UNLISTED

@@ -12,24 +12,32 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from pamrs.diagnosis.evidence._candidates import Candidate, Group, significant
-from pamrs.diagnosis.evidence._weighing import paid_for
+from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate, significant
+from pamrs.diagnosis.evidence._weighing import price_of_term
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import exclude, is_effect
-from pamrs.findings import HEALTHY
+from pamrs.effects import (
+    NONE,
+    PARAMETERS,
+    UNDECIDED,
+    UNLISTED,
+    WITHOUT_NAME,
+    Hypothesis,
+    Term,
+    effect_of,
+)
 
 __all__ = [
     "WALL_TOLERANCES",
     "Judged",
-    "calibrated",
+    "calibrate",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",
-    "is_parameter",
     "judge",
-    "symptoms_of",
+    "parameters_at_wall",
 ]
 
+_HEALTHY = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 _SHARED_ODDS = 6.0
 _ALIKE_STDS = 3.0  # [standard deviations] by which the values of one name in two groups may differ
@@ -51,37 +59,32 @@ _STRAINED_UNLISTED = 0.25  # probability of unlisted there (decision 4)
 WALL_TOLERANCES = 2.9
 
 
-WITHOUT_NAME = (*HEALTHY, "unlisted")
-"""Hypotheses that name nothing."""
-
-
 @dataclass(frozen=True, eq=False)
 class Judged:
     """A group of blocks with its verdict.
 
     Attributes
     ----------
-    group : Group
+    group : BlockGroup
         The blocks, and everything found out about them.
     verdict : str
         ``none``, ``parameters``, ``effects`` or ``unlisted``.
-    probabilities : dict of str to float
-        Over ``none``, ``parameters``, ``unlisted``, sets of effects and wrong parameters (names
-        joined by ``+``), the most probable first.
-    ambiguity : list of list of str
-        Hypotheses that are left, each as its names; empty when settled.
+    probabilities : dict of Hypothesis to float
+        The most probable first.
+    ambiguity : list of Hypothesis
+        Those that are left open; empty when settled.
     chosen : Candidate
         The hypothesis that is named; the baseline where none is.
     """
 
-    group: Group
+    group: BlockGroup
     verdict: str
-    probabilities: dict[str, float]
-    ambiguity: list[list[str]]
+    probabilities: dict[Hypothesis, float]
+    ambiguity: list[Hypothesis]
     chosen: Candidate
 
     @property
-    def named(self) -> tuple[str, ...]:
+    def named(self) -> tuple[Term, ...]:
         """Effects that are named."""
         return self.chosen.effects if self.verdict == "effects" else ()
 
@@ -90,19 +93,17 @@ class Judged:
         """Parameters that are named as wrong."""
         return self.chosen.wrong if self.verdict in ("effects", "parameters") else ()
 
-    def probability(self, name: str) -> float:
+    @property
+    def added(self) -> tuple[Term, ...]:
+        """Effects that are named, and parameters that are named as wrong."""
+        return (*self.named, *map(Term, self.wrong))
+
+    def probability(self, term: Term) -> float:
         """Probability of an effect or of a wrong parameter, whatever else acts in these blocks."""
-        return min(1.0, sum(p for key, p in self.probabilities.items() if name in key.split("+")))
+        return min(1.0, sum(p for h, p in self.probabilities.items() if term in h.terms))
 
 
-def is_parameter(name: str) -> bool:
-    """Whether a name in a hypothesis is that of a parameter of the rig file:
-    ``chamber.dead_volume``.
-    """
-    return "." in name
-
-
-def symptoms_of(group: Group) -> dict[str, float]:
+def parameters_at_wall(group: BlockGroup) -> dict[str, float]:
     """Parameters that the refit without effects moved to their wall, and how far [tolerances]."""
     return {
         name: moved
@@ -111,29 +112,25 @@ def symptoms_of(group: Group) -> dict[str, float]:
     }
 
 
-def _own(group: Group) -> dict[str, float]:
-    """Probabilities of one group by itself; what stands under ``""`` is shared out between nothing
-    and parameters that moved.
+def _own(group: BlockGroup) -> dict[Hypothesis, float]:
+    """Probabilities of one group by itself, that of `UNDECIDED` divided between nothing missing and
+    parameters that moved.
     """
-    found = {key: p for key, p in group.probabilities.items() if key}
-    unchanged = group.probabilities.get("", 0.0)
+    found = {h: p for h, p in group.probabilities.items() if h != UNDECIDED}
+    unchanged = group.probabilities.get(UNDECIDED, 0.0)
     shifted = bool(group.instead) or any(significant(e) for e in group.nominal.values())
     explained = any(c.wrong for c in group.candidates)
-    quiet = {
-        "parameters": _QUIET_LIKELY,
-        "none": _QUIET_OTHER,
-        "unlisted": _QUIET_UNLISTED,
-    }
-    if symptoms_of(group) and group.mismatch is None and not explained:
-        quiet = {"parameters": _STRAINED_PARAMETERS, "unlisted": _STRAINED_UNLISTED}
+    quiet = {PARAMETERS: _QUIET_LIKELY, NONE: _QUIET_OTHER, UNLISTED: _QUIET_UNLISTED}
+    if parameters_at_wall(group) and group.mismatch is None and not explained:
+        quiet = {PARAMETERS: _STRAINED_PARAMETERS, UNLISTED: _STRAINED_UNLISTED}
     elif not shifted:
-        quiet |= {"none": _QUIET_LIKELY, "parameters": _QUIET_OTHER}
-    for name, share in quiet.items():
-        found[name] = found.get(name, 0.0) + unchanged * share
-    return {key: p for key, p in found.items() if p >= _COUNTED or key in WITHOUT_NAME}
+        quiet |= {NONE: _QUIET_LIKELY, PARAMETERS: _QUIET_OTHER}
+    for hypothesis, share in quiet.items():
+        found[hypothesis] = found.get(hypothesis, 0.0) + unchanged * share
+    return {h: p for h, p in found.items() if p >= _COUNTED or h in WITHOUT_NAME}
 
 
-def calibrated(group: Group, settings: DiagnosisSettings) -> Group:
+def calibrate(group: BlockGroup, settings: DiagnosisSettings) -> BlockGroup:
     """A group whose probabilities are as often right as they say.
 
     Where hypotheses compete for a mismatch, the logarithm of the odds between any two of them
@@ -142,53 +139,51 @@ def calibrated(group: Group, settings: DiagnosisSettings) -> Group:
     """
     if group.mismatch is None or group.below_noise:
         return group
-    powers = {key: p**settings.certainty for key, p in group.probabilities.items() if p > 0.0}
+    powers = {h: p**settings.certainty for h, p in group.probabilities.items() if p > 0.0}
     return replace(group, probabilities=_normalised(powers))
 
 
-def judge(groups: Sequence[Group], settings: DiagnosisSettings) -> list[Judged]:
+def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:
     """The verdict of every group, an effect that acts in several being judged once.
 
     Parameters
     ----------
-    groups : sequence of Group
+    groups : sequence of BlockGroup
         Examined, each by itself.
     settings : DiagnosisSettings
         Odds of what is shared, probabilities from which something is named or left open.
     """
     own = [_own(group) for group in groups]
-    beside: list[dict[str, float]] = [{} for _ in groups]
+    joint: list[dict[Hypothesis, float]] = [{} for _ in groups]
     several = _in_several(own)
-    fitted = [{c.key: c for c in group.candidates} for group in groups]
+    fitted = [{c.hypothesis: c for c in group.candidates} for group in groups]
     for choice in itertools.product(*(p.items() for p in own)):
-        keys = [key for key, _ in choice]
-        names = [n for key in keys for n in key.split("+") if n not in WITHOUT_NAME]
-        if not _together(names):
+        if not _possible_together(_terms(h for h, _ in choice)):
             continue  # one effect everywhere and at a place of its own
         weight = math.prod(p for _, p in choice)
-        for name in several:
+        for term in several:
             holders = [
-                (group, known[key])
-                for group, known, key in zip(groups, fitted, keys, strict=True)
-                if name in key.split("+")
+                (group, known[hypothesis])
+                for group, known, (hypothesis, _) in zip(groups, fitted, choice, strict=True)
+                if term in hypothesis.terms
             ]
-            weight *= _odds_shared(name, holders, settings)
-        for found, (key, _) in zip(beside, choice, strict=True):
-            found[key] = found.get(key, 0.0) + weight
+            weight *= _odds_shared(term, holders, settings)
+        for found, (hypothesis, _) in zip(joint, choice, strict=True):
+            found[hypothesis] = found.get(hypothesis, 0.0) + weight
     return [
         _judged(group, _normalised(found), settings)
-        for group, found in zip(groups, beside, strict=True)
+        for group, found in zip(groups, joint, strict=True)
     ]
 
 
-def _in_several(own: Sequence[Mapping[str, float]]) -> set[str]:
-    """Names that hypotheses of several groups have."""
-    named = [set(_names(found)) for found in own]
-    return {name for one, two in itertools.combinations(named, 2) for name in one & two}
+def _in_several(own: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:
+    """Terms that hypotheses of several groups have."""
+    named = [set(_terms(found)) for found in own]
+    return sorted({term for one, two in itertools.combinations(named, 2) for term in one & two})
 
 
 def _odds_shared(
-    name: str, holders: Sequence[tuple[Group, Candidate]], settings: DiagnosisSettings
+    term: Term, holders: Sequence[tuple[BlockGroup, Candidate]], settings: DiagnosisSettings
 ) -> float:
     """Odds of one name in several groups of blocks, each with a hypothesis that has it, to as many
     names of which each happens to be there.
@@ -196,10 +191,10 @@ def _odds_shared(
     What is there once is paid for once: the dearest price stays, the others are given back. Where
     the groups ask for other values, they are two.
     """
-    if len(holders) < 2 or not _alike(name, [c for _, c in holders]):
+    if len(holders) < 2 or not _same_values(term, [c for _, c in holders]):
         return 1.0
     prices = [
-        paid_for(c, name, settings)
+        price_of_term(c, term, settings)
         for group, c in holders
         if group.mismatch is not None and not group.below_noise
     ]
@@ -207,8 +202,8 @@ def _odds_shared(
     return _SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 
-def _alike(name: str, candidates: Sequence[Candidate]) -> bool:
-    """Whether hypotheses give one name the same values, as far as each knows them."""
+def _same_values(term: Term, candidates: Sequence[Candidate]) -> bool:
+    """Whether hypotheses give one term the same values, as far as each knows them."""
 
     def same(parameter: str, one: Candidate, two: Candidate) -> bool:
         first, second = one.fit.values[parameter], two.fit.values[parameter]
@@ -220,53 +215,59 @@ def _alike(name: str, candidates: Sequence[Candidate]) -> bool:
         same(parameter, one, two)
         for one, two in itertools.combinations(candidates, 2)
         for parameter in one.fit.values.keys() & two.fit.values.keys()
-        if parameter == name or parameter.partition(".")[0] == name
+        if parameter == term.id or effect_of(parameter) == term
     )
 
 
-def _together(names: list[str]) -> bool:
-    """Whether the names of several groups can hold at once."""
-    unique = sorted({name for name in names if is_effect(name)})
-    return not any(exclude(one, unique[k + 1 :]) for k, one in enumerate(unique))
+def _possible_together(terms: Sequence[Term]) -> bool:
+    """Whether different terms of several groups can hold at once."""
+    effects = [term for term in terms if term.is_effect]
+    return not any(one.excluded_by(effects[k + 1 :]) for k, one in enumerate(effects))
 
 
-def _normalised(weights: dict[str, float]) -> dict[str, float]:
+def _normalised(weights: dict[Hypothesis, float]) -> dict[Hypothesis, float]:
     total = sum(weights.values())
-    return dict(sorted(((key, w / total) for key, w in weights.items()), key=lambda kv: -kv[1]))
+    return dict(sorted(((h, w / total) for h, w in weights.items()), key=lambda item: -item[1]))
 
 
-def _judged(group: Group, probabilities: dict[str, float], settings: DiagnosisSettings) -> Judged:
+def _judged(
+    group: BlockGroup, probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
+) -> Judged:
     """The verdict: that of the most probable hypothesis; without a name only if no single name is
     more probable than not.
     """
     start = group.candidates[0]
-    names = {key: p for key, p in probabilities.items() if key not in WITHOUT_NAME}
-    healthy = max(HEALTHY, key=lambda key: probabilities.get(key, 0.0))
-    without = probabilities.get("unlisted", 0.0)
-    best = max(names, key=lambda key: names[key], default="")
-    ambiguity = _sets(probabilities, settings)
-    if probabilities.get(healthy, 0.0) >= max(without, names.get(best, 0.0)):
-        return Judged(group, healthy, probabilities, ambiguity, start)
-    marginal = {
-        name: sum(p for key, p in names.items() if name in key.split("+")) for name in _names(names)
-    }
-    if names.get(best, 0.0) <= without and max(marginal.values(), default=0.0) <= settings.named:
-        return Judged(group, "unlisted", probabilities, ambiguity, start)
-    chosen = next(c for c in group.candidates if c.key == best)
+    named = {h: p for h, p in probabilities.items() if h not in WITHOUT_NAME}
+    healthy = max(_HEALTHY, key=lambda h: probabilities.get(h, 0.0))
+    without = probabilities.get(UNLISTED, 0.0)
+    best = max(named, key=lambda h: named[h], default=UNDECIDED)
+    ambiguity = _left_open(probabilities, settings)
+    if probabilities.get(healthy, 0.0) >= max(without, named.get(best, 0.0)):
+        return Judged(group, healthy.rest, probabilities, ambiguity, start)
+    marginal = [sum(p for h, p in named.items() if term in h.terms) for term in _terms(named)]
+    if named.get(best, 0.0) <= without and max(marginal, default=0.0) <= settings.named:
+        return Judged(group, UNLISTED.rest, probabilities, ambiguity, start)
+    chosen = next(c for c in group.candidates if c.hypothesis == best)
     return Judged(
         group, "effects" if chosen.effects else "parameters", probabilities, ambiguity, chosen
     )
 
 
-def _sets(probabilities: dict[str, float], settings: DiagnosisSettings) -> list[list[str]]:
-    """Hypotheses that are left, the most probable first; none where one is settled, ``none`` and
-    ``parameters`` being one answer.
+def _left_open(
+    probabilities: dict[Hypothesis, float], settings: DiagnosisSettings
+) -> list[Hypothesis]:
+    """Hypotheses that are left open, the most probable first; none where one is settled, `NONE` and
+    `PARAMETERS` being one answer.
     """
-    healthy = sum(probabilities.get(key, 0.0) for key in HEALTHY)
-    others = [p for key, p in probabilities.items() if key not in HEALTHY]
+    healthy = sum(probabilities.get(h, 0.0) for h in _HEALTHY)
+    others = [p for h, p in probabilities.items() if h not in _HEALTHY]
     if max(healthy, *others, 0.0) > settings.settled:
         return []
-    found = [sorted(key.split("+")) for key, p in probabilities.items() if p >= settings.in_set]
+    found = [
+        Hypothesis(tuple(sorted(h.terms)), h.rest)
+        for h, p in probabilities.items()
+        if p >= settings.in_set
+    ]
     return found if len(found) > 1 else []
 
 
@@ -280,44 +281,44 @@ def case_verdict(judged: Sequence[Judged]) -> str:
     return next((verdict for verdict in ("unlisted", "parameters") if verdict in found), "none")
 
 
-def case_probabilities(judged: Sequence[Judged]) -> dict[str, float]:
-    """Probabilities of the possible answers for a case: the names of all its blocks together.
+def case_probabilities(judged: Sequence[Judged]) -> dict[Hypothesis, float]:
+    """Probabilities of the possible answers for a case: the terms of all its blocks together.
 
-    ``unlisted`` is that something is missing and nothing has a name. What one block keeps without a
+    `UNLISTED` is that something is missing and nothing has a name. What one block keeps without a
     name takes nothing from a name in another.
     """
     found = dict.fromkeys(WITHOUT_NAME, 0.0)
     for choice in itertools.product(*(j.probabilities.items() for j in judged)):
-        keys = [key for key, _ in choice]
-        names = _names(keys)
-        rest = next((key for key in ("unlisted", "parameters") if key in keys), "none")
-        key = "+".join(names) or rest
-        found[key] = found.get(key, 0.0) + math.prod(p for _, p in choice)
-    return _normalised({key: p for key, p in found.items() if p >= _LISTED or key in WITHOUT_NAME})
+        terms = tuple(_terms(h for h, _ in choice))
+        answer = Hypothesis(terms, "" if terms else _rest(h for h, _ in choice) or NONE.rest)
+        found[answer] = found.get(answer, 0.0) + math.prod(p for _, p in choice)
+    return _normalised({h: p for h, p in found.items() if p >= _LISTED or h in WITHOUT_NAME})
 
 
-def case_ambiguity(judged: Sequence[Judged]) -> list[list[str]]:
-    """Sets of names that a case leaves open: the open sets of its blocks, each beside what is
-    settled in the others.
+def case_ambiguity(judged: Sequence[Judged]) -> list[Hypothesis]:
+    """Hypotheses that a case leaves open: those of its blocks, each with what is settled in the
+    others.
     """
     if not any(j.ambiguity for j in judged):
         return []
     # what a block is settled to keep without a name is no part of the question
-    options = [j.ambiguity or [[*j.named, *j.wrong]] for j in judged]
-    found: list[list[str]] = []
+    options = [j.ambiguity or [Hypothesis(j.added)] for j in judged]
+    found: list[Hypothesis] = []
     for choice in itertools.product(*options):
-        flat = [name for names in choice for name in names]
-        rest = next((word for word in reversed(WITHOUT_NAME) if word in flat), None)
-        # nothing else counts beside a name but that something else is missing
-        entry = [
-            *_names(flat),
-            *([rest] if rest == "unlisted" or (rest and not _names(flat)) else []),
-        ]
-        if entry and entry not in found:
+        terms, rest = tuple(_terms(choice)), _rest(choice)
+        # of what has no name, only that something is missing counts beside a name
+        entry = Hypothesis(terms, rest if not terms or rest == UNLISTED.rest else "")
+        if entry.words and entry not in found:
             found.append(entry)
     return found[:_MOST_SETS] if len(found) > 1 else []
 
 
-def _names(keys: Iterable[str]) -> list[str]:
-    """Names of effects and of parameters in hypotheses, each once, in alphabetical order."""
-    return sorted({name for key in keys for name in key.split("+") if name not in WITHOUT_NAME})
+def _terms(hypotheses: Iterable[Hypothesis]) -> list[Term]:
+    """Terms of hypotheses, each once, in alphabetical order."""
+    return sorted({term for hypothesis in hypotheses for term in hypothesis.terms})
+
+
+def _rest(hypotheses: Iterable[Hypothesis]) -> str:
+    """What is said without a name in some blocks: the worst."""
+    said = {hypothesis.rest for hypothesis in hypotheses}
+    return next((h.rest for h in reversed(WITHOUT_NAME) if h.rest in said), "")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import chi2
@@ -16,24 +16,34 @@ from pamrs.diagnosis.fit import Problem, form_in, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS, SameData, find_parameter, id_of, info_of, term_in, usual_values
+from pamrs.effects import (
+    EFFECTS,
+    UNLISTED,
+    Hypothesis,
+    SameData,
+    Term,
+    effect_of,
+    find_parameter,
+    usual_values,
+)
 
 __all__ = [
     "FORM_SHARE_ALIKE",
     "STANDING_PRICE",
-    "capped",
+    "Weighing",
+    "capped_probability",
     "explains",
     "log_weight",
-    "paid_for",
+    "price_of_term",
     "penalty",
     "price",
     "probability_cap",
-    "room_beside",
+    "possible_gain",
     "same_recordings",
     "share_left",
-    "stands",
-    "unlikely",
-    "visited",
+    "lacks_drift",
+    "loss_by_values",
+    "visited_ranges",
     "weigh",
 ]
 
@@ -80,11 +90,33 @@ _CONTACT_SHARE = 0.5
 _CONTACT_WIDTH = 0.15  # share beyond that which costs a standard deviation (decision 22)
 
 
-Ranges = dict[str, tuple[float, float]]
+VisitedRanges = dict[str, tuple[float, float]]
 """What was visited, by kind of channel [SI]."""
 
 
-def visited(problem: Problem) -> Ranges:
+@dataclass(frozen=True)
+class Weighing:
+    """What hypotheses are weighed by.
+
+    Attributes
+    ----------
+    most : float
+        Largest probability of a name.
+    seconds : float
+        Length of the longest recording that was fitted [s].
+    settings : DiagnosisSettings
+        Prices, and what is allowed to the forms of equations.
+    ranges : dict, optional
+        What was visited in these recordings, by kind of channel [SI].
+    """
+
+    most: float
+    seconds: float
+    settings: DiagnosisSettings
+    ranges: VisitedRanges = field(default_factory=dict)
+
+
+def visited_ranges(problem: Problem) -> VisitedRanges:
     """Range of each kind of channel that is the output of one block alone: the angle of a rig's
     only joint.
     """
@@ -161,12 +193,9 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
 def weigh(
     candidates: list[Candidate],
     suspects: list[Block],
-    most: float,
-    seconds: float,
-    settings: DiagnosisSettings,
-    ranging: Ranges | None = None,
+    weighing: Weighing,
     own: Mapping[Candidate, list[Block]] | None = None,
-) -> dict[str, float]:
+) -> dict[Hypothesis, float]:
     """Probabilities over sets of effects and ``unlisted``.
 
     The mean of two kinds of evidence (docs/decisions/0014): by what each set leaves, and by how
@@ -174,39 +203,39 @@ def weigh(
 
     Between sets, by what they leave: the logarithm of what each leaves of the mismatch, fitted and
     held out, on a nominal number of independent looks (and one more of what is left, whatever is
-    granted); what the form of an equation may leave (``form_share`` of
-    the settings) is granted to all of them, so that no second effect is asked for to mend the form
-    of the first; among sets of as many effects less is granted (``form_share_alike``). What is left
-    of a mismatch near the noise counts by what noise could leave of it. Each parameter and each
-    further effect has its price, and so have a clock that does not drift and values that an effect
-    hardly has (:func:`unlikely`). Against ``unlisted``: the share of the mismatch that the set
-    explains in recordings that it was not fitted to (a name has to carry half of it; the rest may
-    be what no model has, and stands beside the name), its values (a set with an effect whose size
-    is not told from none names nothing), and whether its size is the same in all recordings;
-    improbable sets themselves say nothing against one that is. What a set is not trusted with falls
-    to the part of it that is trusted most, as far as that leads by itself: an event that may be
-    anything takes nothing from the effect beside it. What a wrong value leaves is no form's error,
-    since the equation stays the same: where a value explains more than the effects of a set do,
-    they are judged by what it leaves (docs/decisions/0025). The constants are those under which the
-    stated probabilities came true in a trial with other seeds than the published one
+    granted); what the form of an equation may leave (``form_share`` of the settings) is granted to
+    all of them, so that no second effect is asked for to mend the form of the first; among sets of
+    as many effects less is granted (``form_share_alike``). What is left of a mismatch near the
+    noise counts by what noise could leave of it. Each parameter and each further effect has its
+    price, and so have a clock that does not drift and values that an effect hardly has
+    (:func:`loss_by_values`). Against ``unlisted``: the share of the mismatch that the set explains
+    in recordings that it was not fitted to (a name has to carry half of it; the rest may be what no
+    model has, and stands beside the name), its values (a set with an effect whose size is not told
+    from none names nothing), and whether its size is the same in all recordings; improbable sets
+    themselves say nothing against one that is. What a set is not trusted with falls to the part of
+    it that is trusted most, as far as that leads by itself: an event that may be anything takes
+    nothing from the effect beside it. What a wrong value leaves is no form's error, since the
+    equation stays the same: where a value explains more than the effects of a set do, they are
+    judged by what it leaves (docs/decisions/0025). The constants are those under which the stated
+    probabilities came true in a trial with other seeds than the published one
     (docs/decisions/0014).
 
-    ``seconds`` is the length of the longest recording that was fitted, ``ranging`` what was visited
-    in them, ``own`` the blocks in which each set is judged against ``unlisted``, where these are
-    not all the suspects.
+    ``own`` are the blocks in which each set is judged against ``unlisted``, where these are not
+    all the suspects.
     """
-    named = [c for c in candidates if c.names and not _absent(c)]
+    named = [c for c in candidates if c.terms and not _is_absent(c)]
     if not named:
-        return {"unlisted": 1.0}
+        return {UNLISTED: 1.0}
     start = candidates[0]
-    odd = {c: unlikely(c, ranging or {}) for c in named}
-    against = {c: _against(c, seconds, odd[c]) for c in named}
+    seconds, settings = weighing.seconds, weighing.settings
+    odd = {c: loss_by_values(c, weighing.ranges) for c in named}
+    against = {c: _loss_against_others(c, seconds, odd[c]) for c in named}
 
-    plain = _plain(named, start, suspects, against, settings)
+    plain = _plain_scores(named, start, suspects, against, settings)
     value = _leading_value(plain)
     trusted = {
         c: min(
-            _trusted(one, other, suspects if own is None else own[c], most, seconds, odd[c])
+            _trust(one, other, suspects if own is None else own[c], weighing, odd[c])
             for one, other in _explained_by(c, start, plain)
         )
         for c in named
@@ -219,20 +248,20 @@ def weigh(
 
     coarse, fine = weights_of(settings.form_share), weights_of(FORM_SHARE_ALIKE)
     weights: dict[Candidate, float] = {}
-    for count in {len(c.names) for c in named}:
-        alike = [c for c in named if len(c.names) == count]
+    for count in {len(c.terms) for c in named}:
+        alike = [c for c in named if len(c.terms) == count]
         share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
         weights |= {c: share * fine[c] for c in alike}
-    weights = _between_places(weights, suspects)
-    out = _trusted_parts(weights, trusted)
+    weights = _share_between_places(weights, suspects)
+    out = _share_by_trust(weights, trusted)
     lost = _lost_by_priors(plain)
-    prior = {c: -(_before(c, settings) + against[c] + lost[c] + _of_events(c)) for c in named}
+    prior = {c: -(_prior_loss(c, settings) + against[c] + lost[c] + _of_events(c)) for c in named}
     predicted = _by_prediction(prior, suspects)
     if predicted is not None:
-        by_prediction, share = _trusted_parts(predicted, trusted), _PREDICTIVE_SHARE
+        by_prediction, share = _share_by_trust(predicted, trusted), _PREDICTIVE_SHARE
         out = {key: (1.0 - share) * p + share * by_prediction[key] for key, p in out.items()}
-    _shared_out(out, named, start, suspects, seconds)
-    out["unlisted"] = max(0.0, 1.0 - sum(out.values()))
+    _share_between_same_data(out, named, start, suspects, seconds)
+    out[UNLISTED] = max(0.0, 1.0 - sum(out.values()))
     return out
 
 
@@ -263,7 +292,7 @@ def _of_events(candidate: Candidate) -> float:
     return 0.0 if events is None else float(sum(len(v) for v in events.values.values()))
 
 
-def _plain(
+def _plain_scores(
     named: list[Candidate],
     start: Candidate,
     suspects: list[Block],
@@ -272,7 +301,7 @@ def _plain(
 ) -> dict[Candidate, float]:
     """Logarithms of weights, the same being granted to all."""
     scores = {c: _score(c, start, suspects, FORM_SHARE_ALIKE, settings) - against[c] for c in named}
-    return _beside_values(scores)
+    return _with_prior_losses(scores)
 
 
 def _leading_value(plain: Mapping[Candidate, float]) -> Candidate | None:
@@ -320,38 +349,38 @@ def _scores(
 
     def score(c: Candidate) -> float:
         if value is not None and _led_by_value(c, plain, value):
-            return _score_beside(c, value, start, suspects, granted, settings)
+            return _score_with_value(c, value, start, suspects, granted, settings)
         return _score(c, start, suspects, granted, settings)
 
-    return _beside_values({c: score(c) - against[c] for c in plain})
+    return _with_prior_losses({c: score(c) - against[c] for c in plain})
 
 
-def _trusted_parts(
+def _share_by_trust(
     weights: Mapping[Candidate, float], trusted: Mapping[Candidate, float]
-) -> dict[str, float]:
+) -> dict[Hypothesis, float]:
     """Probabilities of sets: the weight of each times the trust in it. What a set is not trusted
     with goes to its best part: by the trust in that part, times its share among sets of its size.
     """
-    total, out = sum(weights.values()), dict.fromkeys((c.key for c in weights), 0.0)
+    total, out = sum(weights.values()), dict.fromkeys((c.hypothesis for c in weights), 0.0)
     by_size: dict[int, float] = {}
     for c, weight in weights.items():
-        by_size[len(c.names)] = by_size.get(len(c.names), 0.0) + weight
+        by_size[len(c.terms)] = by_size.get(len(c.terms), 0.0) + weight
 
     def alone(part: Candidate) -> float:
-        whole = by_size[len(part.names)]
+        whole = by_size[len(part.terms)]
         return trusted[part] * weights[part] / whole if whole > 0.0 else 0.0
 
     for c, weight in weights.items():
         share = weight / total
-        out[c.key] += share * trusted[c]
-        parts = [p for p in weights if set(p.names) < set(c.names)]
+        out[c.hypothesis] += share * trusted[c]
+        parts = [p for p in weights if p.hypothesis.set < c.hypothesis.set]
         best = max(parts, key=alone, default=None)
         if best is not None:
-            out[best.key] += share * (1.0 - trusted[c]) * alone(best)
+            out[best.hypothesis] += share * (1.0 - trusted[c]) * alone(best)
     return out
 
 
-def _absent(candidate: Candidate) -> bool:
+def _is_absent(candidate: Candidate) -> bool:
     """Whether the sizes of an effect of a set, taken together, are not told from none: a fit that
     goes on beside such an effect may end lower, which is not the effect's doing.
 
@@ -363,7 +392,7 @@ def _absent(candidate: Candidate) -> bool:
         return False
     names, sealed = list(found.values), found.rig.model["valve"] is None
     for effect in candidate.effects:
-        form = info_of(effect).form(form_in(found.rig, effect))
+        form = effect.info.form(form_in(found.rig, effect))
         own = [p for p in form.parameters if f"{effect}.{p.name}" in found.values]
         sizes = [p.role_in(sealed=sealed) == "size" and p.neutral == 0.0 for p in own]
         if not any(sizes):
@@ -379,7 +408,7 @@ def _absent(candidate: Candidate) -> bool:
     return False
 
 
-def _score_beside(
+def _score_with_value(
     candidate: Candidate,
     value: Candidate,
     baseline: Candidate,
@@ -403,9 +432,7 @@ def log_weight(
     candidate: Candidate,
     baseline: Candidate,
     suspects: list[Block],
-    seconds: float,
-    ranging: Ranges,
-    settings: DiagnosisSettings,
+    weighing: Weighing,
     value: Candidate | None = None,
 ) -> float:
     """Logarithm of what a hypothesis weighs beside others, up to a constant: by what it leaves, by
@@ -413,22 +440,26 @@ def log_weight(
 
     ``value`` is the most probable wrong value alone, where none of the effects alone weighs more.
     """
+    settings = weighing.settings
     if value is not None and candidate.wrong:
-        own = _score_beside(candidate, value, baseline, suspects, FORM_SHARE_ALIKE, settings)
+        own = _score_with_value(candidate, value, baseline, suspects, FORM_SHARE_ALIKE, settings)
     else:
         own = _score(candidate, baseline, suspects, FORM_SHARE_ALIKE, settings)
-    return own - _against(candidate, seconds, unlikely(candidate, ranging))
+    unlikely = loss_by_values(candidate, weighing.ranges)
+    return own - _loss_against_others(candidate, weighing.seconds, unlikely)
 
 
-def _against(candidate: Candidate, seconds: float, unlikely: float) -> float:
+def _loss_against_others(candidate: Candidate, seconds: float, unlikely: float) -> float:
     """What a set loses against others by a clock that does not drift, by times that were not seen,
-    and by its values (``unlikely``).
+    and by its values (``loss_by_values``).
     """
-    standing = STANDING_PRICE * stands(candidate, seconds)
-    return standing + _UNSEEN_PRICE * _unseen(candidate, seconds) + unlikely
+    standing = STANDING_PRICE * lacks_drift(candidate, seconds)
+    return standing + _UNSEEN_PRICE * _has_unseen_time(candidate, seconds) + unlikely
 
 
-def _between_places(weights: dict[Candidate, float], blocks: list[Block]) -> dict[Candidate, float]:
+def _share_between_places(
+    weights: dict[Candidate, float], blocks: list[Block]
+) -> dict[Candidate, float]:
     """Weights of sets of the same effects at other places shared out among them, by what each
     leaves inside the noise as well.
 
@@ -438,7 +469,7 @@ def _between_places(weights: dict[Candidate, float], blocks: list[Block]) -> dic
     alike: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Candidate]] = {}
     for c in weights:
         if c.places > 0.0:
-            alike.setdefault((tuple(sorted(map(id_of, c.effects))), c.wrong), []).append(c)
+            alike.setdefault((tuple(sorted(e.id for e in c.effects)), c.wrong), []).append(c)
     found = dict(weights)
     for several in (cs for cs in alike.values() if len(cs) > 1):
         within = {c: _inside_noise(c, blocks) for c in several}
@@ -455,8 +486,8 @@ def _inside_noise(candidate: Candidate, blocks: list[Block]) -> float:
     return sum(math.log(min(max(e[b.name].ratio, 1e-9), 1.0)) for e in stages for b in blocks)
 
 
-def _shared_out(
-    out: dict[str, float],
+def _share_between_same_data(
+    out: dict[Hypothesis, float],
     named: list[Candidate],
     start: Candidate,
     suspects: list[Block],
@@ -468,7 +499,7 @@ def _shared_out(
             same = same_data_in(one.fit.rig, effect)
             if same is None or not same_recordings(one, effect, seconds):
                 continue
-            names = {same.effect if e == effect else e for e in one.effects}
+            names = {Term(same.effect) if e == effect else e for e in one.effects}
             other = next((c for c in named if set(c.effects) == names and not c.wrong), None)
             # what explains more than the other could is something else as well
             if other is None:
@@ -476,14 +507,12 @@ def _shared_out(
             left, beside = (share_left(c, start, suspects) for c in (one, other))
             if left > beside + FORM_SHARE_ALIKE:
                 continue
-            both, odds = (
-                out.get(one.key, 0.0) + out.get(other.key, 0.0),
-                math.exp(STANDING_PRICE),
-            )
-            out[one.key], out[other.key] = both / (1.0 + odds), both * odds / (1.0 + odds)
+            first, second, odds = one.hypothesis, other.hypothesis, math.exp(STANDING_PRICE)
+            both = out.get(first, 0.0) + out.get(second, 0.0)
+            out[first], out[second] = both / (1.0 + odds), both * odds / (1.0 + odds)
 
 
-def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
+def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
     """
@@ -491,7 +520,7 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     if same is None:
         return False
     own: dict[str, float] = next(
-        (e["parameters"] for e in candidate.fit.rig.effects if term_in(e) == effect), {}
+        (e["parameters"] for e in candidate.fit.rig.effects if Term.of(e) == effect), {}
     )
     if not own:
         return False
@@ -505,7 +534,7 @@ def same_recordings(candidate: Candidate, effect: str, seconds: float) -> bool:
     )
 
 
-def _beside_values(scores: dict[Candidate, float]) -> dict[Candidate, float]:
+def _with_prior_losses(scores: dict[Candidate, float]) -> dict[Candidate, float]:
     """Scores of effects and of wrong values made comparable, by what their priors lose."""
     lost = _lost_by_priors(scores)
     return {c: score - lost[c] for c, score in scores.items()}
@@ -521,44 +550,43 @@ def _lost_by_priors(scores: Mapping[Candidate, float]) -> dict[Candidate, float]
     if not any(c.wrong for c in scores):
         return dict.fromkeys(scores, 0.0)
     effects = [c for c in scores if not c.wrong]
-    shared = strained(max(effects, key=lambda c: scores[c])) if effects else 0.0
-    return {c: strained(c) if c.wrong else shared for c in scores}
+    shared = prior_strain(max(effects, key=lambda c: scores[c])) if effects else 0.0
+    return {c: prior_strain(c) if c.wrong else shared for c in scores}
 
 
-def strained(candidate: Candidate) -> float:
+def prior_strain(candidate: Candidate) -> float:
     """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
     return min(0.5 * candidate.fit.strain, _DECIDED)
 
 
-def _trusted(
+def _trust(
     candidate: Candidate,
     baseline: Candidate,
     suspects: list[Block],
-    most: float,
-    seconds: float,
+    weighing: Weighing,
     unlikely: float,
 ) -> float:
-    """Probability of a set against ``unlisted``; ``unlikely`` is what it loses by its values."""
+    """Probability of a set against ``unlisted``; `unlikely` is what it loses by its values."""
     left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
-    even = _LOG_ODDS_EXPLAINED_PLIABLE if _pliable(candidate) else _LOG_ODDS_EXPLAINED
+    even = _LOG_ODDS_EXPLAINED_PLIABLE if _fits_anything(candidate) else _LOG_ODDS_EXPLAINED
     odds = (math.log((1.0 - left) / left) - even) / _SOFTNESS
     if explains(candidate, baseline, suspects):
         odds = max(odds, _LOG_ODDS_NOISE_LEFT)
-    return capped(odds - unlikely - penalty(candidate, seconds), most)
+    return capped_probability(odds - unlikely - penalty(candidate, weighing.seconds), weighing.most)
 
 
-def _pliable(candidate: Candidate) -> bool:
+def _fits_anything(candidate: Candidate) -> bool:
     """Whether it takes up a good part of anything: values of the baseline, and what happens
     differently in every recording; a line or a curve over its whole length does not.
     """
     events = candidate.fit.events
     if events is None:
         return bool(candidate.wrong)
-    info = info_of(events.effect)
+    info = events.effect.info
     return bool(candidate.wrong) or not (info.own or info.leading.same_everywhere)
 
 
-def capped(odds: float, most: float) -> float:
+def capped_probability(odds: float, most: float) -> float:
     """Probability of logarithmic odds, at most so much."""
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
 
@@ -568,10 +596,10 @@ def penalty(candidate: Candidate, seconds: float) -> float:
     recordings, a time that was not seen.
     """
     scatter = max(0.0, candidate.scatter - _SCATTER) / _SCATTER_WIDTH
-    return scatter + _UNSEEN_PRICE * _unseen(candidate, seconds)
+    return scatter + _UNSEEN_PRICE * _has_unseen_time(candidate, seconds)
 
 
-def _unseen(candidate: Candidate, seconds: float) -> bool:
+def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     """Whether a time constant of a set was not seen: it is much longer than the recordings, or
     not told from zero. What relaxes at once is another stiffness.
     """
@@ -588,21 +616,21 @@ def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
     return list(candidate.fit.effect_values.items())
 
 
-def stands(candidate: Candidate, seconds: float) -> bool:
+def lacks_drift(candidate: Candidate, seconds: float) -> bool:
     """Whether a clock of a set does not drift: two free clocks do, and what is late by the same
     time always is a lag or a delay.
     """
 
-    def at_rest(effect: str, same: SameData) -> bool:
+    def at_rest(effect: Term, same: SameData) -> bool:
         size, telling = (
             candidate.fit.values.get(f"{effect}.{name}", 0.0) for name in (same.size, same.without)
         )
         return abs(telling) * seconds < abs(size)
 
-    return any(at_rest(e, same) for e in candidate.effects for same in info_of(e).same_data)
+    return any(at_rest(e, same) for e in candidate.effects for same in e.info.same_data)
 
 
-def unlikely(candidate: Candidate, ranging: Ranges) -> float:
+def loss_by_values(candidate: Candidate, ranges: VisitedRanges) -> float:
     """What a set loses by values that its physics hardly has.
 
     A parameter with a prior loses by its distance from it, as by a Cauchy distribution: a value of
@@ -610,17 +638,17 @@ def unlikely(candidate: Candidate, ranging: Ranges) -> float:
     contact is met near an end of the motion, and what acts over most of the range is none; other
     parameters lose by how many times they are outside the range of usual values, for certain.
     """
-    lost = sum(_rare(candidate, name) for name in candidate.fit.effect_values)
-    for effect in (e for e in candidate.fit.rig.effects if term_in(e) in candidate.effects):
-        lost += _contact_price(effect["id"], effect["parameters"], ranging)
+    lost = sum(_loss_by_value(candidate, name) for name in candidate.fit.effect_values)
+    for effect in (e for e in candidate.fit.rig.effects if Term.of(e) in candidate.effects):
+        lost += _contact_price(effect["id"], effect["parameters"], ranges)
     return lost
 
 
-def _rare(candidate: Candidate, name: str) -> float:
+def _loss_by_value(candidate: Candidate, name: str) -> float:
     """What a set loses by the value of one parameter of an effect."""
     lost, value = 0.0, candidate.fit.values[name]
-    effect = name.partition(".")[0]
-    usual = usual_values(name, {effect: form_in(candidate.fit.rig, effect)})
+    effect = effect_of(name)
+    usual = usual_values(name, {effect: form_in(candidate.fit.rig, effect)} if effect else None)
     if usual is not None:
         lost += math.log1p(((value - usual[0]) / usual[1]) ** 2)
     expected = find_parameter(name).expected
@@ -634,11 +662,11 @@ def _rare(candidate: Candidate, name: str) -> float:
     return lost
 
 
-def _contact_price(effect: str, values: Mapping[str, float], ranging: Ranges) -> float:
+def _contact_price(effect: str, values: Mapping[str, float], ranges: VisitedRanges) -> float:
     """What an effect loses by a contact that is met in the middle of the motion."""
     lost = 0.0
     for place in EFFECTS[effect].with_role("place"):
-        low, high = ranging.get(place.channel, (0.0, 0.0))
+        low, high = ranges.get(place.channel, (0.0, 0.0))
         if high > low:
             inside = (values[place.name] - low) / (high - low)
             above = all(values[side.name] >= 0.0 for side in EFFECTS[effect].with_role("side"))
@@ -659,7 +687,7 @@ def _score(
     granted to the forms of equations.
     """
     lost = _lost_by_left(candidate, baseline, suspects, share, settings)
-    return -lost - _before(candidate, settings)
+    return -lost - _prior_loss(candidate, settings)
 
 
 def _lost_by_left(
@@ -685,13 +713,13 @@ def _lost_by_left(
     return total
 
 
-def _before(candidate: Candidate, settings: DiagnosisSettings) -> float:
+def _prior_loss(candidate: Candidate, settings: DiagnosisSettings) -> float:
     """What a set loses before any data: its price, and that of every name beyond the first."""
-    further = settings.further_price * (len(candidate.names) - 1)
+    further = settings.further_price * (len(candidate.terms) - 1)
     return price(candidate, settings) + further
 
 
-def room_beside(
+def possible_gain(
     candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: DiagnosisSettings
 ) -> float:
     """By how much the logarithm of a set's weight could rise with something beside it, which left
@@ -706,15 +734,15 @@ def room_beside(
     return _lost_by_left(candidate, baseline, suspects, share, settings) - least
 
 
-def paid_for(candidate: Candidate, name: str, settings: DiagnosisSettings) -> float:
-    """What a set loses by one of its names before any data: by the parameters of an effect, their
+def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
+    """What a set loses by one of its terms before any data: by the parameters of an effect, their
     values and its place, or by how far a parameter of the file is wrong.
     """
-    if name in candidate.wrong:
-        return settings.wrong_price + candidate.outside_of(name, settings.most_tolerances)
-    own = [n for n in candidate.fit.effect_values if n.partition(".")[0] == name]
+    if term.id in candidate.wrong:
+        return settings.wrong_price + candidate.outside_of(term.id, settings.most_tolerances)
+    own = [n for n in candidate.fit.effect_values if effect_of(n) == term]
     counted = sum(not find_parameter(n).repeats for n in own)
-    rare = sum(_rare(candidate, n) for n in own)
+    rare = sum(_loss_by_value(candidate, n) for n in own)
     places = candidate.places / max(1, len(candidate.effects))
     return settings.parameter_price * counted + rare + places
 

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
 from pamrs.diagnosis.evidence import (
+    BlockGroup,
     Candidate,
-    Group,
     Judged,
+    parameters_at_wall,
     share_left,
-    stated,
-    symptoms_of,
+    with_stated_std,
 )
 from pamrs.diagnosis.explain import _words as words
 from pamrs.diagnosis.explain._block_entries import block_entries, not_judged, unexplained
@@ -27,6 +27,7 @@ from pamrs.diagnosis.fit import (
     CHOSEN,
     Key,
     Problem,
+    concerns,
     depends,
     entry_of,
     events_of,
@@ -44,7 +45,7 @@ from pamrs.diagnosis.model import (
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual, Unjudged
 from pamrs.diagnosis.result import Diagnosis
-from pamrs.effects import CATALOGUE, id_of, info_of, is_effect, place_of
+from pamrs.effects import CATALOGUE, Hypothesis, Term, effect_of
 from pamrs.findings import (
     BlockResidual,
     ChannelError,
@@ -81,7 +82,7 @@ def assemble(
     case: Case,
     fitted: Problem,
     held: Problem,
-    groups: list[Group],
+    groups: list[BlockGroup],
     found: Conclusion,
     proposal: NextExperiment,
     unjudged: Sequence[Unjudged] = (),
@@ -94,7 +95,7 @@ def assemble(
         The case.
     fitted, held : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
-    groups : list of Group
+    groups : list of BlockGroup
         Gas blocks and arm, examined.
     found : Conclusion
         Model, errors, budget and free runs.
@@ -124,8 +125,8 @@ def assemble(
         verdict=verdict,
         where=words.where(located, fitted, judged, picture),
         effects=effects,
-        ambiguity=found.ambiguity,
-        probabilities=found.probabilities,
+        ambiguity=[hypothesis.words for hypothesis in found.ambiguity],
+        probabilities={str(h): p for h, p in found.probabilities.items()},
         parameters=_parameters(nominal, known, owners),
         fit=FitErrors(found.errors["fit"], found.errors["held_out"], gap),
         next_experiment=proposal,
@@ -213,12 +214,12 @@ def _warnings(
     ]
 
 
-def _tried(groups: list[Group]) -> list[Tried]:
+def _tried(groups: list[BlockGroup]) -> list[Tried]:
     """Every set of effects that was fitted, with what it leaves of each block's excess."""
     return [
         Tried(
             blocks=[b.name for b in group.blocks],
-            effects=list(candidate.effects),
+            effects=list(map(str, candidate.effects)),
             wrong_parameters=list(candidate.wrong),
             fitted={b: e.ratio for b, e in candidate.fitted.items()},
             held_out={b: e.ratio for b, e in candidate.held_out.items()},
@@ -228,9 +229,7 @@ def _tried(groups: list[Group]) -> list[Tried]:
             std={
                 n: s
                 for n, s in candidate.fit.std.items()
-                if n not in candidate.fit.moved
-                and is_effect(n.partition(".")[0])
-                and math.isfinite(s)
+                if n not in candidate.fit.moved and effect_of(n) is not None and math.isfinite(s)
             },
             prior=sum(v * v for v in candidate.fit.moved.values()),
             suspects=[b.name for b in group.suspects],
@@ -250,27 +249,23 @@ def _considered(judged: list[Judged], fitted: Problem) -> list[Considered]:
         before = len(found)
         for own in judged:
             group, blocks = own.group, own.group.suspects
-            acting = [n for n in asked if any(depends(b, n) for b in blocks)]
-            if group.mismatch is None or group.below_noise or not acting:
+            terms = tuple(t for t in asked.terms if any(concerns(t, b) for b in blocks))
+            if group.mismatch is None or group.below_noise or not terms:
                 continue
-            there = next((c for c in group.candidates if set(c.names) == set(acting)), None)
+            acting = Hypothesis(terms)
+            there = next((c for c in group.candidates if c.hypothesis == acting), None)
             left = None
             if there is not None:
                 left = share_left(there, group.candidates[0], blocks)
-            probability = _chance(own, acting)
-            found.append(Considered(acting, [b.name for b in blocks], probability, left))
+            probability = own.probabilities.get(acting, 0.0)
+            found.append(Considered(acting.words, [b.name for b in blocks], probability, left))
         if len(found) == before:
-            chance = max(_chance(own, asked) for own in judged)
-            found.append(Considered(list(asked), [], chance, None))
+            chance = max(own.probabilities.get(asked, 0.0) for own in judged)
+            found.append(Considered(asked.words, [], chance, None))
     return found
 
 
-def _chance(judged: Judged, names: Sequence[str]) -> float:
-    """Probability that a group has these names and no others."""
-    return sum(p for key, p in judged.probabilities.items() if set(key.split("+")) == set(names))
-
-
-def _tested(groups: list[Group]) -> list[Tested]:
+def _tested(groups: list[BlockGroup]) -> list[Tested]:
     """Every persistent effect that acts where a mismatch is, its predicted gain and what it leaves
     alone, the best first.
     """
@@ -281,7 +276,12 @@ def _tested(groups: list[Group]) -> list[Tested]:
             alone = [share_left(c, group.candidates[0], group.suspects) for c in singles]
             blocks = [b.name for b in group.suspects]
             found.append(
-                Tested(effect, blocks, min(1.0, max(0.0, predicted_gain)), min(alone, default=None))
+                Tested(
+                    str(effect),
+                    blocks,
+                    min(1.0, max(0.0, predicted_gain)),
+                    min(alone, default=None),
+                )
             )
     return sorted(
         found, key=lambda a: (a.left is None, a.left if a.left is not None else -a.predicted_gain)
@@ -303,7 +303,7 @@ def _located(judged: list[Judged]) -> str | None:
         if found:
             return max(found)[1]
     for j in sorted(judged, key=lambda j: not j.wrong):
-        moved = symptoms_of(j.group)
+        moved = parameters_at_wall(j.group)
         worst = j.wrong or tuple(sorted(moved, key=lambda n: -abs(moved[n])))
         for block in reversed(j.group.blocks):
             if worst and depends(block, worst[0]):
@@ -323,13 +323,13 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
     """The effects that are named, the most probable first; without a name those that come
     closest.
     """
-    found: dict[str, tuple[float, Candidate]] = {}
+    found: dict[Term, tuple[float, Candidate]] = {}
     chosen = [j.chosen for j in judged]
     owners = owners_of_effects(chosen)
     in_set = problem.settings.in_set
     for j in judged:
-        names = {effect for c in j.group.candidates for effect in c.effects}
-        listed = {effect for effect in names if id_of(effect) in CATALOGUE}
+        tried = dict.fromkeys(effect for c in j.group.candidates for effect in c.effects)
+        listed = [effect for effect in tried if effect.id in CATALOGUE]
         for effect in j.named if verdict == "effects" else listed:
             p = j.probability(effect)
             if verdict == "effects":
@@ -337,13 +337,14 @@ def _effects(judged: list[Judged], verdict: str, problem: Problem) -> list[Effec
                 found[effect] = first, chosen[owners[effect]]
             elif p >= in_set:
                 own = [c for c in j.group.candidates if effect in c.effects]
-                best = max(own, key=lambda c: (j.group.probabilities.get(c.key, 0.0), c.gap_closed))
-                found[effect] = p, stated(problem, j.group, best)
+                chances = j.group.probabilities
+                best = max(own, key=lambda c: (chances.get(c.hypothesis, 0.0), c.gap_closed))
+                found[effect] = p, with_stated_std(problem, j.group, best)
     return [
         EffectFound(
-            id=id_of(effect),
-            name=info_of(effect).name,
-            at=place_of(effect),
+            id=effect.id,
+            name=effect.info.name,
+            at=effect.at,
             form=form_in(candidate.fit.rig, effect),
             probability=p,
             inclusion=max(
@@ -387,7 +388,7 @@ def _wrong(
                 interval=_interval(value, std, known.lower),
                 unit=known.unit,
                 moved_sigmas=own.moved[name],
-                probability=max(j.probability(name) for j in naming),
+                probability=max(j.probability(Term(name)) for j in naming),
                 held_out={
                     channel: StageError(e.before, e.refit, e.after) for channel, e in errors.items()
                 },
@@ -396,13 +397,13 @@ def _wrong(
     return found
 
 
-def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
+def _events(effect: Term, candidate: Candidate) -> list[dict[str, Any]]:
     """What happened in each recording, one entry for each event."""
     events = candidate.fit.events
     if events is None or events.effect != effect:
         return []
     found = []
-    rises = [p.name for p in info_of(effect).with_role("rise")]
+    rises = [p.name for p in effect.info.with_role("rise")]
     for recording, values in events.values.items():
         for parameters in events_of(effect, events.form):
             own = {p.repeats or p.name: values[p.name] for p in parameters if p.name in values}
@@ -413,12 +414,12 @@ def _events(effect: str, candidate: Candidate) -> list[dict[str, Any]]:
     return found
 
 
-def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _effect_parameters(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
     """Parameters of an effect, fitted or chosen."""
     rig = candidate.fit.rig
     unknown_volume = bool(unknown_volumes(rig))
     out: dict[str, EffectParameterFound] = {}
-    for parameter in info_of(effect).form(form_in(rig, effect)).parameters:
+    for parameter in effect.info.form(form_in(rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.role in (*CHOSEN, "threshold"):
             chosen = entry_of(rig, effect)["parameters"][parameter.name]
@@ -436,7 +437,7 @@ def _effect_parameters(effect: str, candidate: Candidate) -> dict[str, EffectPar
             parameter.lower,
         )
     if (
-        info_of(effect).block == "chamber"
+        effect.info.block == "chamber"
         and rig.model["valve"] is None
         and "" in rig.tables("chamber")
     ):
@@ -448,13 +449,13 @@ _REFERENCE_DENSITY = 1.185
 """Density of air in the reference state of ISO 6358 [kg/m3], to which conductances refer."""
 
 
-def _emptying(effect: str, candidate: Candidate) -> dict[str, EffectParameterFound]:
+def _emptying(effect: Term, candidate: Candidate) -> dict[str, EffectParameterFound]:
     """How fast a conductance empties a sealed chamber, and what of it does not depend on the
     chamber's volume.
     """
     gas, chamber = candidate.fit.rig.model["gas"], candidate.fit.rig.model["chamber"]
     out: dict[str, EffectParameterFound] = {}
-    for parameter in info_of(effect).form(form_in(candidate.fit.rig, effect)).parameters:
+    for parameter in effect.info.form(form_in(candidate.fit.rig, effect)).parameters:
         name = f"{effect}.{parameter.name}"
         if parameter.unit != "m3/(s Pa)" or candidate.fit.values.get(name, 0.0) <= 0:
             continue
@@ -504,7 +505,7 @@ def _parameters(
     return out
 
 
-def _block_table(groups: list[Group]) -> dict[str, BlockResidual]:
+def _block_table(groups: list[BlockGroup]) -> dict[str, BlockResidual]:
     """Residual of each block's refitted baseline."""
     out: dict[str, BlockResidual] = {}
     for group in groups:

@@ -62,10 +62,10 @@ def block_entries(
         BlockVerdict(
             blocks=[b.name for b in j.group.blocks],
             verdict=j.verdict,
-            probabilities=j.probabilities,
-            effects=list(j.named),
+            probabilities={str(h): p for h, p in j.probabilities.items()},
+            effects=list(map(str, j.named)),
             wrong_parameters=list(j.wrong),
-            ambiguity=j.ambiguity,
+            ambiguity=[hypothesis.words for hypothesis in j.ambiguity],
             mismatch=[mismatch(b) for b in j.group.blocks],
         )
         for j in judged

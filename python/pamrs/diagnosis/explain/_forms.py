@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.fit import Fit, Problem
 from pamrs.diagnosis.prepare import Block, begun
-from pamrs.effects import CLOSURE_OF, MEMORY_OF, TERMS
+from pamrs.effects import CLOSURE_OF, CLOSURE_TERMS, MEMORY_OF
 from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
 from pamrs.simulation import core_rig, default_step
@@ -47,18 +47,19 @@ def forms_of(found: Fit, problem: Problem, baseline: Fit) -> list[Form]:
     DiagnosisError
         If the fit has no closure.
     """
-    if not set(found.effects) & set(TERMS):
+    ids = [effect.id for effect in found.effects]
+    if not set(ids) & set(CLOSURE_TERMS):
         raise DiagnosisError(
-            f"found.effects = {found.effects} is not allowed: one of {', '.join(TERMS)} is needed"
+            f"found.effects = {ids} is not allowed: one of {', '.join(CLOSURE_TERMS)} is needed"
         )
-    blocks = [b for b in problem.blocks if b.closure in found.effects]
+    blocks = [b for b in problem.blocks if b.closure in ids]
     return [_form(found, problem, baseline, block) for block in blocks]
 
 
 def _form(found: Fit, problem: Problem, baseline: Fit, block: Block) -> Form:
     closure = CLOSURE_OF[block.kind]
     parts = _parts(found, problem, block, closure)
-    used = [term for term in TERMS[closure] if f"{closure}.{term.name}" in found.values]
+    used = [term for term in CLOSURE_TERMS[closure] if f"{closure}.{term.name}" in found.values]
     whole = np.sum([parts[term.name] for term in used], axis=0)
     power = float(whole @ whole)
     effect = next(own for own in found.rig.effects if own["id"] == closure)
@@ -102,7 +103,7 @@ def _parts(found: Fit, problem: Problem, block: Block, closure: str) -> dict[str
     every = np.concatenate(rows)
     return {
         t.name: every[:, k] * found.values.get(f"{closure}.{t.name}", 0.0)
-        for k, t in enumerate(TERMS[closure])
+        for k, t in enumerate(CLOSURE_TERMS[closure])
     }
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from pamrs.channels import channel_of, unit_of
-from pamrs.diagnosis.evidence import Candidate, Judged, symptoms_of
+from pamrs.diagnosis.evidence import Candidate, Judged, parameters_at_wall
 from pamrs.diagnosis.explain._conditions import Picture
 from pamrs.diagnosis.fit import Problem
-from pamrs.diagnosis.model import spoiled
-from pamrs.effects import CATALOGUE, id_of
+from pamrs.diagnosis.model import spoiled_channels
+from pamrs.effects import CATALOGUE, UNDECIDED
 from pamrs.findings import ChannelError, Where
 from pamrs.recordings import Case
 from pamrs.report.text import (
@@ -82,7 +82,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
             f"No block's residual is above the noise level, but the residual of the "
             f"{place}{parts} contains the signature of an effect, in held-out recordings too."
         )
-    elif group is not None and group.probabilities.get("", 0.0) > _NO_MISMATCH_PROBABILITY:
+    elif group is not None and group.probabilities.get(UNDECIDED, 0.0) > _NO_MISMATCH_PROBABILITY:
         text = (
             f"The residual of the {place}{parts} is barely above the noise level "
             f"({found.systematic:.2g} times it in {spoken_name(block.channel)}). "
@@ -117,7 +117,7 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
     out = []
     groups = [j.group for j in judged]
     mistaken = any(j.wrong for j in judged)
-    symptoms = {n: v for j in judged if not j.wrong for n, v in symptoms_of(j.group).items()}
+    symptoms = {n: v for j in judged if not j.wrong for n, v in parameters_at_wall(j.group).items()}
     for recording in case.recordings:
         for channel, values in recording.channels.items():
             if (
@@ -155,7 +155,8 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
         best = group.best
         if best.effects and best.scatter > _SCATTER:
             out.append(
-                f"the size of {best.key} scatters by {100 * best.scatter:.0f} % between recordings"
+                f"the size of {best.hypothesis} scatters by {100 * best.scatter:.0f} % between "
+                "recordings"
             )
     for name in unknown_volumes(case.rig):
         out.append(
@@ -195,7 +196,7 @@ def worse(table: dict[str, ChannelError]) -> list[str]:
     refitted one.
     """
     out = []
-    for channel in spoiled(table):
+    for channel in spoiled_channels(table):
         error = table[channel]
         better, which = min((error.before, "nominal"), (error.refit, "refitted"))
         unit, factor = display_unit(unit_of(channel), error.after)
@@ -231,7 +232,7 @@ def reservations(
                 f"with {what} the model still misses {spoken_name(channel)} by {times:.2g} "
                 f"times the noise level: {name}{why}, and standard deviations do not include that"
             )
-    named = [c for c in chosen if any(id_of(effect) in CATALOGUE for effect in c.effects)]
+    named = [c for c in chosen if any(effect.id in CATALOGUE for effect in c.effects)]
     moved = {
         n: v for c in named for n, v in c.fit.held_by_prior.items() if abs(v) > _MOVED_TOLERANCES
     }

@@ -6,21 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import (
-    EFFECTS,
-    EffectInfo,
-    SameData,
-    id_of,
-    info_of,
-    is_effect,
-    place_of,
-    term_of,
-)
+from pamrs.effects import EFFECTS, EffectInfo, SameData, Term, effect_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rig.schema import ACTS, kind_of, split_name
 
-__all__ = ["acts_in", "core_names", "depends", "fits", "places_of", "same_data_in"]
+__all__ = ["acts_in", "concerns", "core_names", "depends", "fits", "places_of", "same_data_in"]
 
 _CHANNELS = {
     "supply": ("supply_pressure", "supply_command"),
@@ -32,21 +23,24 @@ _CHANNELS = {
 
 
 def depends(block: Block, name: str) -> bool:
-    """Whether a block's output depends on a parameter or an effect, by its name."""
-    effect = name.partition(".")[0]
-    if is_effect(effect):
-        return acts_in(effect, block)
-    return name in block.parameters
+    """Whether a block's output depends on a parameter, by its dotted name."""
+    effect = effect_of(name)
+    return name in block.parameters if effect is None else acts_in(effect, block)
 
 
-def acts_in(effect: str, block: Block) -> bool:
+def concerns(term: Term, block: Block) -> bool:
+    """Whether a block's output depends on an effect or a value of the rig file."""
+    return acts_in(term, block) if term.is_effect else depends(block, term.id)
+
+
+def acts_in(effect: Term, block: Block) -> bool:
     """Whether an effect acts inside a block of the cut chain: that of its own block of the rig,
     unless it says others.
 
     Of several tanks, chambers or joints an effect acts on every one, with the same parameters,
     where it has no place; with one (``leak_muscle@flexor``), on that block alone.
     """
-    info, at = info_of(effect), place_of(effect)
+    info, at = effect.info, effect.at
     kinds = info.acts_in or ACTS.get(info.block, ())
     there = any(kind in kinds for kind in (block.kind, *block.beside))
     return there and (not at or _has(block, info.at, at))
@@ -84,7 +78,7 @@ def places_of(rig: Rig, effect: str, blocks: Sequence[Block]) -> list[str]:
         name
         for name in rig.tables(info.at)
         if name
-        and any(acts_in(term_of(effect, name), block) for block in blocks)
+        and any(acts_in(Term(effect, name), block) for block in blocks)
         and _possible(rig, effect, name)
     ]
     return found if len(found) > 1 else []
@@ -105,14 +99,14 @@ def core_names(rig: Rig, names: Sequence[str]) -> list[str]:
     """
     ids = [entry["id"] for entry in rig.effects]
 
-    def told(name: str) -> str:
-        term, _, short = name.partition(".")
-        effect, at = id_of(term), place_of(term)
-        if not at:
+    def named(name: str) -> str:
+        effect = effect_of(name)
+        if effect is None or not effect.at:
             return name
-        return f"{effect}.{at}.{short}" if ids.count(effect) > 1 else f"{effect}.{short}"
+        place = f".{effect.at}" if ids.count(effect.id) > 1 else ""
+        return f"{effect.id}{place}{name.removeprefix(str(effect))}"
 
-    return [told(name) for name in names]
+    return [named(name) for name in names]
 
 
 def fits(rig: Rig, effect: str) -> bool:
@@ -125,9 +119,9 @@ def fits(rig: Rig, effect: str) -> bool:
     return _acts_on(rig, info)
 
 
-def same_data_in(rig: Rig, effect: str) -> SameData | None:
+def same_data_in(rig: Rig, effect: Term) -> SameData | None:
     """The effect that leaves the same recordings in a rig, held parameters only where they act."""
-    found = (s for s in info_of(effect).same_data if _acts_on(rig, EFFECTS[s.effect]))
+    found = (s for s in effect.info.same_data if _acts_on(rig, EFFECTS[s.effect]))
     same = next(found, None)
     return same and replace(same, held=same.held if rig.tables(same.held_at) else ())
 

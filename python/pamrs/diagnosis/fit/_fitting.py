@@ -23,7 +23,7 @@ from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._starts import without_term
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import EFFECTS, find_parameter, id_of, is_effect, place_of, usual_values
+from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of, find_parameter, usual_values
 from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
@@ -80,8 +80,8 @@ LOGARITHMIC = frozenset(
 
 def _logarithmic(name: str) -> bool:
     """Whether a parameter is one of them, wherever its effect acts."""
-    term, dot, short = name.partition(".")
-    return id_of(term) + dot + short in LOGARITHMIC
+    effect = effect_of(name)
+    return effect is not None and effect.id + name.removeprefix(str(effect)) in LOGARITHMIC
 
 
 class Stopped(BaseException):
@@ -104,8 +104,8 @@ class Problem:
         What it is solved by.
     stopped : Event, optional
         Set by whoever wants no more of it: the next evaluation raises `Stopped`.
-    considered : tuple of tuple of str, optional
-        Sets of names (effects, parameters that may be wrong) that the caller asks for.
+    considered : tuple of Hypothesis, optional
+        What the caller asks for.
     losses : Losses, optional
         What failed and was left out.
     """
@@ -115,7 +115,7 @@ class Problem:
     core: _core.Rig
     settings: DiagnosisSettings
     stopped: Event = field(default_factory=Event)
-    considered: tuple[tuple[str, ...], ...] = ()
+    considered: tuple[Hypothesis, ...] = ()
     losses: Losses = field(default_factory=Losses)
 
 
@@ -125,7 +125,7 @@ class Events:
 
     Attributes
     ----------
-    effect : str
+    effect : Term
         Its id, with a place where it acts at one block of several.
     values : dict of str to dict
         Its parameters (SI) by recording; a recording without an entry has none.
@@ -133,7 +133,7 @@ class Events:
         Its form; empty for the usual one.
     """
 
-    effect: str
+    effect: Term
     values: dict[str, dict[str, float]]
     form: str = ""
 
@@ -141,8 +141,8 @@ class Events:
         """A rig with what happened in one recording, and without it where nothing did."""
         own = self.values.get(recording)
         rig = without_term(rig, self.effect)
-        at = place_of(self.effect)
-        return rig.with_effect(id_of(self.effect), own, at=at, form=self.form) if own else rig
+        at = self.effect.at
+        return rig.with_effect(self.effect.id, own, at=at, form=self.form) if own else rig
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ class Fit:
 
     Attributes
     ----------
-    effects : tuple of str
+    effects : tuple of Term
         Effects in the model.
     rig : Rig
         The model.
@@ -177,7 +177,7 @@ class Fit:
         Variance of each block's binned residual relative to white noise, by which it was weighted.
     """
 
-    effects: tuple[str, ...]
+    effects: tuple[Term, ...]
     rig: Rig
     values: dict[str, float]
     std: dict[str, float]
@@ -204,7 +204,7 @@ class Fit:
         return {
             name: value
             for name, value in self.values.items()
-            if name not in self.moved and is_effect(name.partition(".")[0])
+            if name not in self.moved and effect_of(name) is not None
         }
 
     @property
@@ -251,7 +251,7 @@ def residuals(
         relevant = [name for name in names if depends(block, name)]
         at = prepared.recording.name
         if events is not None and at not in happened:  # nothing here could be differentiated
-            relevant = [name for name in relevant if name.partition(".")[0] != events.effect]
+            relevant = [name for name in relevant if effect_of(name) != events.effect]
         told = [name for name in relevant if name not in steps]
         found = residual(block, cores[at], prepared, core_names(rig, told))
         if told == list(names):
@@ -369,7 +369,7 @@ class Scaling:
         starts: dict[str, float],
         settings: DiagnosisSettings,
         freed: Collection[str] = (),
-        forms: Mapping[str, str] | None = None,
+        forms: Mapping[Term, str] | None = None,
     ) -> None:
         self.names = [*baseline, *starts]
         self.forms = dict(forms or {})
@@ -422,10 +422,9 @@ class Scaling:
         values = {n: self.value(n, float(v)) for n, v in zip(self.names, x, strict=True)}
         rig = with_known(self.nominal, {n: values[n] for n in self.baseline})
         chosen = {**fixed, **{n: v for n, v in values.items() if n not in self.centre}}
-        for effect in dict.fromkeys(n.partition(".")[0] for n in chosen):
-            own = {n.partition(".")[2]: v for n, v in chosen.items() if n.startswith(effect + ".")}
-            form, at = self.forms.get(effect, ""), place_of(effect)
-            rig = rig.with_effect(id_of(effect), own, at=at, form=form)
+        for effect in filter(None, dict.fromkeys(map(effect_of, chosen))):
+            form = self.forms.get(effect, "")
+            rig = rig.with_effect(effect.id, effect.own(chosen), at=effect.at, form=form)
         return rig
 
 
@@ -529,7 +528,7 @@ def changes(
     problem: Problem,
     rig: Rig,
     base: dict[Key, Residual],
-    effect: str,
+    effect: Term,
     known: Mapping[Key, Residual] | None = None,
 ) -> dict[Key, Residual]:
     """Residuals of a model near to another whose residuals (with the starts of their windows) are
@@ -578,7 +577,7 @@ def _away_from_usual(
 def fit(
     problem: Problem,
     nominal: Rig,
-    effects: tuple[str, ...],
+    effects: tuple[Term, ...],
     starts: dict[str, float],
     inflation: dict[str, float],
     *,
@@ -589,7 +588,7 @@ def fit(
     share: float | None = None,
     settled: Mapping[str, float] | None = None,
     freed: Collection[str] = (),
-    forms: Mapping[str, str] | None = None,
+    forms: Mapping[Term, str] | None = None,
 ) -> Fit:
     """Fit baseline parameters (with their tolerances as priors) and effects to the recordings.
 
@@ -599,7 +598,7 @@ def fit(
         Blocks and recordings.
     nominal : Rig
         Nominal model.
-    effects : tuple of str
+    effects : tuple of Term
         Effects to include.
     starts : dict of str to float
         Dotted effect parameters that are free, with their starts.
@@ -620,7 +619,7 @@ def fit(
         Baseline parameters that are held at other values than the nominal ones.
     freed : collection of str, optional
         Baseline parameters that no prior holds, and that may leave their tolerance.
-    forms : mapping of str to str, optional
+    forms : mapping of Term to str, optional
         Form of each effect that is not in its first.
 
     Raises

@@ -15,7 +15,7 @@ from pamrs.diagnosis.fit._acting import acts_in
 from pamrs.diagnosis.fit._fitting import Events, Key, Problem, changes, stacked
 from pamrs.diagnosis.fit._lines import lines_of
 from pamrs.diagnosis.prepare import Residual
-from pamrs.effects import EFFECTS, EffectParameter
+from pamrs.effects import EffectParameter, Term
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -34,7 +34,7 @@ class Shaken:
 
     Attributes
     ----------
-    effect : str
+    effect : Term
         Which effect repeats.
     rows : dict of str to (n,) array
         Stacked residuals by recording.
@@ -42,13 +42,13 @@ class Shaken:
         By frequency [Hz] and recording: their change per unit of each size [1/SI].
     """
 
-    effect: str
+    effect: Term
     rows: dict[str, Array]
     columns: dict[float, dict[str, Array]]
 
     @staticmethod
     def of(
-        effect: str,
+        effect: Term,
         problem: Problem,
         rig: Rig,
         base: dict[Key, Residual],
@@ -72,7 +72,7 @@ class Shaken:
         known : mapping of str to float, optional
             Frequencies that are known; otherwise the lines of the residual's spectrum are taken.
         """
-        form = next(f for f in EFFECTS[effect].forms if f.periodic)
+        form = next(f for f in effect.info.forms if f.periodic)
         (scanned,) = (p for p in form.parameters if p.scan is not None)
         frequencies = [v for n, v in (known or {}).items() if n.startswith(scanned.name)]
         if not frequencies:
@@ -87,7 +87,7 @@ class Shaken:
                 alone = {p.name: unit if p is size else 0.0 for p in sizes}
                 try:
                     model = rig.with_effect(
-                        effect, alone | {scanned.name: frequency}, form=form.name
+                        effect.id, alone | {scanned.name: frequency}, form=form.name
                     )
                     moved = _by_recording(problem, changes(problem, model, base, effect), inflation)
                 except SimulationError:
@@ -103,7 +103,7 @@ class Shaken:
         """The frequencies that take most of the residuals, with the sizes of each recording; None
         where there are not as many as the form has.
         """
-        own = EFFECTS[self.effect].form(form)
+        own = self.effect.info.form(form)
         places = [p.name for p in own.parameters if p.scan is not None]
         sizes = [p.name for p in own.parameters if p.scan is None]
         chosen = itertools.combinations(self.columns, len(places))
@@ -149,7 +149,7 @@ def _by_recording(
 
 
 def _lines(
-    effect: str, scanned: EffectParameter, problem: Problem, base: dict[Key, Residual]
+    effect: Term, scanned: EffectParameter, problem: Problem, base: dict[Key, Residual]
 ) -> list[float]:
     """Lines of the spectrum of what is left in the blocks in which an effect acts [Hz]."""
     there = [

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from pamrs.effects import Form, id_of, info_of, place_of, term_in
+from pamrs.effects import Form, Term
 from pamrs.rig import Rig
 
 __all__ = [
@@ -36,7 +36,7 @@ class Start:
 
     Attributes
     ----------
-    effect : str
+    effect : Term
         Its id, with a place where it acts at one block of several.
     free, held : dict of str to float
         Dotted parameters that a fit moves, and those that it leaves, SI.
@@ -48,7 +48,7 @@ class Start:
         Which form of the effect it is; empty for the first.
     """
 
-    effect: str
+    effect: Term
     free: dict[str, float]
     held: dict[str, float]
     sizes: tuple[str, ...]
@@ -67,15 +67,14 @@ class Start:
 
     def applied(self, rig: Rig) -> Rig:
         """The rig with the effect as it starts."""
-        values = {name.partition(".")[2]: value for name, value in (self.free | self.held).items()}
-        at = place_of(self.effect)
-        return rig.with_effect(id_of(self.effect), values, at=at, form=self.form)
+        values = self.effect.own(self.free | self.held)
+        return rig.with_effect(self.effect.id, values, at=self.effect.at, form=self.form)
 
-    def moved(self, effect: str) -> Start:
+    def moved(self, effect: Term) -> Start:
         """The same start of the effect at another place."""
 
         def named(name: str) -> str:
-            return effect + name.removeprefix(self.effect)
+            return f"{effect}{name.removeprefix(str(self.effect))}"
 
         return replace(
             self,
@@ -89,9 +88,7 @@ class Start:
         """The same start with its sizes multiplied (a restriction divided by the root), inside
         their bounds.
         """
-        bounds = {
-            f"{self.effect}.{p.name}": p for p in info_of(self.effect).form(self.form).parameters
-        }
+        bounds = {f"{self.effect}.{p.name}": p for p in self.effect.info.form(self.form).parameters}
 
         def sized(name: str, value: float) -> float:
             moved = value / math.sqrt(size) if bounds[name].restricts else value * size
@@ -104,22 +101,27 @@ class Start:
         return replace(self, free=free)
 
 
-def form_in(rig: Rig, effect: str) -> str:
+def form_in(rig: Rig, effect: Term) -> str:
     """Form of an effect in a rig; empty for the first, and where the rig does not have it."""
-    return next((e.get("form", "") for e in rig.effects if effect in (e["id"], term_in(e))), "")
+    return next((e.get("form", "") for e in rig.effects if _is(effect, e)), "")
 
 
-def entry_of(rig: Rig, effect: str) -> dict[str, Any]:
-    """An effect of a rig, by its id or by its id and place."""
-    return next(e for e in rig.effects if effect in (e["id"], term_in(e)))
+def entry_of(rig: Rig, effect: Term) -> dict[str, Any]:
+    """The entry of an effect in a rig: that at its place, or the first of its id."""
+    return next(e for e in rig.effects if _is(effect, e))
 
 
-def without_term(rig: Rig, effect: str) -> Rig:
+def _is(effect: Term, entry: Mapping[str, Any]) -> bool:
+    """Whether an entry of a rig is of an effect: with its place, or anywhere."""
+    return effect.id == entry["id"] and effect.at in ("", entry.get("at", ""))
+
+
+def without_term(rig: Rig, effect: Term) -> Rig:
     """A rig without an effect; where it has a place, without that at this place."""
-    at = place_of(effect)
-    if at and not any(term_in(e) == effect for e in rig.effects):
+    at = effect.at
+    if at and not any(Term.of(e) == effect for e in rig.effects):
         return rig
-    return rig.without_effect(id_of(effect), at=at or None)
+    return rig.without_effect(effect.id, at=at or None)
 
 
 def with_effects_of(rig: Rig, other: Rig, but: Collection[str] = ()) -> Rig:
@@ -136,12 +138,12 @@ def with_entry(rig: Rig, entry: Mapping[str, Any], std: Mapping[str, float] | No
     return rig.with_effect(entry["id"], entry["parameters"], std=std, at=at, form=form)
 
 
-def starts_of(effect: str, *, sealed: bool) -> list[Start]:
+def starts_of(effect: Term, *, sealed: bool) -> list[Start]:
     """Every start of every form of an effect that is the same in all recordings.
 
     Parameters
     ----------
-    effect : str
+    effect : Term
         Its id, with a place where it acts at one block of several.
     sealed : bool
         Whether the rig has no valve: a recording may then begin just after a fill.
@@ -152,19 +154,19 @@ def starts_of(effect: str, *, sealed: bool) -> list[Start]:
         One for each form and each combination of its shapes and choices; sizes at their typical
         value.
     """
-    info = info_of(effect)
+    info = effect.info
     # of an effect that only ever happens at times of its own the first form stands for all
     forms = info.lasting or info.forms[:1]
     return [start for form in forms for start in _starts_of_form(effect, form, sealed=sealed)]
 
 
-def _starts_of_form(effect: str, form: Form, *, sealed: bool) -> list[Start]:
+def _starts_of_form(effect: Term, form: Form, *, sealed: bool) -> list[Start]:
     """Every start of one form."""
     shapes: list[list[tuple[str, float]]] = []
     sizes: dict[str, float] = {}
     held: list[list[tuple[str, float]]] = []
     signed = False
-    own = "" if form is info_of(effect).forms[0] else form.name
+    own = "" if form is effect.info.forms[0] else form.name
     for parameter in form.parameters:
         name = f"{effect}.{parameter.name}"
         role = parameter.role_in(sealed=sealed)

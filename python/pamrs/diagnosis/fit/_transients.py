@@ -35,7 +35,7 @@ from pamrs.diagnosis.fit._leastsquares import levenberg_marquardt
 from pamrs.diagnosis.fit._shaken import Shaken
 from pamrs.diagnosis.fit._spread import pieces_of, pieces_spread
 from pamrs.diagnosis.prepare import Prepared, Residual
-from pamrs.effects import EffectParameter, find_parameter, info_of
+from pamrs.effects import EffectParameter, Term, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
@@ -66,18 +66,18 @@ _EVALUATIONS_TOGETHER = 12  # evaluations of the fit of baseline and events of a
 Array = NDArray[np.float64]
 
 
-def events_of(effect: str, form: str = "") -> list[list[EffectParameter]]:
+def events_of(effect: Term, form: str = "") -> list[list[EffectParameter]]:
     """Parameters (size, time, duration) of each event that one recording can have, the first
     event's first.
 
     Parameters
     ----------
-    effect : str
+    effect : Term
         A transient effect.
     form : str
         Its form; the usual one where it is empty.
     """
-    shape, leading = info_of(effect).form(form), info_of(effect).leading.name
+    shape, leading = effect.info.form(form), effect.info.leading.name
     own = shape.parameters
     if shape.own:
         return [list(own)]
@@ -95,13 +95,13 @@ def _tried(parameter: EffectParameter) -> float:
     return parameter.default if parameter.tried is None else parameter.tried
 
 
-def _first_of(effect: str, parameter: str) -> EffectParameter:
+def _first_of(effect: Term, parameter: str) -> EffectParameter:
     """The parameter of the first event that one of a later event repeats."""
     info = find_parameter(f"{effect}.{parameter}")
     return find_parameter(f"{effect}.{info.repeats}") if info.repeats else info
 
 
-def _scale(effect: str, parameter: str) -> float:
+def _scale(effect: Term, parameter: str) -> float:
     """Scale of an event's parameter in a fit [SI]."""
     scales = {
         "time": _TIME_SCALE,
@@ -109,20 +109,20 @@ def _scale(effect: str, parameter: str) -> float:
         "rise": _RISE_SCALE,
     }
     first = _first_of(effect, parameter)
-    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _tried(info_of(effect).leading)
-    if info_of(effect).own:
+    usual = _FREQUENCY_SCALE if first.unit == "Hz" else _tried(effect.info.leading)
+    if effect.info.own:
         return _tried(first)
     return scales.get(first.role, usual)
 
 
 def fit_events(
-    effect: str, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
+    effect: Term, problem: Problem, nominal: Rig, baseline: Fit, inflation: dict[str, float]
 ) -> Fit | None:
     """Find the events of an effect in every recording and refit the baseline beside them.
 
     Parameters
     ----------
-    effect : str
+    effect : Term
         A transient one.
     problem : Problem
         Blocks and recordings.
@@ -140,8 +140,8 @@ def fit_events(
         None where nothing was found.
     """
     rig, base = baseline.rig, baseline.residuals
-    forms = [form for form in info_of(effect).forms if form.transient]
-    timed = not info_of(effect).own
+    forms = [form for form in effect.info.forms if form.transient]
+    timed = not effect.info.own
     found = look_for_events(effect, problem, rig, base, inflation) if timed else None
     shaken = None
     last = None
@@ -178,7 +178,7 @@ def _in_form(events: Events, form: str) -> Events:
     effect = events.effect
     values = {}
     for name, own in events.values.items():
-        told = {p.name: own.get(p.name, _tried(p)) for p in info_of(effect).form(form).parameters}
+        told = {p.name: own.get(p.name, _tried(p)) for p in effect.info.form(form).parameters}
         new = [p for event in events_of(effect, form) for p in event if p.name not in own]
         early = sum(0.5 * told[p.name] for p in new if p.role == "duration")
         later = [p.name for event in events_of(effect, form) for p in event if p.role == "time"]
@@ -187,7 +187,7 @@ def _in_form(events: Events, form: str) -> Events:
 
 
 def look_for_events(
-    effect: str,
+    effect: Term,
     problem: Problem,
     rig: Rig,
     base: dict[Key, Residual],
@@ -199,7 +199,7 @@ def look_for_events(
 
     Parameters
     ----------
-    effect : str
+    effect : Term
         A transient one.
     problem : Problem
         Blocks and recordings.
@@ -220,8 +220,8 @@ def look_for_events(
         None where no recording has one.
     """
     known = dict(known or {})
-    size = known.get(info_of(effect).leading.name)
-    periodic = info_of(effect).form(form).periodic
+    size = known.get(effect.info.leading.name)
+    periodic = effect.info.form(form).periodic
     shaken = (
         Shaken.of(effect, problem, rig, base, inflation, known).best(form) if periodic else None
     )
@@ -231,7 +231,7 @@ def look_for_events(
         name = prepared.recording.name
         if periodic:
             return None if shaken is None else replace(shaken, values={name: shaken.values[name]})
-        if info_of(effect).own:
+        if effect.info.own:
             return _drifting(effect, form, alone, rig, base, inflation, known)
         own = {key: r for key, r in base.items() if key[1] == name}
         started = _scan(effect, alone, prepared, rig, own, inflation, size, stopped)
@@ -261,7 +261,7 @@ def look_for_events(
 
 
 def _drifting(
-    effect: str,
+    effect: Term,
     form: str,
     problem: Problem,
     rig: Rig,
@@ -272,7 +272,7 @@ def _drifting(
     """Sizes of an effect that is another one in each recording, by its signature in each; without
     those in which it is not worth it, None where it is in none.
     """
-    info, values = info_of(effect), {}
+    info, values = effect.info, {}
     leading = info.leading
     shapes = [
         [(p.name, x) for x in ([known[p.name]] if known and p.name in known else p.starts)]
@@ -297,7 +297,7 @@ def _drifting(
 
 
 def _scan(
-    effect: str,
+    effect: Term,
     problem: Problem,
     prepared: Prepared,
     rig: Rig,
@@ -310,7 +310,7 @@ def _scan(
     it.
     """
     slots = len(events_of(effect))
-    typical = _tried(info_of(effect).leading)
+    typical = _tried(effect.info.leading)
     length = prepared.n * prepared.dt
     times = np.arange(_FIRST_TIME, length - _LAST_TIME, _SPACING)
     rows, _ = stacked(problem, base, inflation)
@@ -321,7 +321,9 @@ def _scan(
         values = _numbered([(typical if size is None else size, float(t)) for t in group], effect)
         try:
             moved, _ = stacked(
-                problem, changes(problem, rig.with_effect(effect, values), base, effect), inflation
+                problem,
+                changes(problem, rig.with_effect(effect.id, values), base, effect),
+                inflation,
             )
         except SimulationError:
             continue
@@ -383,7 +385,7 @@ def _apart(times: Array, slots: int) -> list[list[float]]:
     return [[float(t) for t in times[k::stride]] for k in range(stride)]
 
 
-def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float]:
+def _numbered(events: list[tuple[float, float]], effect: Term) -> dict[str, float]:
     """Parameters of a few events of one recording, by their sizes and times."""
     values: dict[str, float] = {}
     for (size, time), parameters in zip(events, events_of(effect), strict=False):
@@ -391,7 +393,7 @@ def _numbered(events: list[tuple[float, float]], effect: str) -> dict[str, float
             first = _first_of(effect, parameter.name)
             told = {"time": time, "duration": _tried(first)}
             values[parameter.name] = told.get(first.role, size)
-    return values | {p.name: _tried(p) for p in info_of(effect).with_role("rise") if values}
+    return values | {p.name: _tried(p) for p in effect.info.with_role("rise") if values}
 
 
 def _fitted(
@@ -432,7 +434,7 @@ def _fitted(
     return told(x)
 
 
-def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, float]:
+def _limits(effect: Term, parameter: str, prepared: Prepared) -> tuple[float, float]:
     """Smallest and largest value of an event's parameter [SI]."""
     info = find_parameter(f"{effect}.{parameter}")
     limits = {
@@ -441,7 +443,7 @@ def _limits(effect: str, parameter: str, prepared: Prepared) -> tuple[float, flo
         "rise": (_LEAST_RISE, _MOST_RISE),
     }
     size = max(info.lower, -_MOST_SIZE), min(info.upper, _MOST_SIZE)
-    if info_of(effect).own:
+    if effect.info.own:
         size = info.lower, info.upper
     return limits.get(_first_of(effect, parameter).role, size)
 
@@ -532,7 +534,7 @@ class _Joint:
     ) -> _Joint:
         """The vector of a problem."""
         effect, settings = events.effect, problem.settings
-        shared = info_of(effect).form(events.form).shared
+        shared = effect.info.form(events.form).shared
         names = list(baseline.moved)
         places = [("", p) for p in shared] + [
             (name, p) for name, own in events.values.items() for p in own if p not in shared

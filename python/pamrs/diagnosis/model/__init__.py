@@ -1,13 +1,13 @@
 """The model with what was found: the fits of all groups of blocks in one rig, what it leaves of the
 recordings at every stage, the budget of each block, and the whole rig from its commands alone.
 
-Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled`, `owners_of_effects`,
+Public: `conclude`, `Conclusion`, `Models`, `with_std`, `spoiled_channels`, `owners_of_effects`,
 `owners_of_parameters` (whose value the model has), `said_of_constants` (free runs).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled, with_std
+from pamrs.diagnosis.model._conclude import Conclusion, Models, conclude, spoiled_channels, with_std
 from pamrs.diagnosis.model._free_run import said_of_constants
 from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 
@@ -18,6 +18,6 @@ __all__ = [
     "owners_of_effects",
     "owners_of_parameters",
     "said_of_constants",
-    "spoiled",
+    "spoiled_channels",
     "with_std",
 ]

@@ -13,17 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import unit_of
-from pamrs.diagnosis.evidence import (
-    Judged,
-    is_parameter,
-    significant,
-)
+from pamrs.diagnosis.evidence import Judged, significant
 from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
     acts_in,
-    depends,
+    concerns,
     form_in,
     known_parameters,
     residuals,
@@ -34,7 +30,7 @@ from pamrs.diagnosis.model._owners import owners_of_effects
 from pamrs.diagnosis.noise import Excess, NoiseLevel, excess
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import find_parameter, id_of, info_of, is_effect, place_of
+from pamrs.effects import Term, effect_of, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm, EffectParameterFound
 from pamrs.rig import Parameter, Rig
@@ -55,12 +51,14 @@ _NAMED = ("wrong_parameter", "effect")
 
 @dataclass(frozen=True)
 class _Step:
-    """A term of a group, and what the blocks keep with it.
+    """One step of the budget of a group, and what the blocks keep with it.
 
     Attributes
     ----------
-    kind, name : str
-        Kind and name of the term.
+    kind : str
+        Of the step.
+    terms : tuple of Term
+        What it adds to the model: an effect, or all wrong parameters; none for what has no name.
     now : dict
         What the blocks keep with it and all terms before it.
     change : dict or None
@@ -69,7 +67,7 @@ class _Step:
     """
 
     kind: str
-    name: str
+    terms: tuple[Term, ...]
     now: Residuals
     change: Residuals | None = None
 
@@ -123,15 +121,15 @@ def budget(
             def kept(residual: Residuals, block: Block = block) -> Excess:
                 return excess(block, problem.recordings, residual, noise_level, problem.settings)
 
-            acting = [(name, r) for name, r in bare if not name or acts_in(name, block)]
+            acting = [(e, r) for e, r in bare if e is None or acts_in(e, block)]
             before = kept(acting[0][1])
             if not significant(before):
                 continue
-            stages = [_Stage("held", name, kept(now)) for name, now in acting[1:]]
+            stages = [_Stage("held", (e,), kept(now)) for e, now in acting[1:] if e is not None]
             for step in steps:
-                acts = not step.name or _concerns(step.name, block)
+                acts = not step.terms or any(concerns(term, block) for term in step.terms)
                 change = kept(step.change) if step.change and acts else None
-                stages.append(_Stage(step.kind, step.name, kept(step.now), acts, change))
+                stages.append(_Stage(step.kind, step.terms, kept(step.now), acts, change))
             shares = _Shares(before, stages, problem.settings)
             terms += _terms(block, shares, stages, one, owners, final)
     return terms
@@ -139,20 +137,13 @@ def budget(
 
 @dataclass(frozen=True)
 class _Stage:
-    """A term of one block: as in `_Step`, against its noise; and whether it acts there."""
+    """A step of one block: as in `_Step`, against its noise; and whether it acts there."""
 
     kind: str
-    name: str
+    terms: tuple[Term, ...]
     now: Excess
     acts: bool = True
     change: Excess | None = None
-
-
-def _concerns(name: str, block: Block) -> bool:
-    """Whether the output of a block depends on what is named."""
-    if is_effect(name):
-        return acts_in(name, block)
-    return any(depends(block, one) for one in name.split("+"))
 
 
 def _steps(
@@ -163,33 +154,35 @@ def _steps(
     final: Rig,
     events: Events | None,
 ) -> list[_Step]:
-    """The terms of a group beside what the nominal model holds."""
+    """The steps of a group after what the nominal model holds."""
     names = _in_order(judged)
     if not names:
-        refit = _Step("parameters", "", found["refit"])
+        refit = _Step("parameters", (), found["refit"])
         if judged.verdict != "unlisted" or judged.group.closure is None:
             return [refit]
-        return [refit, _Step("form", "", found["after"])]
+        return [refit, _Step("form", (), found["after"])]
     own = replace(problem, blocks=judged.group.blocks)
     known = known_parameters(nominal)
 
     @cache
-    def kept(present: tuple[str, ...]) -> Residuals | None:
+    def kept(present: tuple[tuple[Term, ...], ...]) -> Residuals | None:
         if present == names:
             return found["after"]
-        happened = events if events is not None and events.effect in present else None
-        rig = _without_names([name for name in names if name not in present], known, final)
+        happened = events if events is not None and (events.effect,) in present else None
+        lacking = [term for terms in names if terms not in present for term in terms]
+        rig = _without_terms(lacking, known, final)
         try:
             return residuals(own, rig, (), happened)
         except SimulationError:  # without the others the model leaves its range
             return None
 
-    steps = [_Step("parameters", "", kept(()) or found["refit"])]
-    for n, name in enumerate(names):
+    steps = [_Step("parameters", (), kept(()) or found["refit"])]
+    for n, terms in enumerate(names):
         now = kept(names[: n + 1]) or steps[-1].now
         without = kept((*names[:n], *names[n + 1 :])) if len(names) > 1 else None
         change = _difference(found["after"], without) if without else None
-        steps.append(_Step(_kind(name), name, now, change))
+        kind = "effect" if terms[0].is_effect else "wrong_parameter"
+        steps.append(_Step(kind, terms, now, change))
     return steps
 
 
@@ -202,53 +195,45 @@ def _difference(one: Residuals, other: Residuals) -> Residuals:
     }
 
 
-def _without_names(names: Sequence[str], known: Mapping[str, Parameter], final: Rig) -> Rig:
-    """The final model without some names: effects, wrong parameters joined by ``+``."""
-    back: dict[str, float] = {}
-    for name in names:
-        if is_parameter(name):
-            back |= {n: known[n].value for n in name.split("+")}
-        else:
-            final = without_term(final, name)
-    return with_known(final, back)
+def _without_terms(terms: Sequence[Term], known: Mapping[str, Parameter], final: Rig) -> Rig:
+    """The final model without some terms: parameters have their nominal values."""
+    for term in terms:
+        if term.is_effect:
+            final = without_term(final, term)
+    return with_known(final, {t.id: known[t.id].value for t in terms if t.is_value})
 
 
 def _without_held(
     problem: Problem, nominal: Rig, before: dict[Key, Residual]
-) -> list[tuple[str, dict[Key, Residual]]]:
-    """The residuals of the nominal model without the effects that it holds (under an empty name),
-    then with one id of them after the other.
+) -> list[tuple[Term | None, dict[Key, Residual]]]:
+    """The residuals of the nominal model without the effects that it holds (of None), then with one
+    id of them after the other.
     """
     ids = list(dict.fromkeys(entry["id"] for entry in nominal.effects))
-    out: list[tuple[str, dict[Key, Residual]]] = []
+    out: list[tuple[Term | None, dict[Key, Residual]]] = []
     rig, now = nominal, before
     try:
         for later in reversed(ids):
-            out.insert(0, (later, now))
+            out.insert(0, (Term(later), now))
             rig = rig.without_effect(later)
             now = residuals(problem, rig)
     except SimulationError:  # without it the model leaves its range: nothing to compare with
-        return [("", before)]
-    return [("", now), *out]
+        return [(None, before)]
+    return [(None, now), *out]
 
 
-def _kind(name: str) -> str:
-    """What a name of a hypothesis is."""
-    return "wrong_parameter" if is_parameter(name) else "effect"
-
-
-def _in_order(judged: Judged) -> tuple[str, ...]:
-    """Names of a group: wrong parameters in one, then effects, the one that leaves least by itself
-    first.
+def _in_order(judged: Judged) -> tuple[tuple[Term, ...], ...]:
+    """What a group names, step by step: all wrong parameters, then each effect, the one that leaves
+    least by itself first.
     """
     alone = {
         c.effects[0]: sum(e.ratio for e in c.held_out.values())
         for c in judged.group.candidates
         if len(c.effects) == 1
     }
-    wrong = ["+".join(judged.wrong)] if judged.wrong else []
-    effects = [name for name in judged.named if is_effect(name)]
-    return (*wrong, *sorted(effects, key=lambda name: alone.get(name, np.inf)))
+    wrong = [tuple(map(Term, judged.wrong))] if judged.wrong else []
+    effects = sorted(judged.named, key=lambda effect: alone.get(effect, np.inf))
+    return (*wrong, *((effect,) for effect in effects))
 
 
 def _terms(
@@ -256,33 +241,33 @@ def _terms(
     shares: _Shares,
     stages: list[_Stage],
     judged: Judged,
-    owners: Mapping[str, Judged],
+    owners: Mapping[Term, Judged],
     final: Rig,
 ) -> Iterator[BudgetTerm]:
     """The terms of one block, and what is left; ``owners`` are the groups whose values of an effect
     the final model has.
     """
     for k, stage in enumerate(stages):
-        name, now = stage.name, stage.now
+        terms, now = stage.terms, stage.now
         share, interval = shares.of(k)
         if not stage.acts and share == 0.0:
             continue
-        named = name and stage.kind != "held"
-        chance = min(judged.probability(n) for n in name.split("+")) if named else None
+        named = terms and stage.kind != "held"
+        first = terms[0] if terms else Term("")
+        at = first.at or next((e.get("at", "") for e in final.effects if e["id"] == first.id), "")
         yield BudgetTerm(
             block=block.name,
             kind=stage.kind,
-            id=id_of(name),
-            form=form_in(final, name),
+            id="+".join(term.id for term in terms),
+            form=form_in(final, first),
             share=share,
             interval=interval,
-            probability=chance,
+            probability=min(map(judged.probability, terms)) if named else None,
             noises=now.systematic,
             size=now.systematic * now.noise,
             unit=unit_of(block.channel),
-            at=place_of(name)
-            or next((e.get("at", "") for e in final.effects if e["id"] == name), ""),
-            parameters=_values(name, owners.get(name, judged)),
+            at=at,
+            parameters=_values(terms, owners.get(first, judged)),
         )
     was = stages[-1].now
     share, interval = shares.unexplained()
@@ -300,22 +285,22 @@ def _terms(
     )
 
 
-def _values(name: str, judged: Judged) -> dict[str, EffectParameterFound]:
-    """What the recordings say of a term: values of the effect, or of the wrong parameters, SI."""
-    found, names = judged.chosen.fit, set(name.split("+"))
-    form = info_of(name).form(form_in(found.rig, name)).parameters if is_effect(name) else ()
-    units = {p.name: p.unit for p in form}
+def _values(terms: Sequence[Term], judged: Judged) -> dict[str, EffectParameterFound]:
+    """What the recordings say of a step: values of the effect, or of the wrong parameters, SI."""
+    found = judged.chosen.fit
     out = {}
-    for full, value in found.values.items():
-        own, _, parameter = full.partition(".")
-        if own == name:
-            key, unit = parameter, units.get(parameter, "")
-        elif full in names:
-            there = find_parameter(full) if is_effect(own) else found.rig.parameter(full)
-            key, unit = full, there.unit
+    for name, value in found.values.items():
+        effect = effect_of(name)
+        if effect is not None and effect in terms:
+            key = name.removeprefix(f"{effect}.")
+            form = effect.info.form(form_in(found.rig, effect))
+            unit = next((p.unit for p in form.parameters if p.name == key), "")
+        elif Term(name) in terms:
+            key = name
+            unit = (find_parameter(name) if effect else found.rig.parameter(name)).unit
         else:
             continue
-        std = found.std.get(full, math.inf)
+        std = found.std.get(name, math.inf)
         out[key] = EffectParameterFound(value, std if math.isfinite(std) else None, unit)
     return out
 

@@ -16,20 +16,19 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from pamrs.diagnosis.evidence import (
+    BlockGroup,
     Candidate,
-    Group,
     Judged,
     autocorrelation_of,
     case_ambiguity,
     case_probabilities,
     case_verdict,
-    determined,
-    is_parameter,
+    drop_undetermined,
     judge,
     parts_of,
     put_aside,
     start_of,
-    stated,
+    with_stated_std,
 )
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
@@ -37,6 +36,7 @@ from pamrs.diagnosis.fit import (
     Events,
     Key,
     Problem,
+    concerns,
     depends,
     fit,
     known_parameters,
@@ -50,12 +50,12 @@ from pamrs.diagnosis.model._free_run import Known, free_run
 from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
-from pamrs.effects import CATALOGUE, id_of, term_in
+from pamrs.effects import CATALOGUE, NONE, PARAMETERS, Hypothesis, Term
 from pamrs.errors import SimulationError
-from pamrs.findings import HEALTHY, BudgetTerm, ChannelError, FreeRun, channels_off
+from pamrs.findings import BudgetTerm, ChannelError, FreeRun, channels_off
 from pamrs.rig import Rig
 
-__all__ = ["Conclusion", "Models", "conclude", "spoiled", "with_std"]
+__all__ = ["Conclusion", "Models", "conclude", "spoiled_channels", "with_std"]
 
 # [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
 _ZERO_DIFFERENCE = 0.1
@@ -121,10 +121,10 @@ class Conclusion:
     ----------
     models : Models
         The rig at every stage, from the verdicts of the groups.
-    probabilities : dict of str to float
-        Of the case, by hypothesis.
-    ambiguity : list of list of str
-        Sets of names that are left open.
+    probabilities : dict of Hypothesis to float
+        Of the case.
+    ambiguity : list of Hypothesis
+        Those that are left open.
     noise_level : dict
         By block and recording.
     inside, outside : dict of str to dict
@@ -142,8 +142,8 @@ class Conclusion:
     """
 
     models: Models
-    probabilities: dict[str, float]
-    ambiguity: list[list[str]]
+    probabilities: dict[Hypothesis, float]
+    ambiguity: list[Hypothesis]
     noise_level: dict[Key, NoiseLevel]
     inside: dict[str, dict[Key, Residual]]
     outside: dict[str, dict[Key, Residual]]
@@ -169,10 +169,10 @@ class Conclusion:
 
     def hypotheses(self, problem: Problem) -> list[tuple[str, Rig, float]]:
         """The likely hypotheses that have a model: label, rig and probability."""
-        return _hypotheses(self.judged, self.probabilities, self.models.nominal, problem)
+        return _fit_hypotheses(self.judged, self.probabilities, self.models.nominal, problem)
 
 
-def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[Group]) -> Conclusion:
+def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGroup]) -> Conclusion:
     """Merge what the groups of blocks found into one model, and see what that leaves.
 
     Parameters
@@ -181,7 +181,7 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[Group]) 
         The model of the rig file.
     fitted, held : Problem
         Recordings to fit and held-out ones (the same object when there are no others).
-    groups : list of Group
+    groups : list of BlockGroup
         Gas blocks and arm, examined.
     """
     noise_level = {k: v for g in groups for k, v in g.noise_level.items()}
@@ -213,7 +213,7 @@ def _sound_models(
     nominal: Rig,
     fitted: Problem,
     held: Problem,
-    groups: list[Group],
+    groups: list[BlockGroup],
     noise_level: dict[Key, NoiseLevel],
 ) -> tuple[Models, dict[str, dict[Key, Residual]], dict[str, dict[Key, Residual]]]:
     """The rig at every stage with names that spoil no channel, and the residuals of the recordings
@@ -223,14 +223,14 @@ def _sound_models(
     the group is judged again without it.
     """
     settings = fitted.settings
-    groups = [determined(group, fitted) for group in groups]
+    groups = [drop_undetermined(group, fitted) for group in groups]
     while True:
         judged = judge(groups, settings)
         models = _models(nominal, fitted, judged, case_verdict(judged))
         inside = models.residuals(fitted)
         outside = inside if held is fitted else models.residuals(held)
         problem, found = (fitted, inside) if held is fitted else (held, outside)
-        spoilt = spoiled(_table(problem, found, noise_level))
+        spoilt = spoiled_channels(_table(problem, found, noise_level))
         blamed = _blamed(models.judged, spoilt)
         if not blamed:
             return models, inside, outside
@@ -240,10 +240,10 @@ def _sound_models(
         ]
 
 
-def _without_name(group: Group, judged: Judged) -> Group:
+def _without_name(group: BlockGroup, judged: Judged) -> BlockGroup:
     """A group without what it adds to the model: its name, or the form of what has none."""
     if judged.named:
-        return put_aside(group, judged.chosen.key)
+        return put_aside(group, judged.chosen.hypothesis)
     return replace(group, closure=None)
 
 
@@ -256,12 +256,12 @@ def _blamed(judged: list[Judged], spoilt: Collection[str]) -> set[int]:
     for channel in spoilt:
         own = {k for k in added if channel in {b.channel for b in judged[k].group.blocks}}
         blocks = [b for j in judged for b in j.group.blocks if b.channel == channel]
-        acting = {k for k in added if any(depends(b, n) for b in blocks for n in added[k])}
+        acting = {k for k in added if any(concerns(term, b) for b in blocks for term in added[k])}
         blamed |= own or acting
     return blamed
 
 
-def _additions(judged: Judged) -> tuple[str, ...]:
+def _additions(judged: Judged) -> tuple[Term, ...]:
     """Effects that a group adds to the model."""
     closure = judged.group.closure if judged.verdict == "unlisted" else None
     return judged.named or (closure.effects if closure is not None else ())
@@ -330,42 +330,42 @@ def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residua
     )
 
 
-def _hypotheses(
-    judged: list[Judged], probabilities: dict[str, float], nominal: Rig, problem: Problem
+def _fit_hypotheses(
+    judged: list[Judged], probabilities: dict[Hypothesis, float], nominal: Rig, problem: Problem
 ) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a
     name; those of an effect with times of its own can predict no other recording.
     """
     found, least = [], problem.settings.simulated_from
-    healthy = {key: p for key, p in probabilities.items() if key in HEALTHY}
+    healthy = {h.rest: p for h, p in probabilities.items() if h in (NONE, PARAMETERS)}
 
     def model(chosen: list[Candidate]) -> Rig:
         stated = _widened(problem, judged, chosen)
         return with_std(_merged(nominal, chosen), nominal, stated, owners_of_parameters(chosen))
 
-    likeliest = max(healthy, key=lambda key: healthy[key], default="")
+    likeliest = max(healthy, key=lambda rest: healthy[rest], default="")
     if sum(healthy.values()) >= least:
         chosen = [j.group.candidates[0] for j in judged]
         found.append((likeliest, model(chosen), sum(healthy.values())))
-    for key, p in probabilities.items():
-        wanted = frozenset(key.split("+"))
-        if p < least or not all(id_of(name) in CATALOGUE or is_parameter(name) for name in wanted):
+    for hypothesis, p in probabilities.items():
+        wanted = hypothesis.set
+        if p < least or hypothesis.rest or not all(t.id in CATALOGUE or t.is_value for t in wanted):
             continue
         chosen = [_inside(j.group, wanted) for j in judged]
         if any(c.fit.events is not None for c in chosen):
             continue
-        if {name for c in chosen for name in c.names} == wanted:
-            found.append((key, model(chosen), p))
+        if {term for c in chosen for term in c.terms} == wanted:
+            found.append((str(hypothesis), model(chosen), p))
     return found
 
 
-def _inside(group: Group, wanted: frozenset[str]) -> Candidate:
+def _inside(group: BlockGroup, wanted: frozenset[Term]) -> Candidate:
     """The most probable hypothesis of a group that names nothing else than what is wanted; the
     baseline where there is none.
     """
-    named = [c for c in group.candidates if c.names and set(c.names) <= wanted]
+    named = [c for c in group.candidates if c.terms and c.hypothesis.set <= wanted]
     return max(
-        named, key=lambda c: group.probabilities.get(c.key, 0.0), default=group.candidates[0]
+        named, key=lambda c: group.probabilities.get(c.hypothesis, 0.0), default=group.candidates[0]
     )
 
 
@@ -420,7 +420,7 @@ def _settled(
 
 def _widened(problem: Problem, judged: list[Judged], chosen: list[Candidate]) -> list[Candidate]:
     """The fits of the groups with the standard deviations that are stated."""
-    return [stated(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
+    return [with_stated_std(problem, j.group, c) for j, c in zip(judged, chosen, strict=True)]
 
 
 def _merged(nominal: Rig, candidates: list[Candidate]) -> Rig:
@@ -441,7 +441,7 @@ def _added(nominal: Rig, candidates: list[Candidate]) -> Iterator[tuple[Candidat
     owners = owners_of_effects(candidates)
     for k, candidate in enumerate(candidates):
         for entry in candidate.fit.rig.effects:
-            if entry["id"] not in _ids(nominal) and owners.get(term_in(entry), k) == k:
+            if entry["id"] not in _ids(nominal) and owners.get(Term.of(entry), k) == k:
                 yield candidate, entry
 
 
@@ -456,14 +456,9 @@ def with_std(rig: Rig, nominal: Rig, candidates: list[Candidate], owners: dict[s
     """
     spread = {name: candidates[k].fit.std[name] for name, k in owners.items()}
     rig = with_known(rig, {}, {name: s for name, s in spread.items() if math.isfinite(s)})
-    for candidate, effect in _added(nominal, candidates):
-        own = term_in(effect) + "."
-        std = {
-            n.removeprefix(own): s
-            for n, s in candidate.fit.std.items()
-            if n.startswith(own) and math.isfinite(s)
-        }
-        rig = with_entry(rig, effect, std)
+    for candidate, entry in _added(nominal, candidates):
+        known = Term.of(entry).own(candidate.fit.std)
+        rig = with_entry(rig, entry, {n: s for n, s in known.items() if math.isfinite(s)})
     return rig
 
 
@@ -491,7 +486,7 @@ def _table(
     return out
 
 
-def spoiled(table: dict[str, ChannelError]) -> list[str]:
+def spoiled_channels(table: dict[str, ChannelError]) -> list[str]:
     """Channels that the model with what was added predicts worse than the one without it."""
     return [
         channel

@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from pamrs.channels import channel_of, dotted, recorded_as, unit_of
 from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
-from pamrs.effects import info_of
+from pamrs.effects import EFFECTS
 from pamrs.errors import PamrsError, RecordingError
 from pamrs.findings import FreeRun, FreeRunError
 from pamrs.recordings import Recording
@@ -329,7 +329,7 @@ def said_of_constants(runs: Sequence[FreeRun], effects: Sequence[str]) -> list[s
         What was found: the free run takes readings as they are, so that those of a sensor explain
         a difference of their own.
     """
-    if any(info_of(effect).block == "sensors" for effect in effects):
+    if any(EFFECTS[effect].block == "sensors" for effect in effects):
         return []
     worst: dict[str, tuple[float, FreeRunError, str]] = {}
     for run in runs:

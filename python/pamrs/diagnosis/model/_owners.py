@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from pamrs.diagnosis.evidence import Candidate
-from pamrs.effects import find_parameter
+from pamrs.effects import Term, effect_of, find_parameter
 
 __all__ = ["owners_of_effects", "owners_of_parameters"]
 
@@ -30,11 +30,11 @@ def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     return found
 
 
-def owners_of_effects(candidates: list[Candidate]) -> dict[str, int]:
+def owners_of_effects(candidates: list[Candidate]) -> dict[Term, int]:
     """The group that tells most of each effect that several have (a clock moves what arm and
     chamber see): the one whose standard deviations are least, on the average of their logarithms.
     """
-    found: dict[str, int] = {}
+    found: dict[Term, int] = {}
     for k, candidate in enumerate(candidates):
         for effect in candidate.effects:
             last = candidates[found.get(effect, k)]
@@ -43,14 +43,14 @@ def owners_of_effects(candidates: list[Candidate]) -> dict[str, int]:
     return found
 
 
-def _doubt(candidate: Candidate, effect: str) -> float:
+def _doubt(candidate: Candidate, effect: Term) -> float:
     """How little a fit tells of an effect: mean logarithm of the standard deviations of its
     parameters, in units of their typical sizes.
     """
     std = candidate.fit.std
     logs = []
     for name in candidate.fit.values:
-        if name.startswith(effect + "."):
+        if effect_of(name) == effect:
             parameter = find_parameter(name)
             size = max(abs(s) for s in (parameter.default, *parameter.starts))
             spread = std[name] / size if size > 0.0 else std[name]

@@ -11,13 +11,13 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from pamrs.diagnosis.evidence import Judged, is_parameter
-from pamrs.diagnosis.fit import Problem, depends, without_term
-from pamrs.diagnosis.next_experiment._choice import Hypothesis, apart, outcome_of, propose, spoken
+from pamrs.diagnosis.evidence import Judged
+from pamrs.diagnosis.fit import Problem, concerns, without_term
+from pamrs.diagnosis.next_experiment._choice import Modelled, apart, outcome_of, propose, spoken
 from pamrs.diagnosis.next_experiment._differences import noise_of
 from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.prepare import Block, Prepared
-from pamrs.effects import info_of, is_effect
+from pamrs.effects import NONE, PARAMETERS, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import (
     Chain,
@@ -63,8 +63,8 @@ class _Telling:
 _TELLINGS = {name: _Telling(**own) for name, own in words("telling").items()}
 
 
-def _telling(block: Block, rig: Rig, names: Iterable[str] = ()) -> _Telling:
-    """What tells most about a block of a rig: about some names that are open there, as far as the
+def _telling(block: Block, rig: Rig, terms: Iterable[Term] = ()) -> _Telling:
+    """What tells most about a block of a rig: about some terms that are open there, as far as the
     catalogue says what tells them, else whatever is missing.
     """
     if block.mechanical:
@@ -78,7 +78,7 @@ def _telling(block: Block, rig: Rig, names: Iterable[str] = ()) -> _Telling:
         return _TELLINGS["set"]
     if not all(can_shut(rig, chain) for chain in _driving(block, rig)):
         return _TELLINGS["kept"]
-    asked = {dict(info_of(n).excitation).get("kind") for n in names if is_effect(n)}
+    asked = {dict(term.info.excitation).get("kind") for term in terms if term.is_effect}
     if block.kind != "supply" and _TELLINGS["leaks"].kind in asked:
         return _TELLINGS["leaks"]
     return _TELLINGS["holds" if block.kind == "supply" else "shut"]
@@ -140,28 +140,28 @@ class _Question:
             for channel in sorted(common)
         }
 
-    def place(self, names: Iterable[str]) -> Block:
-        """The block that a question about some names is about: where the group that has one of them
+    def place(self, terms: Iterable[Term]) -> Block:
+        """The block that a question about some terms is about: where the group that has one of them
         keeps its mismatch, or else the group that is most likely to lack what has no name.
         """
-        own = {n for n in names if is_effect(n) or is_parameter(n)}
+        own = set(terms)
 
         def merit(judged: Judged) -> tuple[bool, bool, float]:
-            there = {n for s in judged.ambiguity for n in s} | {*judged.named, *judged.wrong}
+            there = {*judged.added, *(term for h in judged.ambiguity for term in h.terms)}
             kept = judged.group.mismatch is not None
-            return bool(own & there), kept, judged.probabilities.get("unlisted", 0.0)
+            return bool(own & there), kept, judged.probabilities.get(UNLISTED, 0.0)
 
         group = max(self.judged, key=merit).group
-        acting = [b for b in group.blocks if any(depends(b, n) for n in own)]
+        acting = [b for b in group.blocks if any(concerns(term, b) for term in own)]
         found = group.mismatch
         if found is not None and (found in acting or not acting):
             return found
         return acting[0] if acting else group.blocks[-1]
 
     def experiment(
-        self, block: Block, open_: Iterable[str] = ()
+        self, block: Block, open_: Iterable[Term] = ()
     ) -> tuple[str, str, Experiment | None]:
-        """What to do about a block, of which some names are open, what it shows, and the experiment
+        """What to do about a block, of which some terms are open, what it shows, and the experiment
         where the library makes it for this rig.
         """
         telling, rig = _telling(block, self.nominal, open_), self.nominal
@@ -173,10 +173,10 @@ class _Question:
         made = self._made(tuple(names))
         return telling.text if made is None else made.text, telling.shows, made
 
-    def answer(self, begin: str, block: Block, names: Iterable[str] = ()) -> NextExperiment:
+    def answer(self, begin: str, block: Block, terms: Iterable[Term] = ()) -> NextExperiment:
         """What to record about a block, behind the words that say why."""
-        what, shows, experiment = self.experiment(block, names)
-        kind = {"kind": _telling(block, self.nominal, names).kind, "block": block.name}
+        what, shows, experiment = self.experiment(block, terms)
+        kind = {"kind": _telling(block, self.nominal, terms).kind, "block": block.name}
         text = f"{begin}: {what}; {shows}."
         if experiment is None:
             return NextExperiment(text, kind)
@@ -200,8 +200,8 @@ class _Question:
 
 def next_to_record(
     verdict: str,
-    ambiguity: list[list[str]],
-    hypotheses: Sequence[Hypothesis],
+    ambiguity: list[Hypothesis],
+    hypotheses: Sequence[Modelled],
     nominal: Rig,
     judged: list[Judged],
     fitted: Problem,
@@ -214,8 +214,8 @@ def next_to_record(
     ----------
     verdict : str
         Of the case.
-    ambiguity : list of list of str
-        Sets of names that are left open.
+    ambiguity : list of Hypothesis
+        Those that are left open.
     hypotheses : sequence of (label, rig, probability)
         Those that have a model, as fitted.
     nominal : Rig
@@ -256,11 +256,11 @@ def next_to_record(
         return replace(simulated, pairs=pairs)
     if same:
         return NextExperiment(same, pairs=pairs)
-    return replace(_told(asked, verdict, ambiguity, off), pairs=pairs)
+    return replace(_without_models(asked, verdict, ambiguity, off), pairs=pairs)
 
 
-def _told(
-    asked: _Question, verdict: str, ambiguity: list[list[str]], off: Sequence[str]
+def _without_models(
+    asked: _Question, verdict: str, ambiguity: list[Hypothesis], off: Sequence[str]
 ) -> NextExperiment:
     """What to record where no two hypotheses could be simulated."""
     missing = [
@@ -271,7 +271,7 @@ def _told(
     if not ambiguity and verdict != "unlisted" and not missing and off:
         return _of_whole(asked, off[0])
     if not ambiguity and verdict != "unlisted" and not missing:
-        several = sum(len(j.named) + len(j.wrong) for j in asked.judged) > 1
+        several = sum(len(j.added) for j in asked.judged) > 1
         text = (
             "The names are settled by these recordings; no further one is needed for them."
             if several and verdict not in HEALTHY
@@ -279,17 +279,17 @@ def _told(
             "recordings; no further one is needed for it."
         )
         return NextExperiment(text, {}, 0.0)
-    names = [name for names in ambiguity for name in names]
-    measurable = [n for n in names if is_parameter(n)]
-    if measurable and all(is_parameter(n) for n in names):
-        return NextExperiment(_measured(measurable) + ".")
+    terms = [term for hypothesis in ambiguity for term in hypothesis.terms]
+    named = not any(hypothesis.rest for hypothesis in ambiguity)
+    if terms and named and all(term.is_value for term in terms):
+        return NextExperiment(_measured(terms) + ".")
     settled = not ambiguity and verdict != "unlisted"
-    block = missing[0] if missing and not ambiguity else asked.place(names or [verdict])
+    block = missing[0] if missing and not ambiguity else asked.place(terms)
     if not settled:
-        return asked.answer(f"For the {spoken_name(block.name)}", block, names)
+        return asked.answer(f"For the {spoken_name(block.name)}", block, terms)
     rest = " and ".join(dict.fromkeys(spoken_name(b.name) for b in missing))
     begin = f"The name is settled. For the rest of the residual in the {rest}"
-    return asked.answer(begin, block, names)
+    return asked.answer(begin, block, terms)
 
 
 def _of_whole(asked: _Question, channel: str) -> NextExperiment:
@@ -306,95 +306,92 @@ def _of_whole(asked: _Question, channel: str) -> NextExperiment:
 
 def _pairs(
     asked: _Question,
-    ambiguity: list[list[str]],
-    hypotheses: Sequence[Hypothesis],
+    ambiguity: list[Hypothesis],
+    hypotheses: Sequence[Modelled],
     known: Sequence[PairExperiment],
 ) -> list[PairExperiment]:
     """What tells each two of the sets that are left open from each other; that something else is
     missing beside a name is a question by itself.
     """
-    sets = [[n for n in names if n != "unlisted" or len(names) == 1] for names in ambiguity]
-    if any("unlisted" in names for names in ambiguity):
-        sets.append(["unlisted"])
-    unique = list({frozenset(names): names for names in sets}.values())
+    alone = [Hypothesis(h.terms) if h.terms else h for h in ambiguity]
+    alone += [UNLISTED for h in ambiguity if h.rest == UNLISTED.rest]
+    unique = dict.fromkeys(alone)
     found = []
     for one, other in itertools.combinations(unique, 2):
-        labels = ["+".join(one), "+".join(other)]
-        simulated = next((p for p in known if _same(p.between, labels)), None)
+        simulated = next((p for p in known if _same(p.between, (one, other))), None)
         found.append(
-            replace(simulated, between=labels)
+            replace(simulated, between=[str(one), str(other)])
             if simulated is not None
             else _pair(asked, one, other, hypotheses)
         )
     return found
 
 
-def _same(one: Sequence[str], other: Sequence[str]) -> bool:
-    """Whether two pairs of labels are of the same names."""
-
-    def names(labels: Sequence[str]) -> set[frozenset[str]]:
-        # whether parameters moved inside their tolerances is no other answer
-        plain = ("none" if label in HEALTHY else label for label in labels)
-        return {frozenset(label.split("+")) for label in plain}
-
-    return names(one) == names(other)
+def _same(labels: Sequence[str], pair: Sequence[Hypothesis]) -> bool:
+    """Whether two texts are of the two hypotheses of a pair."""
+    # whether parameters moved inside their tolerances is no other answer
+    one, other = (
+        {NONE if hypothesis == PARAMETERS else hypothesis for hypothesis in several}
+        for several in (map(Hypothesis.parse, labels), pair)
+    )
+    return one == other
 
 
 def _pair(
-    asked: _Question, one: list[str], other: list[str], hypotheses: Sequence[Hypothesis]
+    asked: _Question, one: Hypothesis, other: Hypothesis, hypotheses: Sequence[Modelled]
 ) -> PairExperiment:
-    """What tells two sets apart that were not both simulated."""
-    labels = ["+".join(one), "+".join(other)]
+    """What tells two hypotheses apart that were not both simulated."""
+    labels = [str(one), str(other)]
     same = same_data([one, other])
     if same:
         return PairExperiment(labels, same)
-    differing = sorted(set(one) ^ set(other))
-    block = asked.place([*one, *other])
-    what, shows, experiment = asked.experiment(block, [*one, *other])
+    both = [*one.terms, *other.terms]
+    block = asked.place(both)
+    what, shows, experiment = asked.experiment(block, both)
     kind = "" if experiment is None else experiment.name
-    if "unlisted" not in differing:
-        values = [n for n in differing if is_parameter(n)]
+    if UNLISTED not in (one, other):
+        differing = sorted(one.set ^ other.set)
+        values = [term for term in differing if term.is_value]
         if values:
             return PairExperiment(
                 labels,
                 f"{_measured(values)}; or, for the {spoken_name(block.name)}: {what}; {shows}.",
                 kind,
             )
-        effects = [n for n in differing if is_effect(n)]
-        why = f" {spoken(effects[0])}: {info_of(effects[0]).separates}." if effects else ""
+        effect = next((term for term in differing if term.is_effect), None)
+        why = f" {spoken(str(effect))}: {effect.info.separates}." if effect else ""
         return PairExperiment(
             labels, f"For the {spoken_name(block.name)}: {what}; {shows}.{why}", kind
         )
-    names = next(names for names in (one, other) if "unlisted" not in names)
-    listed = "+".join(names)
+    listed = other if one == UNLISTED else one
     text = (
-        f"For the {spoken_name(block.name)}: {what}. A model with {spoken(listed)} has to predict "
-        "that to the noise without another fit; what it misses is not listed"
+        f"For the {spoken_name(block.name)}: {what}. A model with {spoken(str(listed))} has to "
+        "predict that to the noise without another fit; what it misses is not listed"
     )
-    values = [n for n in names if is_parameter(n)]
-    told = _weight(asked, set(names), hypotheses, experiment)
-    if told is not None:
-        channel, size = told
+    values = [term for term in listed.terms if term.is_value]
+    missed = _missed_without(asked, listed.set, hypotheses, experiment)
+    if missed is not None:
+        channel, size = missed
         text += (
-            f" (without {spoken(listed)} the model would miss the {spoken_name(channel)} by "
+            f" (without {spoken(str(listed))} the model would miss the {spoken_name(channel)} by "
             f"{size:.2g} times the noise level)"
         )
     text += f". {_measured(values)}." if values else "."
-    return PairExperiment(labels, text, kind, None if told is None else told[1])
+    return PairExperiment(labels, text, kind, None if missed is None else missed[1])
 
 
-def _weight(
+def _missed_without(
     asked: _Question,
-    names: set[str],
-    hypotheses: Sequence[Hypothesis],
+    terms: frozenset[Term],
+    hypotheses: Sequence[Modelled],
     experiment: Experiment | None,
 ) -> tuple[str, float] | None:
-    """What a model without some names misses of what they do in an experiment: channel and noise
+    """What a model without some terms misses of what they do in an experiment: channel and noise
     levels; None where it cannot be simulated.
     """
-    of = {frozenset(label.split("+")): rig for label, rig, _ in hypotheses}
-    own = next((rig for label, rig in of.items() if names and names <= label), None)
-    effects = [n for n in names if is_effect(n)]
+    models = ((Hypothesis.parse(label), rig) for label, rig, _ in hypotheses)
+    own = next((rig for known, rig in models if terms and terms <= known.set), None)
+    effects = [term for term in terms if term.is_effect]
     if own is None or experiment is None or not effects:
         return None
     bare = own
@@ -409,21 +406,22 @@ def _weight(
     return None
 
 
-def _measured(names: Sequence[str]) -> str:
+def _measured(values: Sequence[Term]) -> str:
     """How values of the rig file are told from what looks like them."""
+    names = " or the ".join(spoken_name(term.id) for term in values)
     return (
-        f"Measure the {' or the '.join(map(spoken_name, names))} by itself (scale, ruler, known "
-        "volume): these recordings cannot tell which is wrong"
+        f"Measure the {names} by itself (scale, ruler, known volume): these recordings cannot tell "
+        "which is wrong"
     )
 
 
-def same_data(ambiguity: list[list[str]]) -> str:
-    """What tells the two most probable sets apart where they are the same data; empty where they
-    are not.
+def same_data(ambiguity: list[Hypothesis]) -> str:
+    """What tells the two most probable hypotheses apart where they are the same data; empty where
+    they are not.
     """
-    for one, other in itertools.permutations([set(s) for s in ambiguity[:2]], 2):
-        for effect in one:
-            for same in info_of(effect).same_data if is_effect(effect) else ():
-                if other == one - {effect} | {same.effect}:
+    for one, other in itertools.permutations(ambiguity[:2], 2):
+        for term in one.terms if one.rest == other.rest else ():
+            for same in term.info.same_data if term.is_effect else ():
+                if other.set == one.set - {term} | {Term(same.effect)}:
                     return same.told_by
     return ""

@@ -38,7 +38,7 @@ from pamrs.diagnosis.next_experiment._differences import (
 )
 from pamrs.diagnosis.prepare import Prepared
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import info_of, is_effect, place_of, term_in
+from pamrs.effects import Hypothesis, Term
 from pamrs.errors import DiagnosisError, ParameterError, SimulationError
 from pamrs.experiments import Experiment, experiments_of, protocol_of
 from pamrs.findings import Curves, NextExperiment, PairExperiment, RankedExperiment
@@ -69,7 +69,8 @@ _HOPELESS_SHARE = 0.1  # share of the uncertainty below which the text suggests 
 
 
 Array = NDArray[np.float64]
-Hypothesis = tuple[str, Rig, float]
+Modelled = tuple[str, Rig, float]
+"""A hypothesis with a model: its text, the rig and its probability."""
 
 
 def entropy(probabilities: Sequence[float]) -> float:
@@ -171,8 +172,8 @@ def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
     """The blocks in which hypotheses differ: those where an effect acts that not all of them have;
     all where none does.
     """
-    sets = [{term_in(effect) for effect in rig.effects} for rig in rigs]
-    shared: set[str] = set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set()
+    sets = [set(map(Term.of, rig.effects)) for rig in rigs]
+    shared: set[Term] = set.intersection(*sets) if len({frozenset(s) for s in sets}) > 1 else set()
     disputed = set.union(*sets) - shared
     blocks = [b for b in problem.blocks if any(acts_in(effect, b) for effect in disputed)]
     return replace(problem, blocks=blocks or problem.blocks)
@@ -180,7 +181,7 @@ def _telling(problem: Problem, rigs: Sequence[Rig]) -> Problem:
 
 def outcome_of(
     experiment: Experiment,
-    hypotheses: Sequence[Hypothesis],
+    hypotheses: Sequence[Modelled],
     noise: Mapping[str, float],
     channels: tuple[str, ...],
     settings: DiagnosisSettings,
@@ -279,7 +280,7 @@ def ranked(outcomes: Sequence[Outcome], probabilities: Sequence[float]) -> list[
 
 def propose(
     nominal: Rig,
-    hypotheses: Sequence[Hypothesis],
+    hypotheses: Sequence[Modelled],
     noise: Mapping[str, float] | None = None,
     recordings: Sequence[Recording | Prepared] = (),
     *,
@@ -402,7 +403,7 @@ def propose(
     )
 
 
-def _simulated(experiment: Experiment, hypotheses: Sequence[Hypothesis]) -> list[Simulation] | None:
+def _simulated(experiment: Experiment, hypotheses: Sequence[Modelled]) -> list[Simulation] | None:
     """An experiment with every hypothesis; None where one of them cannot be run there."""
     try:
         return two_at_a_time(experiment.simulate, [rig for _, rig, _ in hypotheses])
@@ -431,11 +432,11 @@ def _largest(outcome: Outcome, i: int, j: int) -> tuple[str, float]:
 
 def _nested(one: Rig, other: Rig) -> bool:
     """Whether the one model has every effect of the other."""
-    first, second = ({term_in(entry) for entry in rig.effects} for rig in (one, other))
+    first, second = (set(map(Term.of, rig.effects)) for rig in (one, other))
     return first <= second or second <= first
 
 
-def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Hypothesis]) -> list[PairExperiment]:
+def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Modelled]) -> list[PairExperiment]:
     """For every two hypotheses the experiment that tells most of these two, by what is there."""
     there = [o for o in outcomes if not (o.experiment.needs or o.sensor)] or list(outcomes)
     found = []
@@ -448,7 +449,7 @@ def _pairs(outcomes: Sequence[Outcome], hypotheses: Sequence[Hypothesis]) -> lis
         (one, first, _), (other, second, _) = hypotheses[i], hypotheses[j]
         _, size = apart(outcome, i, j, nested=_nested(first, second))
         text = (
-            f"{_told(outcome)}. If it is {spoken(one)}, a model with "
+            f"{_instruction(outcome)}. If it is {spoken(one)}, a model with "
             f"{spoken(other)} then misses the {_missed(outcome, i, j)}; the other way round it "
             f"misses the {_missed(outcome, j, i)}."
         )
@@ -462,7 +463,7 @@ def _missed(outcome: Outcome, i: int, j: int) -> str:
     return f"{spoken_name(channel)} by {size:.2g} times the noise level"
 
 
-def _told(outcome: Outcome) -> str:
+def _instruction(outcome: Outcome) -> str:
     """What to record, and with which further sensor, in words."""
     text = outcome.experiment.text
     sensor = f", with one more channel: {spoken_name(outcome.sensor)}" if outcome.sensor else ""
@@ -480,7 +481,7 @@ def _with_more(best: Outcome, best_first: Sequence[Outcome]) -> str:
     return f" With {most.experiment.needs}, {most.bits:.2f} bit: {most.experiment.text}."
 
 
-def _checked(hypotheses: Sequence[Hypothesis]) -> list[Hypothesis]:
+def _checked(hypotheses: Sequence[Modelled]) -> list[Modelled]:
     """The hypotheses that count, the most probable first."""
     if not hypotheses:
         raise ParameterError(
@@ -531,26 +532,27 @@ _WITHOUT_NAME = {
     "parameters": "parameters inside their tolerances",
     "unlisted": "something that is not listed",
 }
-"""Hypotheses without a name, in words."""
+"""What is said without a name, in words."""
 
 
 def spoken(label: str) -> str:
-    """A hypothesis in words: names joined by ``+``, ``parameters``, ``none`` or ``unlisted``."""
+    """A hypothesis in words, from its text."""
+    hypothesis = Hypothesis.parse(label)
 
-    def told(part: str) -> str:
-        if is_effect(part):
-            place = f" at {place_of(part)}" if place_of(part) else ""
-            return info_of(part).name + place
-        return _WITHOUT_NAME.get(part, f"another {spoken_name(part)}" if "." in part else part)
+    def name(term: Term) -> str:
+        if term.is_effect:
+            return term.info.name + (f" at {term.at}" if term.at else "")
+        return f"another {spoken_name(term.id)}" if term.is_value else str(term)
 
-    return " with ".join(told(part) for part in label.split("+"))
+    rest = [_WITHOUT_NAME[hypothesis.rest]] if hypothesis.rest else []
+    return " with ".join([*map(name, hypothesis.terms), *rest])
 
 
-def _text(best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float) -> str:
+def _text(best: Outcome, hypotheses: Sequence[Modelled], uncertainty: float) -> str:
     # of the leading pair: what the second one cannot explain of what the first one does
     j = min(range(1, len(hypotheses)), key=lambda k: (-round(hypotheses[k][2], 2), k))
     said = (
-        f"{_told(best)}. If it is {spoken(hypotheses[0][0])}, a model with "
+        f"{_instruction(best)}. If it is {spoken(hypotheses[0][0])}, a model with "
         f"{spoken(hypotheses[j][0])} then misses the {_missed(best, 0, j)}, whatever its "
         f"parameters. The expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of "
         "uncertainty."
@@ -560,7 +562,7 @@ def _text(best: Outcome, hypotheses: Sequence[Hypothesis], uncertainty: float) -
     return said
 
 
-def _curves(best: Outcome, hypotheses: Sequence[Hypothesis]) -> Curves:
+def _curves(best: Outcome, hypotheses: Sequence[Modelled]) -> Curves:
     """The channel that separates most: as each hypothesis predicts it, and what each leaves of the
     leading one's outcome.
     """

@@ -7,7 +7,7 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
-from pamrs.effects import CATALOGUE, find_parameter, id_of, place_of
+from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.errors import ParameterError
 
 __all__ = ["Addition", "Plan", "Sight"]
@@ -164,7 +164,7 @@ class Plan:
         surround.
         """
         return tuple(
-            e for e in CATALOGUE if e not in {id_of(sight.effect) for sight in self.sights}
+            e for e in CATALOGUE if e not in {Term.parse(sight.effect).id for sight in self.sights}
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -183,8 +183,8 @@ class Plan:
             "experiments": self.experiments,
             "effects": [
                 {
-                    "id": id_of(s.effect),
-                    "at": place_of(s.effect) or None,
+                    "id": Term.parse(s.effect).id,
+                    "at": Term.parse(s.effect).at or None,
                     "verdict": s.verdict,
                     "left": number(s.left),
                     "block": s.block or None,

@@ -50,7 +50,7 @@ from pamrs.diagnosis.next_experiment._plan import Addition, Plan, Sight
 from pamrs.diagnosis.next_experiment._words import words
 from pamrs.diagnosis.prepare import Block, available_blocks, begun_alike, binned
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, info_of, term_of
+from pamrs.effects import CATALOGUE, EFFECTS, Term
 from pamrs.errors import DiagnosisError, ParameterError, RigError, SimulationError
 from pamrs.experiments import Experiment, library
 from pamrs.report.text import spoken_name
@@ -288,7 +288,7 @@ def _check_rig(rig: Rig) -> None:
             "pamrs.load_rig(path)"
         )
     # how a sensor lags is known of a rig, what it leaves out is not
-    known = [e["id"] for e in rig.effects if info_of(e["id"]).block != "sensors"]
+    known = [e["id"] for e in rig.effects if EFFECTS[e["id"]].block != "sensors"]
     if known:
         raise DiagnosisError(
             f"rig {rig.name!r}: it already has the effect {known[0]!r}; plan with a rig without "
@@ -338,7 +338,7 @@ def _starts(rig: Rig, blocks: list[Block], most_halvings: int) -> list[Start]:
         if not _applies(rig, effect, blocks):
             continue
         places = places_of(rig, effect, blocks)
-        for term in [term_of(effect, at) for at in places] or [effect]:
+        for term in [Term(effect, at) for at in places] or [Term(effect)]:
             usual = starts_of(term, sealed=rig.model["valve"] is None)
             found += [
                 s
@@ -366,7 +366,7 @@ def _applies(rig: Rig, effect: str, blocks: list[Block]) -> bool:
     """
     if effect in {held["id"] for held in rig.effects}:
         return False
-    return fits(rig, effect) and any(acts_in(effect, block) for block in blocks)
+    return fits(rig, effect) and any(acts_in(Term(effect), block) for block in blocks)
 
 
 def _layers(
@@ -465,7 +465,7 @@ def _picture(
         for (block, name), part in parts.items()
         if block in blocks and name in experiments
     }
-    effects = list(dict.fromkeys(s.effect for s in starts))
+    effects = list(dict.fromkeys(str(s.effect) for s in starts))
     if not used:
         return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
     shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
@@ -490,14 +490,14 @@ def _picture(
     sights: dict[str, Sight] = {}
     best: dict[str, int] = {}
     for effect in effects:
-        own = [k for k, s in enumerate(starts) if s.effect == effect]
+        own = [k for k, s in enumerate(starts) if str(s.effect) == effect]
         index, key = max(
             ((k, key) for k in own for key in sizes),
             key=lambda pair: float(sizes[pair[1]][pair[0]]),
         )
         best[effect] = index
         sights[effect] = _sight(starts[index], float(sizes[key][index]), key, settings)
-    shapes = {e: [k for k, s in enumerate(starts) if s.effect == e] for e in effects}
+    shapes = {e: [k for k, s in enumerate(starts) if str(s.effect) == e] for e in effects}
     cosine, unseparated = {}, set()
     for first, second in itertools.combinations(effects, 2):
         mine, theirs = best[first], best[second]
@@ -520,18 +520,18 @@ def _picture(
 def _sight(start: Start, left: float, key: Key, settings: DiagnosisSettings) -> Sight:
     """How an effect shows from the start that shows most."""
     if left < 1e-6:
-        return Sight(start.effect, 0.0)
+        return Sight(str(start.effect), 0.0)
     marginal = left >= _SUSPECT_FROM
     verdict = "seen" if left >= settings.seen else "marginal" if marginal else "not seen"
     if not start.scalable:
-        return Sight(start.effect, left, *key, verdict=verdict)
+        return Sight(str(start.effect), left, *key, verdict=verdict)
     leading = start.sizes[0]
     typical, size = abs(start.free[leading]), settings.seen / left
     found = start.scaled(size).free[leading]
     # one that its bounds hold shows less than that
     whole = math.isclose(start.scaled(0.999 * size).free[leading], found, rel_tol=1e-9)
     smallest = abs(found) if size < _MOST_MULTIPLE and not whole else math.nan
-    return Sight(start.effect, left, *key, leading, typical, smallest, verdict)
+    return Sight(str(start.effect), left, *key, leading, typical, smallest, verdict)
 
 
 def _addition(kind: str, name: str, text: str, now: _Picture, then: _Picture) -> Addition:

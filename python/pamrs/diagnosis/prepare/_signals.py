@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 
 from pamrs.channels import channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import info_of
+from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
@@ -559,7 +559,7 @@ def warm_chambers(rig: Rig) -> list[str]:
     """Names of the chambers whose gas has a temperature of its own: those with an energy balance,
     and those on which an effect acts that gives them one.
     """
-    warming = [entry.get("at", "") for entry in rig.effects if info_of(entry["id"]).frees_mass]
+    warming = [entry.get("at", "") for entry in rig.effects if EFFECTS[entry["id"]].frees_mass]
     return [
         name
         for name, table in rig.tables("chamber").items()

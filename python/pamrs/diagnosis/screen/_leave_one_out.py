@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Fit, Key, Problem, bin_width, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["left_out"]
+__all__ = ["predicted_by_others"]
 
 # share of a direction that one recording alone tells (leverage, Cook & Weisberg 1982)
 _SOLE_SOURCE = 0.9
@@ -25,7 +25,9 @@ Array = NDArray[np.float64]
 _RIDGE = 1e-9  # keeps a matrix invertible
 
 
-def left_out(problem: Problem, found: Fit, inflation: dict[str, float]) -> dict[Key, Residual]:
+def predicted_by_others(
+    problem: Problem, found: Fit, inflation: dict[str, float]
+) -> dict[Key, Residual]:
     """Residuals of each recording under the fit that the other recordings would have given; of a
     single recording each piece of its time under the fit that the other pieces would have given.
 

@@ -20,9 +20,9 @@ from pamrs._normal import solve_normal
 from pamrs.diagnosis.fit import FIT_BIN_TIME
 from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import exclude
+from pamrs.effects import Term
 
-__all__ = ["inclusion"]
+__all__ = ["inclusion_shares"]
 
 # resamples of the recordings that say how often an effect would be taken: within 4 %
 _RESAMPLES = 200
@@ -33,9 +33,9 @@ _RESAMPLE_TIME = 2.5
 Array = NDArray[np.float64]
 
 
-def inclusion(
+def inclusion_shares(
     screened: Screen, least: float, partner: float, settings: DiagnosisSettings
-) -> dict[str, float]:
+) -> dict[Term, float]:
     """Share of resamples in which forward selection takes an effect.
 
     Parameters
@@ -52,21 +52,21 @@ def inclusion(
 
     Returns
     -------
-    dict of str to float
+    dict of Term to float
         By effect, those that were ever taken.
     """
-    stand = screened.stand
-    if not screened.signatures or stand.rows.size == 0:
+    tangent = screened.tangent
+    if not screened.signatures or tangent.rows.size == 0:
         return {}
     columns = np.column_stack(
-        [stand.rows, stand.jacobian, *(signature for _, _, signature in screened.signatures)]
+        [tangent.rows, tangent.jacobian, *(signature for _, _, signature in screened.signatures)]
     )
     length = round(_RESAMPLE_TIME / FIT_BIN_TIME)
     count = -(-columns.shape[0] // length)
     parts = [columns[k * length : (k + 1) * length] for k in range(count)]
     products = np.array([part.T @ part for part in parts])
     rng = np.random.default_rng(settings.seed)
-    taken: Counter[str] = Counter()
+    taken: Counter[Term] = Counter()
     for weights in rng.multinomial(count, np.full(count, 1.0 / count), _RESAMPLES):
         taken.update(
             _selected(
@@ -76,15 +76,15 @@ def inclusion(
     return {effect: number / _RESAMPLES for effect, number in taken.most_common()}
 
 
-def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[str]:
+def _selected(screened: Screen, products: Array, least: float, partner: float) -> list[Term]:
     """Effects that forward selection takes, from the products of residual, sensitivities and
     signatures with each other.
     """
-    stand = screened.stand
-    first = 1 + stand.moved.size
-    base, prior, pull = list(range(1, first)), stand.free, stand.moved * stand.free
+    tangent = screened.tangent
+    first = 1 + tangent.moved.size
+    base, prior, pull = list(range(1, first)), tangent.free, tangent.moved * tangent.free
     columns = list(range(first, products.shape[0]))
-    chosen: list[str] = []
+    chosen: list[Term] = []
     for threshold in (least, max(least, partner * float(products[0, 0]))):
         normal = products[np.ix_(base, base)] + np.diag(prior)
         normal += 1e-9 * np.diag(np.diag(normal))
@@ -97,9 +97,9 @@ def _selected(screened: Screen, products: Array, least: float, partner: float) -
             for column, (effect, start, _), along, power in zip(
                 columns, screened.signatures, alongs, powers, strict=True
             )
-            if not exclude(effect, chosen)
+            if not effect.excluded_by(chosen)
         ]
-        gain, effect, column = max(gains, default=(0.0, "", 0))
+        gain, effect, column = max(gains, default=(0.0, Term(""), 0))
         if gain <= threshold:
             break
         chosen.append(effect)

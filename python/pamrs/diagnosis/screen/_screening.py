@@ -31,7 +31,7 @@ from pamrs.diagnosis.fit import (
     starts_of,
 )
 from pamrs.diagnosis.prepare import Block, Residual
-from pamrs.effects import EffectParameter, exclude, id_of, info_of, place_of, term_of
+from pamrs.effects import EffectParameter, Term
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
@@ -40,12 +40,12 @@ __all__ = [
     "STRONG_SIZES",
     "Score",
     "Screen",
-    "Stand",
+    "Tangent",
     "best_of_each_kind",
     "best_size",
     "by_effect",
     "screen",
-    "stand_of",
+    "tangent_of",
 ]
 
 _MOST_SIZE = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
@@ -67,7 +67,7 @@ _OPENING_SHARES = (0.6, 3.0)
 
 
 Array = NDArray[np.float64]
-Signature = tuple[str, Start, Array]
+Signature = tuple[Term, Start, Array]
 """Effect, where it starts, and what it does to the stacked residuals there."""
 _Values = tuple[str, str, tuple[tuple[str, float], ...]]
 """Effect, form, and its parameters with their values, SI."""
@@ -79,7 +79,7 @@ class Score:
 
     Attributes
     ----------
-    effect : str
+    effect : Term
         Its id.
     start : Start
         Where it starts.
@@ -91,7 +91,7 @@ class Score:
         Change of the stacked residuals at the start's size.
     """
 
-    effect: str
+    effect: Term
     start: Start
     gain: float
     size: float
@@ -99,7 +99,7 @@ class Score:
 
 
 @dataclass(frozen=True, eq=False)
-class Stand:
+class Tangent:
     """Where a fitted model stands, and what its free parameters could still do.
 
     Attributes
@@ -142,7 +142,7 @@ class Screen:
 
     Attributes
     ----------
-    stand : Stand
+    tangent : Tangent
         The model.
     signatures : list of (effect, start, (n,) array)
         Each effect's, from each of its starts.
@@ -151,24 +151,26 @@ class Screen:
         and no more.
     """
 
-    stand: Stand
+    tangent: Tangent
     signatures: list[Signature]
     strong: bool = False
 
-    def scores(self, stand: Stand | None = None, *, without: tuple[str, ...] = ()) -> list[Score]:
+    def scores(
+        self, tangent: Tangent | None = None, *, without: tuple[Term, ...] = ()
+    ) -> list[Score]:
         """Every start of every effect, the most telling first.
 
         Parameters
         ----------
-        stand : Stand, optional
+        tangent : Tangent, optional
             Another model than the screen's own (a fitted effect).
-        without : tuple of str
+        without : tuple of Term
             Effects to leave out, with those that cannot act beside them.
         """
-        own = self.stand if stand is None else stand
+        own = self.tangent if tangent is None else tangent
         found = []
         for effect, start, signature in self.signatures:
-            if exclude(effect, without):
+            if effect.excluded_by(without):
                 continue
             power = own.power(signature)
             if power < _INVISIBLE:
@@ -192,9 +194,9 @@ def best_size(along: float, power: float, start: Start) -> tuple[float, float]:
     return size, -2.0 * size * along - size**2 * power
 
 
-def by_effect(scores: list[Score]) -> dict[str, list[Score]]:
+def by_effect(scores: list[Score]) -> dict[Term, list[Score]]:
     """Scores of each effect, effects and starts in the order of their gain."""
-    found: dict[str, list[Score]] = {}
+    found: dict[Term, list[Score]] = {}
     for score in scores:
         found.setdefault(score.effect, []).append(score)
     return found
@@ -208,7 +210,7 @@ def best_of_each_kind(scores: list[Score]) -> list[Score]:
     return list(best.values())
 
 
-def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stand:
+def tangent_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Tangent:
     """Stacked residuals of a fit, and what its free parameters can do.
 
     The priors enter as rows of their own, so that a parameter that its tolerance holds cannot
@@ -220,7 +222,7 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     names = [n for n in fitted.values if abs(fitted.held_by_prior.get(n, 0.0)) < walls - 1e-3]
     if jacobian is None or not names:
         none = np.zeros((rows.size, 0))
-        return Stand(rows, rows, none, np.zeros(0), np.zeros(0), none)
+        return Tangent(rows, rows, none, np.zeros(0), np.zeros(0), none)
     scales = np.array([fitted.scales[name] for name in names])
     scaled = jacobian[:, [list(fitted.values).index(name) for name in names]] * scales
     free = np.array([name in fitted.held_by_prior for name in names], dtype=np.float64)
@@ -236,13 +238,13 @@ def stand_of(fitted: Fit, problem: Problem, inflation: dict[str, float]) -> Stan
     basis = (u @ turn) * np.sqrt(np.clip(weights, 0.0, 1.0))
     moved = np.array([fitted.held_by_prior.get(name, 0.0) for name in names])
     pull = u @ (inner @ solve_normal(normal, moved))
-    return Stand(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
+    return Tangent(rows, rows - basis @ (basis.T @ rows) - pull, scaled, moved, free, basis)
 
 
 def screen(
     problem: Problem,
     fitted: Fit,
-    effects: list[str],
+    effects: list[Term],
     inflation: dict[str, float],
     *,
     sealed: bool,
@@ -256,7 +258,7 @@ def screen(
         Blocks and recordings.
     fitted : Fit
         The model.
-    effects : list of str
+    effects : list of Term
         Those to screen, by their ids, with a place where they act at one block of several.
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
@@ -266,14 +268,14 @@ def screen(
         Whether so much is left that a signature at one size tells little of another: each start is
         then looked at in several.
     """
-    looking = _Looking(problem, fitted, inflation, stand_of(fitted, problem, inflation), strong)
+    looking = _Looking(problem, fitted, inflation, tangent_of(fitted, problem, inflation), strong)
     for effect in effects:
-        if not place_of(effect):
+        if not effect.at:
             looking.seen.clear()
         starts = starts_of(effect, sealed=sealed)
         for form in dict.fromkeys(start.form for start in starts):
             looking.at([start for start in starts if start.form == form])
-    return Screen(looking.stand, looking.signatures, strong)
+    return Screen(looking.tangent, looking.signatures, strong)
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +290,7 @@ class _Looking:
         The model.
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
-    stand : Stand
+    tangent : Tangent
         Where the model stands.
     strong : bool
         As in :func:`screen`.
@@ -304,7 +306,7 @@ class _Looking:
     problem: Problem
     fitted: Fit
     inflation: dict[str, float]
-    stand: Stand
+    tangent: Tangent
     strong: bool
     signatures: list[Signature] = field(default_factory=list)
     everywhere: dict[_Values, Start] = field(default_factory=dict)
@@ -313,22 +315,22 @@ class _Looking:
     def at(self, starts: list[Start]) -> None:
         """Add the signatures of one form of an effect, given all its starts."""
         first = starts[0]
-        parameters = info_of(first.effect).form(first.form).parameters
+        parameters = first.effect.info.form(first.form).parameters
         if any(p.scan for p in parameters):
-            for start in _nearest(first, lambda start: self.try_(start, 1), self.signatures):
+            for start in _scan_resonance(first, lambda start: self.try_(start, 1), self.signatures):
                 self.try_(start)
                 self.try_(_as_usual(start, first))
         elif any(p.role == "threshold" for p in parameters):
             before = len(self.signatures)
-            best = _switched(first, self.problem, lambda start: self.try_(start, 1))
+            best = _find_thresholds(first, self.problem, lambda start: self.try_(start, 1))
             self.signatures[before:] = [s for s in self.signatures[before:] if s[1] is best]
         else:
-            for start in _placed(starts, self.problem, self.fitted.rig):
+            for start in _moved_to_action(starts, self.problem, self.fitted.rig):
                 self.try_(start)
 
     def try_(self, start: Start, looks: int | None = None) -> float:
         """Add the signature of a start; what it would bring."""
-        begun = self.everywhere.get(_values(start)) if place_of(start.effect) else None
+        begun = self.everywhere.get(_values(start)) if start.effect.at else None
         tried, best = start if begun is None else begun.moved(start.effect), None
         for _ in range(_MOST_SIGNATURES if looks is None else looks):
             seen = self._look(tried)
@@ -336,7 +338,12 @@ class _Looking:
                 break
             best = seen
             score = seen[1]
-            if score is None or score.gain <= 0.0 or not start.scalable or self._placed(score):
+            if (
+                score is None
+                or score.gain <= 0.0
+                or not start.scalable
+                or self._about_this_size(score)
+            ):
                 break
             # what a stop or a threshold does is not in proportion to its size: it is looked at
             # where it would be
@@ -352,7 +359,7 @@ class _Looking:
         if best is None:
             return -math.inf
         self.signatures.append(best[0])
-        if not place_of(start.effect):
+        if not start.effect.at:
             self.everywhere[_values(start)] = best[0][1]
         return _gain(best)
 
@@ -362,11 +369,11 @@ class _Looking:
         found = self.problem.losses.part(what, lambda: self._changes(start))
         if found is None:
             return None
-        if not place_of(start.effect):
+        if not start.effect.at:
             self.seen[_values(start)] = found
         rows, _ = stacked(self.problem, found, self.inflation)
-        entry = (start.effect, start, rows - self.stand.rows)
-        return entry, next(iter(Screen(self.stand, [entry]).scores()), None)
+        entry = (start.effect, start, rows - self.tangent.rows)
+        return entry, next(iter(Screen(self.tangent, [entry]).scores()), None)
 
     def _changes(self, start: Start) -> dict[Key, Residual] | None:
         """Residuals with an effect at the size of a start; None where that leaves the range in
@@ -384,30 +391,30 @@ class _Looking:
         does what it does where it is everywhere.
         """
         term = start.effect
-        seen = self.seen.get(_values(start), {}) if place_of(term) else {}
+        seen = self.seen.get(_values(start), {}) if term.at else {}
         if not seen:
             return {}
-        others = places_of(self.fitted.rig, id_of(term), self.problem.blocks)
-        rivals = [t for at in others if (t := term_of(id_of(term), at)) != term]
+        others = places_of(self.fitted.rig, term.id, self.problem.blocks)
+        rivals = [t for at in others if (t := Term(term.id, at)) != term]
         own = {b.name for b in self.problem.blocks if not any(acts_in(t, b) for t in rivals)}
         return {key: r for key, r in seen.items() if key[0] in own}
 
-    def _placed(self, score: Score) -> bool:
+    def _about_this_size(self, score: Score) -> bool:
         """Whether a signature says that its effect has about the size at which it was taken."""
         return _REPEAT_BELOW <= abs(score.size) < _MOST_SIZE
 
     def _taken(self, entry: Signature) -> float:
         """What a start takes of the chi-square at its own size."""
         signature = entry[2]
-        along = float(self.stand.left @ signature)
-        return -2.0 * along - self.stand.power(signature)
+        along = float(self.tangent.left @ signature)
+        return -2.0 * along - self.tangent.power(signature)
 
 
 def _values(start: Start) -> _Values:
     """Effect, form and values of a start, wherever it acts."""
     values = start.free | start.held
-    own = tuple(sorted((n.removeprefix(start.effect), v) for n, v in values.items()))
-    return id_of(start.effect), start.form, own
+    own = tuple(sorted((n.removeprefix(str(start.effect)), v) for n, v in values.items()))
+    return start.effect.id, start.form, own
 
 
 def _gain(seen: tuple[Signature, Score | None]) -> float:
@@ -415,7 +422,7 @@ def _gain(seen: tuple[Signature, Score | None]) -> float:
     return -math.inf if seen[1] is None else seen[1].gain
 
 
-def _seen(problem: Problem, channel: str) -> Array | None:
+def _measured(problem: Problem, channel: str) -> Array | None:
     """Everything that was measured of the channels of one kind; None where there is none."""
     seen = [
         p.signals[name][0]
@@ -426,18 +433,18 @@ def _seen(problem: Problem, channel: str) -> Array | None:
     return np.concatenate(seen) if seen else None
 
 
-def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
+def _moved_to_action(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     """Starts moved to where they act: a contact to places that were reached, a restriction to the
     size of what it stands beside.
     """
     effect = starts[0].effect
-    info = info_of(effect)
+    info = effect.info
     parameters = info.form(starts[0].form).parameters
     beside = next((p for p in parameters if p.like), None)
     if beside is not None:
-        return _beside(starts, beside, problem, rig)
+        return _restrictions_like(starts, beside, problem, rig)
     place = next((p for p in parameters if p.role == "place"), None)
-    reached = None if place is None else _seen(problem, place.channel)
+    reached = None if place is None else _measured(problem, place.channel)
     if place is None or reached is None:
         return starts
     sides = [f"{effect}.{side.name}" for side in parameters if side.role == "side"]
@@ -450,7 +457,7 @@ def _placed(starts: list[Start], problem: Problem, rig: Rig) -> list[Start]:
     return [at(start, share) for start in starts for share in _PLACE_SHARES]
 
 
-def _nearest(
+def _scan_resonance(
     start: Start, try_: Callable[[Start], float], signatures: list[Signature]
 ) -> list[Start]:
     """The values that tell most among many: what swings long has to be met within a few percent of
@@ -459,7 +466,7 @@ def _nearest(
     They are tried with more damping than the effect has, which makes the resonance broader than the
     distance between two values.
     """
-    parameters = info_of(start.effect).form(start.form).parameters
+    parameters = start.effect.info.form(start.form).parameters
     scanned = next(p for p in parameters if p.scan)
     assert scanned.scan is not None
     broad = {f"{start.effect}.{p.name}": p.tried for p in parameters if p.tried is not None}
@@ -481,7 +488,7 @@ def _as_usual(start: Start, first: Start) -> Start:
     """A start whose resonance is as broad as it usually is: from a broader one a fit may end beside
     it.
     """
-    parameters = info_of(start.effect).form(start.form).parameters
+    parameters = start.effect.info.form(start.form).parameters
     names = [f"{start.effect}.{p.name}" for p in parameters if p.tried is not None]
     return replace(start, free=start.free | {name: first.free[name] for name in names})
 
@@ -490,7 +497,7 @@ def _as_usual(start: Start, first: Start) -> Start:
 _CONDUCTANCES = ("fill_conductance", "vent_conductance")
 
 
-def _beside(
+def _restrictions_like(
     starts: list[Start], parameter: EffectParameter, problem: Problem, rig: Rig
 ) -> list[Start]:
     """Restrictions in parts of the conductance of the largest opening that they stand beside, where
@@ -517,21 +524,23 @@ def _shows(start: Start, block: Block) -> bool:
     """Whether an effect acts in a block with the choices that a start holds."""
     values = start.free | start.held
     parameters = [
-        p for p in info_of(start.effect).form(start.form).parameters if block.kind in p.needed_in
+        p for p in start.effect.info.form(start.form).parameters if block.kind in p.needed_in
     ]
     return acts_in(start.effect, block) and all(
         values[f"{start.effect}.{p.name}"] for p in parameters
     )
 
 
-def _switched(start: Start, problem: Problem, try_: Callable[[Start], float]) -> Start | None:
+def _find_thresholds(
+    start: Start, problem: Problem, try_: Callable[[Start], float]
+) -> Start | None:
     """The levels of a channel between which something switches: over the range that was seen, then
     closer and closer.
 
     A relay that is asked once a step has no slope in its thresholds, so that no fit can move them.
     """
-    on, off = info_of(start.effect).with_role("threshold")
-    seen = _seen(problem, on.channel)
+    on, off = start.effect.info.with_role("threshold")
+    seen = _measured(problem, on.channel)
     if seen is None:
         return None
     low, high = (float(f(seen)) for f in (np.min, np.max))

@@ -2,29 +2,33 @@
 noise, forms without a name.
 
 Public: `examine` (all of it, for some blocks), `refitted`, `with_autocorrelation` (the baseline
-alone), `misread`, `Reading`, `reading_errors` (other units of channels), `find_closure`,
-`below_noise`, `freed`, `beside_quiet`, `suspected`.
+alone), `find_misread`, `Reading`, `reading_errors` (other units of channels), `find_closure`,
+`find_below_noise`, `free_suspects`, `find_wrong_values`, `suspects_at_wall`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.search._baseline import refitted, with_autocorrelation
-from pamrs.diagnosis.search._below_noise import below_noise
+from pamrs.diagnosis.search._below_noise import find_below_noise
 from pamrs.diagnosis.search._closure import find_closure
 from pamrs.diagnosis.search._hypotheses import examine
-from pamrs.diagnosis.search._readings import Reading, misread, reading_errors
-from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed, suspected
+from pamrs.diagnosis.search._readings import Reading, find_misread, reading_errors
+from pamrs.diagnosis.search._wrong_parameters import (
+    find_wrong_values,
+    free_suspects,
+    suspects_at_wall,
+)
 
 __all__ = [
     "Reading",
-    "below_noise",
-    "beside_quiet",
+    "find_below_noise",
+    "find_wrong_values",
     "examine",
     "find_closure",
-    "freed",
-    "misread",
+    "free_suspects",
+    "find_misread",
     "reading_errors",
     "refitted",
-    "suspected",
+    "suspects_at_wall",
     "with_autocorrelation",
 ]

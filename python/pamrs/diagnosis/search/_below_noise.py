@@ -13,14 +13,14 @@ import numpy as np
 from pamrs.diagnosis.evidence import (
     STANDING_PRICE,
     Attempts,
+    BlockGroup,
     Candidate,
-    Group,
-    capped,
+    capped_probability,
+    lacks_drift,
+    loss_by_values,
     penalty,
     price,
-    stands,
-    unlikely,
-    visited,
+    visited_ranges,
 )
 from pamrs.diagnosis.fit import (
     Fit,
@@ -34,10 +34,11 @@ from pamrs.diagnosis.fit import (
     stacked,
 )
 from pamrs.diagnosis.prepare import Residual
-from pamrs.diagnosis.screen import Screen, Stand, by_effect, inclusion, screen
+from pamrs.diagnosis.screen import Screen, Tangent, by_effect, inclusion_shares, screen
+from pamrs.effects import UNDECIDED, UNLISTED, Term
 from pamrs.errors import SimulationError
 
-__all__ = ["below_noise"]
+__all__ = ["find_below_noise"]
 
 # share of a stated error that a signature has by chance: most had less (decision 111)
 _STATED_SHARE = 0.3
@@ -76,9 +77,9 @@ class Begun:
     back: dict[str, float]
 
 
-def below_noise(
-    trial: Attempts, quiet: Group, acting: list[str], say: Callable[[str], None]
-) -> Group | None:
+def find_below_noise(
+    trial: Attempts, quiet: BlockGroup, acting: list[Term], say: Callable[[str], None]
+) -> BlockGroup | None:
     """An effect that shows although the refitted baseline leaves no more than noise; None where
     there is none.
 
@@ -94,9 +95,9 @@ def below_noise(
     ----------
     trial : Attempts
         Recordings, model, noise levels.
-    quiet : Group
+    quiet : BlockGroup
         The blocks, none of which keeps an excess.
-    acting : list of str
+    acting : list of Term
         Effects that act in them.
     say : callable
         Receives progress.
@@ -110,12 +111,12 @@ def below_noise(
     )
     best = {effect: scores[0] for effect, scores in by_effect(screened.scores()).items()}
     gains = {effect: score.gain for effect, score in best.items()}
-    needed = settings.least_gain_below_noise + _by_chance(trial, screened.stand)
+    needed = settings.least_gain_below_noise + _gain_by_chance(trial, screened.tangent)
     least = max(needed, _RIVAL_SHARE * max(gains.values(), default=0.0))
     chosen = [e for e in sorted(gains, key=lambda e: -gains[e]) if gains[e] > least][:_MOST_FITTED]
     starts = {e: Begun(best[e].start.scaled(best[e].size), {}) for e in chosen}
-    starts = starts or _instead(screened, start.fit, trial, autocorrelation)
-    against = _finest(trial, start.fit, starts, autocorrelation) if starts else None
+    starts = starts or _matching_shifted(screened, start.fit, trial, autocorrelation)
+    against = _fit_baseline_exactly(trial, start.fit, starts, autocorrelation) if starts else None
     if against is None:
         return None
     found = _Found({}, {})
@@ -132,23 +133,23 @@ def below_noise(
         )
         if tried is not None:
             tried = replace(tried, gain=gains.get(effect, 0.0))
-            _weigh(found, tried, begun, against, trial, needed)
+            _add_if_shown(found, tried, begun, against, trial, needed)
     if not found.shown and not found.eased:
         return None
     often = (
-        inclusion(screened, settings.least_gain_below_noise, 1.0, trial.settings)
+        inclusion_shares(screened, settings.least_gain_below_noise, 1.0, trial.settings)
         if found.shown
         else {}
     )
     return replace(_group(found, quiet, starts, trial), inclusion=often)
 
 
-def _by_chance(trial: Attempts, stand: Stand) -> float:
+def _gain_by_chance(trial: Attempts, tangent: Tangent) -> float:
     """Gain in chi-square that a signature has by chance where the rig file states an error of the
     model: a smooth error has a share of any shape.
     """
     stated = max((level.stated for level in trial.noise_level.values()), default=0.0)
-    return _STATED_SHARE * stated * stand.power_left
+    return _STATED_SHARE * stated * tangent.power_left
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,8 +182,8 @@ class _Found:
     eased: dict[Candidate, float]
 
 
-def _finest(
-    trial: Attempts, start: Fit, starts: dict[str, Begun], autocorrelation: dict[str, float]
+def _fit_baseline_exactly(
+    trial: Attempts, start: Fit, starts: dict[Term, Begun], autocorrelation: dict[str, float]
 ) -> _Finest | None:
     """The baseline to the last unit of chi-square and from wherever an effect begins: what it still
     has to gain would count for one.
@@ -208,7 +209,7 @@ def _finest(
     )
 
 
-def _weigh(
+def _add_if_shown(
     found: _Found,
     tried: Candidate,
     begun: Begun,
@@ -227,7 +228,9 @@ def _weigh(
     )
     relief = against.fit.strain - tried.fit.strain
     gain = within + relief
-    odd = STANDING_PRICE * stands(tried, seconds) + unlikely(tried, visited(trial.inner))
+    odd = STANDING_PRICE * lacks_drift(tried, seconds) + loss_by_values(
+        tried, visited_ranges(trial.inner)
+    )
     if odd > _LOG_ODDS:
         return  # it would have to have values that its physics hardly has
     cost = price(tried, trial.settings)
@@ -243,7 +246,9 @@ def _weigh(
         )
 
 
-def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempts) -> Group:
+def _group(
+    found: _Found, quiet: BlockGroup, starts: dict[Term, Begun], trial: Attempts
+) -> BlockGroup:
     """The quiet group with what was found in it, and its probabilities."""
     shown = bool(found.shown)
     seconds = max(p.n * p.dt for p in trial.inner.recordings)
@@ -257,12 +262,14 @@ def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempt
     }
     total = sum(weights.values()) + (0.0 if shown else 1.0)
     probabilities = {
-        c.effects[0]: w / total * capped(_LOG_ODDS - penalty(c, seconds), _MOST_PROBABILITY)
+        c.hypothesis: w
+        / total
+        * capped_probability(_LOG_ODDS - penalty(c, seconds), _MOST_PROBABILITY)
         for c, w in weights.items()
     }
     if not shown:
-        probabilities[""] = _MOST_PROBABILITY / total
-    probabilities["unlisted"] = 1.0 - sum(probabilities.values())
+        probabilities[UNDECIDED] = _MOST_PROBABILITY / total
+    probabilities[UNLISTED] = 1.0 - sum(probabilities.values())
     acts = [b for b in quiet.blocks if acts_in(top.effects[0], b)]
     mismatch = max(acts, key=lambda b: quiet.baseline[b.name].ratio - top.fitted[b.name].ratio)
     return replace(
@@ -276,13 +283,13 @@ def _group(found: _Found, quiet: Group, starts: dict[str, Begun], trial: Attempt
     )
 
 
-def _instead(
+def _matching_shifted(
     screened: Screen, found: Fit, trial: Attempts, autocorrelation: dict[str, float]
-) -> dict[str, Begun]:
+) -> dict[Term, Begun]:
     """Effects that do what a parameter was moved far for."""
     known = known_parameters(trial.nominal)
     _, jacobian = stacked(trial.inner, found.residuals, autocorrelation)
-    best: dict[str, tuple[float, Begun]] = {}
+    best: dict[Term, tuple[float, Begun]] = {}
     for name, moved in found.moved.items():
         if abs(moved) < _MOVED_TOLERANCES or jacobian is None:
             continue

@@ -22,7 +22,15 @@ from pamrs.diagnosis.evidence import autocorrelation_of
 from pamrs.diagnosis.fit import Fit, Key, Problem, fit, residuals, stacked, with_priors
 from pamrs.diagnosis.noise import NoiseLevel, correlation_time
 from pamrs.diagnosis.prepare import Block
-from pamrs.effects import CLOSURE_OF, EFFECTS, MEMORY_OF, TERMS, Term
+from pamrs.effects import (
+    CLOSURE_OF,
+    CLOSURE_TERMS,
+    EFFECTS,
+    MEMORY_OF,
+    ClosureTerm,
+    Term,
+    effect_of,
+)
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 
@@ -46,7 +54,7 @@ class _Candidate:
     """One term of one closure, with the shape of its memory."""
 
     closure: str
-    term: Term
+    term: ClosureTerm
     shape: float | None
 
     @property
@@ -129,8 +137,8 @@ def find_closure(
     """
     if baseline.effects:
         raise DiagnosisError(
-            f"baseline.effects = {', '.join(baseline.effects)} is not allowed: a closure needs the "
-            "fit without effects"
+            f"baseline.effects = {', '.join(map(str, baseline.effects))} is not allowed: a closure "
+            "needs the fit without effects"
         )
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
@@ -212,7 +220,7 @@ def _at_zero(
         for closure, shapes in tried.items():
             here = {name: values[min(k, len(values) - 1)] for name, values in shapes.items()}
             rig = rig.with_effect(closure, here)
-            for term in TERMS[closure]:
+            for term in CLOSURE_TERMS[closure]:
                 shape = MEMORY_OF.get(term.kind)
                 if shape is not None or k == 0:
                     now.append(_Candidate(closure, term, here[shape] if shape else None))
@@ -234,7 +242,7 @@ def _again(
     """
     rig = found.rig
     for closure in closures.values():
-        if closure not in found.effects:
+        if Term(closure) not in found.effects:
             rig = rig.with_effect(closure)
     shapes = {e["id"]: e["parameters"] for e in rig.effects}
     candidates = [
@@ -242,7 +250,7 @@ def _again(
             closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None
         )
         for closure in closures.values()
-        for term in TERMS[closure]
+        for term in CLOSURE_TERMS[closure]
     ]
     names = list(baseline.values)
     evaluated = residuals(problem, rig, [*names, *(c.name for c in candidates)])
@@ -355,10 +363,9 @@ def _better(
     least = models[int(np.argmin(misfits))]
     frame = _Frame.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
-    terms = [sum(1 for name in model.values if name.partition(".")[0] in TERMS) for model in models]
     worth = [
-        -samples * math.log(m) - k * _price(samples, among)
-        for m, k in zip(misfits, terms, strict=True)
+        -samples * math.log(misfit) - len(model.effect_values) * _price(samples, among)
+        for misfit, model in zip(misfits, models, strict=True)
     ]
     best = int(np.argmax(worth))
     most = _MOST_MISFIT_SHARE * misfits[0]
@@ -582,14 +589,8 @@ def _fitted(
     """The chosen terms and the shapes of their memories in the nonlinear model; None where it
     cannot be run.
     """
-    effects = tuple(dict.fromkeys(name.partition(".")[0] for name in chosen.values))
-    every = {
-        name: parameter
-        for effect in effects
-        for name, parameter in zip(
-            EFFECTS[effect].dotted(), EFFECTS[effect].parameters, strict=True
-        )
-    }
+    effects = tuple(dict.fromkeys(filter(None, map(effect_of, chosen.values))))
+    every = {f"{e}.{p.name}": p for e in effects for p in e.info.parameters}
     held = {
         n: 0.0 if p.neutral == 0.0 else p.default
         for n, p in every.items()

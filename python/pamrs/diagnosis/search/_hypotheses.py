@@ -15,17 +15,16 @@ from threadpoolctl import threadpool_limits
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     Attempts,
+    BlockGroup,
     Candidate,
-    Group,
-    Ranges,
-    doubted,
+    Weighing,
     explains,
-    log_weight,
+    misses_only_held_out,
     probability_cap,
     same_recordings,
     share_left,
     significant,
-    visited,
+    visited_ranges,
     weigh,
     without_autocorrelation,
 )
@@ -35,7 +34,7 @@ from pamrs.diagnosis.fit import (
     Problem,
     Start,
     acts_in,
-    depends,
+    concerns,
     fits,
     form_in,
     predicted_with_doubt,
@@ -50,39 +49,39 @@ from pamrs.diagnosis.screen import (
     Screen,
     best_of_each_kind,
     by_effect,
-    inclusion,
-    left_out,
+    inclusion_shares,
+    predicted_by_others,
     screen,
 )
 from pamrs.diagnosis.search._baseline import refitted, thorough, with_autocorrelation
-from pamrs.diagnosis.search._below_noise import below_noise
+from pamrs.diagnosis.search._below_noise import find_below_noise
 from pamrs.diagnosis.search._closure import find_closure
-from pamrs.diagnosis.search._considered import considered
+from pamrs.diagnosis.search._considered import fit_considered
 from pamrs.diagnosis.search._sets import (
     LEAST_GAIN,
     MOST_PAIRED,
     MOST_STARTS,
     NEAR_PLACE,
     PARTNER_SHARE,
-    Weight,
-    beside_wrong,
+    Search,
+    cannot_gain,
+    combine,
     far_above_noise,
     in_best_forms,
-    left_everywhere,
-    no_room_beside,
+    log_misfit,
     settles,
-    several,
+    with_freed_values,
     without_needless,
 )
-from pamrs.diagnosis.search._wrong_parameters import beside_quiet, freed
+from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects
 from pamrs.effects import (
     CATALOGUE,
     EFFECTS,
+    UNDECIDED,
+    UNLISTED,
+    Hypothesis,
     SameData,
-    exclude,
-    id_of,
-    info_of,
-    place_of,
+    Term,
 )
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -118,7 +117,7 @@ Say = Callable[[str], None]
 
 def examine(
     fitted: Problem, held: Problem, nominal: Rig, parts: list[list[Block]], say: Say
-) -> list[Group]:
+) -> list[BlockGroup]:
     """Refit the baseline of some blocks, locate what is left, and try every effect that acts there.
 
     Each part is examined by itself, all at the same time; then what one names is tried in the
@@ -140,25 +139,25 @@ def examine(
 
     Returns
     -------
-    list of Group
+    list of BlockGroup
         Without the blocks of a part whose judgement failed, which the losses of `fitted` tell.
     """
     losses, through = fitted.losses, (SimulationError,)
 
-    def begin(blocks: list[Block]) -> _Mismatch | Group | None:
+    def begin(blocks: list[Block]) -> _Mismatch | BlockGroup | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
-        work = partial(_begun_with, fitted, held, nominal, blocks, say)
+        work = partial(_begin_part, fitted, held, nominal, blocks, say)
         return losses.part(what, work, through=through)
 
-    def end(part: _Mismatch | Group | None) -> list[Group]:
-        if part is None or isinstance(part, Group):
+    def end(part: _Mismatch | BlockGroup | None) -> list[BlockGroup]:
+        if part is None or isinstance(part, BlockGroup):
             return [part] if part else []
         others = [p for p in begun if isinstance(p, _Mismatch) and p is not part]
         starts = [start for p in others for start in p.leading]
         names = " and ".join(b.name for b in part.refit.trial.inner.blocks)
         beside = losses.part(
             f"what other blocks name, tried in {names},",
-            lambda: part.beside(starts),
+            lambda: part.with_effects_of_others(starts),
             part,
             through=through,
         )
@@ -176,9 +175,9 @@ def examine(
             raise
 
 
-def _begun_with(
+def _begin_part(
     fitted: Problem, held: Problem, nominal: Rig, blocks: list[Block], say: Say
-) -> _Mismatch | Group:
+) -> _Mismatch | BlockGroup:
     """Some blocks examined by themselves: a mismatch with its hypotheses, or, where they keep only
     noise, the group that they are.
     """
@@ -192,13 +191,13 @@ def _begun_with(
     refit = _refit(inner, outer, nominal, same=held is fitted)
     kept = refit.start.fitted
     if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
-        common = _together(refit.trial, refit.start)
+        common = _fit_all_recordings(refit.trial, refit.start)
         if common is not None:
             tell("one baseline leaves noise in all recordings")
-            return _healthy(refit, common)
+            return _healthy_group(refit, common)
     if not refit.trial.suspects:
-        return _quiet(refit, say, tell)
-    return _explained(refit, tell)
+        return _search_in_noise(refit, say, tell)
+    return _explain(refit, tell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,12 +228,15 @@ class _Refit:
     apart: list[Block]
 
     def group(
-        self, candidates: list[Candidate], probabilities: dict[str, float], mismatch: Block | None
-    ) -> Group:
+        self,
+        candidates: list[Candidate],
+        probabilities: dict[Hypothesis, float],
+        mismatch: Block | None,
+    ) -> BlockGroup:
         """The blocks as a group, with hypotheses and their probabilities."""
         trial = self.trial
         blocks, kept = trial.inner.blocks, candidates[0].fitted
-        return Group(
+        return BlockGroup(
             blocks,
             self.was,
             kept,
@@ -261,7 +263,11 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
         return {b.name: excess(b, problem.recordings, found, noise_level, settings) for b in blocks}
 
     was, now = kept(inner, before), kept(inner, baseline.residuals)
-    outside = left_out(inner, baseline, autocorrelation) if same else residuals(outer, baseline.rig)
+    outside = (
+        predicted_by_others(inner, baseline, autocorrelation)
+        if same
+        else residuals(outer, baseline.rig)
+    )
     out = kept(outer, outside)
     # what parameters could not be told from the fitted recordings shows in the others alone, and is
     # no mismatch
@@ -276,7 +282,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
         ]
 
     apart = held_out_alone(out)
-    if doubted(now, out, same=same):
+    if misses_only_held_out(now, out, same=same):
         out = kept(outer, predicted_with_doubt(outer, baseline))
     there = held_out_alone(out)
     suspects = [b for b in blocks if significant(now[b.name]) or b in there]
@@ -284,7 +290,7 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     return _Refit(trial, first, autocorrelation, was, Candidate((), baseline, out, now, 0.0), apart)
 
 
-def _healthy(refit: _Refit, common: Candidate) -> Group:
+def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
     """A group whose baseline leaves noise in all recordings, once it is fitted to all of them."""
     trial = refit.trial
     # what the nominal model leaves in the held-out ones is what the parameters are moved for
@@ -293,10 +299,10 @@ def _healthy(refit: _Refit, common: Candidate) -> Group:
         b.name: max(refit.was[b.name], trial.excess(b, trial.outer, quiet), key=lambda e: e.ratio)
         for b in trial.inner.blocks
     }
-    return replace(refit.group([common], {"": 1.0}, None), nominal=ever, suspects=[])
+    return replace(refit.group([common], {UNDECIDED: 1.0}, None), nominal=ever, suspects=[])
 
 
-def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
+def _acting_effects(trial: Attempts, blocks: list[Block]) -> list[Term]:
     """Effects of the catalogue that the rig can have, that it does not hold already and that act in
     some blocks: everywhere, and at each place that the blocks tell apart.
     """
@@ -305,25 +311,27 @@ def _acting(trial: Attempts, blocks: list[Block]) -> list[str]:
     return [term for term in terms if any(acts_in(term, b) for b in blocks)]
 
 
-def _quiet(refit: _Refit, say: Say, tell: Say) -> Group:
+def _search_in_noise(refit: _Refit, say: Say, tell: Say) -> BlockGroup:
     """A group that keeps only noise: an effect below it, or a parameter at the end of its plausible
     range, may still show.
     """
-    nothing = refit.group([refit.start], {"": 1.0}, None)
+    nothing = refit.group([refit.start], {UNDECIDED: 1.0}, None)
     blocks = refit.trial.inner.blocks
     # the rounding of a coarse converter does not average out as noise does
     coarse = {name for p in refit.trial.inner.recordings for name in p.steps}
     fine = [b for b in blocks if coarse.isdisjoint((b.channel, *b.drives))]
-    persistent = [e for e in _acting(refit.trial, fine) if info_of(e).lasting]
+    persistent = [e for e in _acting_effects(refit.trial, fine) if e.info.lasting]
     trial = replace(refit.trial, suspects=blocks)
     part = trial.inner.losses.part
-    below = part("the search below the noise", lambda: below_noise(trial, nothing, persistent, say))
+    below = part(
+        "the search below the noise", lambda: find_below_noise(trial, nothing, persistent, say)
+    )
     quiet = below or nothing
     what = "the search for a value at the end of its range"
-    return part(what, lambda: beside_quiet(trial, quiet, tell), quiet)
+    return part(what, lambda: find_wrong_values(trial, quiet, tell), quiet)
 
 
-def _explained(refit: _Refit, tell: Say) -> _Mismatch:
+def _explain(refit: _Refit, tell: Say) -> _Mismatch:
     """A mismatch with every hypothesis that was tried for it."""
     trial, start = refit.trial, refit.start
     suspects, now = trial.suspects, start.fitted
@@ -332,30 +340,34 @@ def _explained(refit: _Refit, tell: Say) -> _Mismatch:
         f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} "
         "noise levels"
     )
-    marginal = _marginal(refit)
-    acting = _acting(trial, suspects)
+    marginal = _is_marginal(refit)
+    acting = _acting_effects(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
-    happens = [e for e in acting if e in EFFECTS and EFFECTS[e].transient and not EFFECTS[e].own]
+    happens = [e for e in acting if not e.at and e.info.transient and not e.info.own]
     transient = [] if marginal else happens
     # gauges do not drift together
-    own = [e for e in acting if info_of(e).own and (place_of(e) or len(trial.terms_of(e)) == 1)]
-    persistent = [e for e in acting if info_of(e).lasting]
+    own = [e for e in acting if e.info.own and (e.at or len(trial.terms_of(e.id)) == 1)]
+    persistent = [e for e in acting if e.info.lasting]
     part = trial.inner.losses.part
     mistaken = part(
-        "the search for wrong values", lambda: freed(trial, start.fit, refit.first, tell), []
+        "the search for wrong values",
+        lambda: free_suspects(trial, start.fit, refit.first, tell),
+        [],
     )
     sealed = trial.nominal.model["valve"] is None
     # by the noise of the sensors, whatever error of the model the rig file states
     strong = far_above_noise(trial, start)
     screened = screen(trial.inner, start.fit, persistent, trial.white, sealed=sealed, strong=strong)
-    terms = _Terms(
+    weighing = Weighing(
         probability_cap(trial.inner, mismatch, now[mismatch.name].rms, alone=trial.same and sealed),
         max(p.n * p.dt for p in trial.inner.recordings),
-        visited(trial.inner),
+        trial.settings,
+        visited_ranges(trial.inner),
     )
-    candidates = _hypotheses(refit, screened, mistaken, (own, transient), terms, tell)
-    candidates, weighed = _weighed(trial, screened, candidates, terms, tell)
-    return _Mismatch(refit, mismatch, screened, terms, marginal, candidates, weighed, tell)
+    search = Search(trial, screened, start, weighing, tell)
+    candidates = _fit_hypotheses(search, mistaken, own, transient)
+    candidates, weighed = _weigh_to_the_end(search, candidates)
+    return _Mismatch(refit, mismatch, search, marginal, candidates, weighed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -368,42 +380,36 @@ class _Mismatch:
         The refit of their parameters.
     block : Block
         The one that keeps most.
-    screened : Screen
-        Signatures of the effects.
-    terms : _Terms
-        What hypotheses are weighed by.
+    search : Search
+        What hypotheses were found with, and are weighed by.
     marginal : bool
         Whether so little is left that the noise level may as well have been estimated too low.
     candidates : list of Candidate
         The baseline first, then every hypothesis.
-    weighed : dict of str to float
+    weighed : dict of Hypothesis to float
         Their probabilities.
-    tell : callable
-        Receives progress.
     """
 
     refit: _Refit
     block: Block
-    screened: Screen
-    terms: _Terms
+    search: Search
     marginal: bool
     candidates: list[Candidate]
-    weighed: dict[str, float]
-    tell: Say
+    weighed: dict[Hypothesis, float]
 
     @property
     def leading(self) -> list[Start]:
         """The lasting effects of the hypothesis that leads, as they were fitted; none where nothing
         is as probable as what has no name.
         """
-        trial, named = self.refit.trial, [c for c in self.candidates if c.names]
-        best = max(named, key=lambda c: _odds(self.weighed, c), default=None)
-        if best is None or _odds(self.weighed, best) <= self.weighed.get("unlisted", 0.0):
+        trial, named = self.refit.trial, [c for c in self.candidates if c.terms]
+        best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
+        if best is None or _probability(self.weighed, best) <= self.weighed.get(UNLISTED, 0.0):
             return []
         lasting = best.fit.events is None
-        return [trial.start_of(best.fit, e) for e in best.effects] if lasting else []
+        return trial.starts_of(best) if lasting else []
 
-    def beside(self, starts: list[Start]) -> _Mismatch:
+    def with_effects_of_others(self, starts: list[Start]) -> _Mismatch:
         """The same with what other blocks name tried here, where it acts: alone, and beside what
         leads here.
         """
@@ -411,72 +417,54 @@ class _Mismatch:
         acting = [s for s in starts if any(acts_in(s.effect, b) for b in trial.suspects)]
         if not acting:
             return self
-        self.tell("trying " + ", ".join(s.effect for s in acting) + ", which other blocks have")
+        self.search.tell(
+            f"trying {', '.join(str(s.effect) for s in acting)}, which other blocks have"
+        )
         named = [c for c in self.candidates if c.effects and c.fit.events is None]
-        best = max(named, key=lambda c: _odds(self.weighed, c), default=None)
+        best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         found: list[Candidate] = []
         for one in acting:
             alone = trial.fitted([one], start.fit, trial.white)
-            if alone is None or not _told(alone, one):
+            if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
             found.append(alone)
-            if best is not None and not exclude(one.effect, best.effects):
-                own = [trial.start_of(best.fit, e) for e in best.effects]
-                both = trial.together([*own, one], best.fit, best.wrong)
+            if best is not None and not one.effect.excluded_by(best.effects):
+                both = trial.together([*trial.starts_of(best), one], best.fit, best.wrong)
                 found += [] if both is None else [both]
-        candidates = _one_of_each([*self.candidates, *found])
-        candidates, weighed = _weighed(trial, self.screened, candidates, self.terms, self.tell)
+        candidates = _best_of_each([*self.candidates, *found])
+        candidates, weighed = _weigh_to_the_end(self.search, candidates)
         return replace(self, candidates=candidates, weighed=weighed)
 
-    def groups(self, say: Say) -> list[Group]:
+    def groups(self, say: Say) -> list[BlockGroup]:
         """The blocks as one group, or in parts where names explain parts of them."""
         refit, weighed = self.refit, dict(self.weighed)
         if self.marginal:
-            unlisted = weighed["unlisted"]
-            weighed |= {
-                "": _MARGINAL_PROBABILITY * unlisted,
-                "unlisted": (1.0 - _MARGINAL_PROBABILITY) * unlisted,
-            }
+            unlisted = weighed[UNLISTED]
+            weighed[UNDECIDED] = _MARGINAL_PROBABILITY * unlisted
+            weighed[UNLISTED] = (1.0 - _MARGINAL_PROBABILITY) * unlisted
         now = refit.start.fitted[self.block.name]
         part = refit.trial.inner.losses.part
-        shares: dict[str, float] = {}
+        shares: dict[Term, float] = {}
         resampled = partial(
-            inclusion, self.screened, LEAST_GAIN, PARTNER_SHARE, refit.trial.settings
+            inclusion_shares, self.search.screened, LEAST_GAIN, PARTNER_SHARE, refit.trial.settings
         )
         group = replace(
             refit.group(self.candidates, weighed, self.block),
             inclusion=part("the screen of resampled recordings", resampled, shares),
-            predicted_gain=_predicted_gain(self.screened, now, _MARGINAL_EXCESS),
+            predicted_gain=_predicted_gain(self.search.screened, now, _MARGINAL_EXCESS),
         )
-        if weighed["unlisted"] > _SPLIT_FROM:
+        if weighed[UNLISTED] > _SPLIT_FROM:
             what = "the division of the blocks by their names"
-            parts = part(what, lambda: _apart(group, refit.trial, self.terms), [])
+            parts = part(
+                what, lambda: _split_by_names(group, refit.trial, self.search.weighing), []
+            )
             if parts:
                 return parts
         what = "the search for a form of what is missing"
-        return [part(what, lambda: _with_form(group, refit, say, self.tell), group)]
+        return [part(what, lambda: _add_form(group, refit, say, self.search.tell), group)]
 
 
-@dataclass(frozen=True)
-class _Terms:
-    """What hypotheses are weighed by.
-
-    Attributes
-    ----------
-    most : float
-        Largest probability of a name.
-    seconds : float
-        Length of the longest recording that was fitted [s].
-    ranging : dict
-        What was visited in them, by kind of channel [SI].
-    """
-
-    most: float
-    seconds: float
-    ranging: Ranges
-
-
-def _marginal(refit: _Refit) -> bool:
+def _is_marginal(refit: _Refit) -> bool:
     """Whether so little is left that the noise level may as well have been estimated too low."""
     found = (refit.start.fitted, refit.trial.out)
     return all(
@@ -486,65 +474,54 @@ def _marginal(refit: _Refit) -> bool:
     )
 
 
-def _one_of_each(candidates: list[Candidate]) -> list[Candidate]:
+def _best_of_each(candidates: list[Candidate]) -> list[Candidate]:
     """Of hypotheses of the same names, in whatever order, lasting or of events, the one that leaves
     least.
     """
-    best: dict[frozenset[str], Candidate] = {}
-    for candidate in sorted(candidates, key=left_everywhere):
-        best.setdefault(frozenset(candidate.names), candidate)
-    return [c for c in candidates if c is best[frozenset(c.names)]]
+    best: dict[Hypothesis, Candidate] = {}
+    for candidate in sorted(candidates, key=log_misfit):
+        best.setdefault(candidate.hypothesis, candidate)
+    return [c for c in candidates if c is best[c.hypothesis]]
 
 
-def _hypotheses(
-    refit: _Refit,
-    screened: Screen,
-    mistaken: list[Candidate],
-    happening: tuple[list[str], list[str]],
-    terms: _Terms,
-    tell: Say,
+def _fit_hypotheses(
+    search: Search, mistaken: list[Candidate], own: list[Term], transient: list[Term]
 ) -> list[Candidate]:
     """The baseline, single effects, pairs where no single one explains the mismatch, and values
-    that are wrong. ``happening`` are effects with sizes, and with times, of their own in each
-    recording.
+    that are wrong. ``own`` and ``transient`` are effects with sizes, and with times, of their own
+    in each recording.
     """
-    (own, transient), trial, start = happening, refit.trial, refit.start
-
-    alone = partial(
-        log_weight,
-        baseline=start,
-        suspects=trial.compared,
-        seconds=terms.seconds,
-        ranging=terms.ranging,
-        settings=trial.settings,
-    )
-    singles = _singles(trial, screened, start.fit, alone, tell)
+    trial, start, alone = search.trial, search.start, search.weight
+    singles = _fit_singles(search)
     part = trial.inner.losses.part
     what = "the effects that are the same data as others"
-    singles = part(what, lambda: _with_same_data(trial, start, singles, terms.seconds), singles)
+    singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += [c for e in own if (c := trial.transient(e, start)) is not None]
     value = max(mistaken, key=alone, default=None)
-    leads = value is not None and all(alone(c) <= alone(value) for c in singles)
-    weight = partial(alone, value=value if leads else None)
-    if transient and not any(no_room_beside(c, trial, start) for c in (*singles, *mistaken)):
-        tell(f"looking for what happens at times of its own ({', '.join(transient)})")
+    if value is not None and all(alone(c) <= alone(value) for c in singles):
+        search = replace(search, value=value)
+    if transient and not any(cannot_gain(c, trial, start) for c in (*singles, *mistaken)):
+        search.tell(
+            f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
+        )
         singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
-        singles = _one_of_each(singles)
+        singles = _best_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
-        lasting = sorted((c for c in singles if c.fit.events is None), key=left_everywhere)
+        lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
 
         def more() -> list[Candidate]:
-            near = _alike(lasting, alone, trial)
-            return [s for c in near for s in beside_wrong(trial, c, tell)]
+            near = _nearly_as_heavy(lasting, alone)
+            return [s for c in near for s in with_freed_values(search, c)]
     else:
-        more = partial(several, trial, screened, start, singles, mistaken, transient, weight, tell)
+        more = partial(combine, search, singles, mistaken, transient)
     sets = part("the search for sets of names", more, [])
-    what = "what was asked for"
-    asked = part(what, lambda: considered(trial, screened, start, weight, tell), [])
-    return [start, *_one_of_each([*singles, *sets, *mistaken, *asked])]
+    asked = part("what was asked for", lambda: fit_considered(search), [])
+    return [start, *_best_of_each([*singles, *sets, *mistaken, *asked])]
 
 
-def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Candidate]:
+def _nearly_as_heavy(
+    lasting: list[Candidate], weight: Callable[[Candidate], float]
+) -> list[Candidate]:
     """Of lasting effects, those that leave least first, the first one and the heaviest of the
     others, unless it weighs far less: a value that is wrong beside one may be so beside all.
     """
@@ -554,65 +531,65 @@ def _alike(lasting: list[Candidate], weight: Weight, trial: Attempts) -> list[Ca
     return [*lasting[:1], *near[: max(MOST_PAIRED - 1, 0)]]
 
 
-def _told(candidate: Candidate, start: Start) -> bool:
+def _is_visible(candidate: Candidate, start: Start) -> bool:
     """Whether recordings depend on any parameter of an effect that was fitted."""
     return any(math.isfinite(candidate.fit.std[name]) for name in start.free)
 
 
-def _weighed(
-    trial: Attempts, screened: Screen, candidates: list[Candidate], terms: _Terms, tell: Say
-) -> tuple[list[Candidate], dict[str, float]]:
+def _weigh_to_the_end(
+    search: Search, candidates: list[Candidate]
+) -> tuple[list[Candidate], dict[Hypothesis, float]]:
     """Hypotheses with their probabilities, those that are close fitted to the end first, each
     effect in its best form.
     """
-    start, settings = candidates[0], trial.settings
+    start, trial, settings = candidates[0], search.trial, search.trial.settings
 
-    def weights(sets: list[Candidate]) -> dict[str, float]:
-        return weigh(sets, trial.compared, terms.most, terms.seconds, settings, terms.ranging)
+    def weights(sets: list[Candidate]) -> dict[Hypothesis, float]:
+        return weigh(sets, trial.compared, search.weighing)
 
     found = weights(candidates)
-    likely = [c for c in candidates[1:] if _odds(found, c) > _POLISH_FROM]
-    close = sorted(likely, key=lambda c: -_odds(found, c))[: settings.most_polished]
+    likely = [c for c in candidates[1:] if _probability(found, c) > _POLISH_FROM]
+    close = sorted(likely, key=lambda c: -_probability(found, c))[: settings.most_polished]
     if len(close) > 1 or (close and not explains(close[0], start, trial.compared)):
-        tell("fitting to the end " + ", ".join(c.key for c in close))
+        search.tell("fitting to the end " + ", ".join(str(c.hypothesis) for c in close))
 
         def best(candidate: Candidate) -> Candidate:
-            what = f"the search for the best form of {candidate.key}"
-            work = partial(in_best_forms, trial, screened, candidate, tell)
+            what = f"the search for the best form of {candidate.hypothesis}"
+            work = partial(in_best_forms, search, candidate)
             return trial.polished(trial.inner.losses.part(what, work, candidate))
 
         ended = [best(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
         candidates = [c for c in ended if c.is_wrong(settings.most_tolerances)]
         found = weights(candidates)
-        sets = [c for c in candidates if _odds(found, c) > _POLISH_FROM]
+        sets = [c for c in candidates if _probability(found, c) > _POLISH_FROM]
         parts = trial.inner.losses.part(
             "the search for terms that are not needed",
-            lambda: without_needless(trial, candidates, sets, tell),
+            lambda: without_needless(search, candidates, sets),
             [],
         )
         if parts:
-            kept = {frozenset(c.names) for c in parts}
-            candidates = [*(c for c in candidates if frozenset(c.names) not in kept), *parts]
+            kept = {c.hypothesis for c in parts}
+            candidates = [*(c for c in candidates if c.hypothesis not in kept), *parts]
             found = weights(candidates)
     return candidates, found
 
 
-def _predicted_gain(screened: Screen, kept: Excess, least: float) -> dict[str, float]:
+def _predicted_gain(screened: Screen, kept: Excess, least: float) -> dict[Term, float]:
     """Share of the mismatch that each effect could take by its signature alone."""
     # of the chi-square that is left noise has its part
-    missing = screened.stand.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
+    missing = screened.tangent.power_left * (1.0 - 1.0 / max(kept.ratio, 1.0 + least))
     return {e: scores[0].gain / missing for e, scores in by_effect(screened.scores()).items()}
 
 
-def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
+def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGroup:
     """A group with a form of what is missing, where no name is likely and one is found that carries
     over.
     """
     trial, start = refit.trial, refit.start
     # what is missing in a chamber is missing in the temperature of its gas too
     suspects = [b for b in trial.suspects if "chamber" not in b.beside] or trial.suspects
-    if group.probabilities["unlisted"] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
+    if group.probabilities[UNLISTED] < _FROM_PROBABILITY or len({b.kind for b in suspects}) < len(
         suspects
     ):
         return group  # of two chambers one form would have to serve both
@@ -644,39 +621,37 @@ def _with_form(group: Group, refit: _Refit, say: Say, tell: Say) -> Group:
     return replace(group, closure=judged)
 
 
-def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
+def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> list[BlockGroup]:
     """A group in parts, where a name explains a block in which alone it acts; else nothing.
 
     A leak of the tank is seen in the tank's pressure, whatever the chamber behind the valve keeps
     without a name, or with one of its own. All parts have one fit, with everything that they name.
     """
     start = group.candidates[0]
-    settings = trial.settings
     acting = {
-        c: [b for b in group.suspects if any(depends(b, name) for name in c.names)]
+        c: [b for b in group.suspects if any(concerns(term, b) for term in c.terms)]
         for c in group.candidates
-        if c.names
+        if c.terms
     }
 
-    def weighed(blocks: list[Block]) -> dict[str, float]:
+    def weighed(blocks: list[Block]) -> dict[Hypothesis, float]:
         there = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh(
-            [start, *there], blocks, terms.most, terms.seconds, settings, terms.ranging, acting
-        )
+        return weigh([start, *there], blocks, weighing, acting)
 
     own = {
         b.name: weighed([b])
         for b in group.suspects
         if any(found == [b] for found in acting.values())
     }
-    named = [
-        b for b in group.suspects if own.get(b.name, {"unlisted": 1.0})["unlisted"] < _SPLIT_FROM
-    ]
+    named = [b for b in group.suspects if own.get(b.name, {UNLISTED: 1.0})[UNLISTED] < _SPLIT_FROM]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
     best = [
-        max((c for c in acting if c.key in own[b.name]), key=lambda c: own[b.name][c.key])
+        max(
+            (c for c in acting if c.hypothesis in own[b.name]),
+            key=partial(_probability, own[b.name]),
+        )
         for b in named
     ]
     common = best[0].fit if len(best) == 1 else trial.united(best)
@@ -684,7 +659,9 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
         return []
     start = replace(start, fit=common)
 
-    def part(blocks: list[Block], suspects: list[Block], probabilities: dict[str, float]) -> Group:
+    def part(
+        blocks: list[Block], suspects: list[Block], probabilities: dict[Hypothesis, float]
+    ) -> BlockGroup:
         return replace(
             group,
             blocks=blocks,
@@ -693,7 +670,7 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
                 *(
                     replace(c, fit=common) if c in best else c
                     for c in acting
-                    if c.key in probabilities
+                    if c.hypothesis in probabilities
                 ),
             ],
             probabilities=probabilities,
@@ -716,12 +693,12 @@ def _apart(group: Group, trial: Attempts, terms: _Terms) -> list[Group]:
     return [replace(parts[0], blocks=[*named[:1], *others]), *parts[1:]]
 
 
-def _odds(weighed: dict[str, float], candidate: Candidate) -> float:
+def _probability(weighed: dict[Hypothesis, float], candidate: Candidate) -> float:
     """Probability of a hypothesis."""
-    return weighed.get(candidate.key, 0.0)
+    return weighed.get(candidate.hypothesis, 0.0)
 
 
-def _together(trial: Attempts, start: Candidate) -> Candidate | None:
+def _fit_all_recordings(trial: Attempts, start: Candidate) -> Candidate | None:
     """One baseline inside its tolerances that leaves only noise in fitted and held-out recordings,
     taken together, if there is one.
     """
@@ -740,10 +717,9 @@ def _together(trial: Attempts, start: Candidate) -> Candidate | None:
     return Candidate((), found, held, fitted, 0.0)
 
 
-def _singles(
-    trial: Attempts, screened: Screen, baseline: Fit, weight: Weight, tell: Say
-) -> list[Candidate]:
+def _fit_singles(search: Search) -> list[Candidate]:
     """The effects that the screen finds worth it, fitted; the most telling first."""
+    trial, screened, baseline = search.trial, search.screened, search.start.fit
     settings = trial.settings
     ranked = by_effect(screened.scores())
     gains = {effect: scores[0].gain for effect, scores in ranked.items()}
@@ -751,16 +727,11 @@ def _singles(
     # signatures of strong effects rule none out
     least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
     worth = _by_family([e for e, gain in gains.items() if screened.strong or gain > least])
-    tell(
-        "screened: "
-        + (
-            ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
-            or "no effect acts here"
-        )
-    )
+    first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
+    search.tell(f"screened: {first or 'no effect acts here'}")
 
     if screened.strong:
-        chosen, near, short = _shortlisted(trial, worth, ranked, baseline, weight)
+        chosen, near, short = _shortlist(search, worth, ranked)
     else:
         chosen, near, short = [], {}, {}
         for rank, places in enumerate(worth[: settings.most_singles]):
@@ -769,20 +740,26 @@ def _singles(
             # of the leading effects another place may yet be the one that leaves least
             for effect in close if leads else places[:1]:
                 chosen.append(effect)
-                near[effect] = _begun(_near(ranked[effect]) if leads else ranked[effect][:1])
+                near[effect] = _scaled_starts(
+                    _near_starts(ranked[effect]) if leads else ranked[effect][:1]
+                )
     found = []
     for effect in chosen:
         tried = two_at_a_time(
-            lambda start: _ended(trial, start, baseline, short.get((start.effect, start.form))),
+            lambda start: _fit_effect(
+                trial, start, baseline, short.get((start.effect, start.form))
+            ),
             near[effect],
         )
         fitted = [candidate for candidate in tried if candidate is not None]
         if fitted:
-            found.append(replace(_usual_form(fitted, FORM_SHARE_ALIKE), gain=gains[effect]))
+            found.append(
+                replace(_first_of_equal_forms(fitted, FORM_SHARE_ALIKE), gain=gains[effect])
+            )
     return found
 
 
-def _ended(
+def _fit_effect(
     trial: Attempts, start: Start, baseline: Fit, short: Candidate | None
 ) -> Candidate | None:
     """An effect fitted from a start beside the baseline; where that leaves more than a few steps to
@@ -796,18 +773,14 @@ def _ended(
     return min(both, key=lambda c: c.misfit, default=None)
 
 
-def _begun(scores: Iterable[Score]) -> list[Start]:
+def _scaled_starts(scores: Iterable[Score]) -> list[Start]:
     """Where fits begin: starts in the size in which they take most."""
     return [s.start.scaled(s.size) for s in scores]
 
 
-def _shortlisted(
-    trial: Attempts,
-    worth: list[list[str]],
-    ranked: dict[str, list[Score]],
-    baseline: Fit,
-    weight: Weight,
-) -> tuple[list[str], dict[str, list[Start]], dict[tuple[str, str], Candidate]]:
+def _shortlist(
+    search: Search, worth: list[list[Term]], ranked: dict[Term, list[Score]]
+) -> tuple[list[Term], dict[Term, list[Start]], dict[tuple[Term, str], Candidate]]:
     """Of many effects (each a list of its places) those that leave least after a few steps, where
     the best of these steps led, and what they came to, by effect and form.
 
@@ -815,10 +788,11 @@ def _shortlisted(
     effect is not. Each form of each effect gets a few steps from its best start, and the effects
     that then lead from all their others.
     """
+    trial, weight, baseline = search.trial, search.weight, search.start.fit
     settings = trial.settings
-    short: dict[str, list[Candidate]] = {}
+    short: dict[Term, list[Candidate]] = {}
 
-    def begin(starts: dict[str, list[Start]]) -> None:
+    def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, own in starts.items() for start in own]
         tried = two_at_a_time(lambda one: trial.fitted_shortly([one[1]], baseline), tasks)
         for effect in starts:
@@ -826,20 +800,24 @@ def _shortlisted(
             known = [*short.get(effect, []), *(c for c in own if c is not None)]
             short[effect] = sorted(known, key=weight, reverse=True)
 
-    def most(effect: str) -> float:
+    def most(effect: Term) -> float:
         return weight(short[effect][0]) if short.get(effect) else -math.inf
 
     best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
-    begin({effect: _begun(best) for effect, best in best_of.items()})
+    begin({effect: _scaled_starts(best) for effect, best in best_of.items()})
     first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
-        {p[0]: _begun(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
-        | {e: _begun(ranked[e]) for places in first[:_EFFECTS_WITH_STARTS] for e in places[1:]}
+        {p[0]: _scaled_starts(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
+        | {
+            e: _scaled_starts(ranked[e])
+            for places in first[:_EFFECTS_WITH_STARTS]
+            for e in places[1:]
+        }
     )
     first.sort(key=lambda places: -most(places[0]))
-    best: list[str] = []
-    starts: dict[str, list[Start]] = {}
-    ends: dict[tuple[str, str], Candidate] = {}
+    best: list[Term] = []
+    starts: dict[Term, list[Start]] = {}
+    ends: dict[tuple[Term, str], Candidate] = {}
     for rank, places in enumerate(first):
         leads = rank < _EFFECTS_WITH_STARTS
         tried = [e for e in places[: None if leads else 1] if most(e) > -math.inf]
@@ -855,26 +833,26 @@ def _shortlisted(
     return best, starts, ends
 
 
-def _by_family(terms: list[str]) -> list[list[str]]:
+def _by_family(terms: list[Term]) -> list[list[Term]]:
     """The places of each effect, in the order in which they come."""
-    found: dict[str, list[str]] = {}
+    found: dict[str, list[Term]] = {}
     for term in terms:
-        found.setdefault(id_of(term), []).append(term)
+        found.setdefault(term.id, []).append(term)
     return list(found.values())
 
 
-def _usual_form(fitted: list[Candidate], alike: float) -> Candidate:
+def _first_of_equal_forms(fitted: list[Candidate], alike: float) -> Candidate:
     """Of one effect's fits the one that leaves least; of forms that leave as little, the one that
     the catalogue lists first, which is the usual one.
     """
-    least = min(left_everywhere(c) for c in fitted)
-    near = [c for c in fitted if left_everywhere(c) <= least + alike]
+    least = min(log_misfit(c) for c in fitted)
+    near = [c for c in fitted if log_misfit(c) <= least + alike]
     (effect,) = near[0].effects
-    order = ["", *(form.name for form in info_of(effect).forms[1:])]
-    return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), left_everywhere(c)))
+    order = ["", *(form.name for form in effect.info.forms[1:])]
+    return min(near, key=lambda c: (order.index(form_in(c.fit.rig, effect)), log_misfit(c)))
 
 
-def _near(scores: list[Score]) -> list[Score]:
+def _near_starts(scores: list[Score]) -> list[Score]:
     """The starts of an effect that are fitted: the best of each form (and choice in it) that comes
     near, and further ones of the best.
 
@@ -888,22 +866,17 @@ def _near(scores: list[Score]) -> list[Score]:
     return [*near[:MOST_STARTS], *(s for s in forms if s not in near)]
 
 
-def _with_same_data(
-    trial: Attempts, start: Candidate, singles: list[Candidate], seconds: float
-) -> list[Candidate]:
+def _add_same_data(search: Search, singles: list[Candidate]) -> list[Candidate]:
     """The singles, and beside each that may be the same data as another effect (a late clock and a
     dead time) that other one.
     """
-
-    def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.compared)
-
+    trial, start, left_by = search.trial, search.start, search.share_left
     there = {c.effects: c for c in singles}
 
-    def wanted(effect: str, own: Candidate) -> bool:
+    def wanted(effect: Term, own: Candidate) -> bool:
         """Whether an effect was not fitted, or only in a form that leaves more than its equal."""
         fitted = there.get((effect,))
-        return fits(trial.nominal, effect) and (
+        return fits(trial.nominal, effect.id) and (
             fitted is None or left_by(fitted) > left_by(own) + FORM_SHARE_ALIKE
         )
 
@@ -912,31 +885,32 @@ def _with_same_data(
     for single in singles:
         (effect,) = single.effects
         same = same_data_in(trial.nominal, effect)
-        own = single if same is None else _in_shape(trial, start, single, same)
+        own = single if same is None else _in_shape(search, single, same)
         found.append(own)
-        if same is not None and same_recordings(own, effect, seconds):
-            others += [_as_other(trial, start, own, same)] if wanted(same.effect, own) else []
-        twins = ((twin, same_data_in(trial.nominal, twin)) for twin in CATALOGUE)
+        if same is not None and same_recordings(own, effect, search.weighing.seconds):
+            others += [_as_other(trial, start, own, same)] if wanted(Term(same.effect), own) else []
+        twins = ((twin, same_data_in(trial.nominal, twin)) for twin in map(Term, CATALOGUE))
         others += [
             _as_twin(trial, start, own, twin, same)
             for twin, same in twins
-            if same is not None and same.effect == effect and wanted(twin, own)
+            if same is not None and Term(same.effect) == effect and wanted(twin, own)
         ]
-    return _one_of_each([*found, *(c for c in others if c is not None)])
+    return _best_of_each([*found, *(c for c in others if c is not None)])
 
 
-def _in_shape(trial: Attempts, start: Candidate, single: Candidate, same: SameData) -> Candidate:
+def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
     """An effect in the shape in which it is the same data as another one, where it explains as much
     in it.
     """
+    trial = search.trial
     own = trial.start_of(single.fit, single.effects[0])
     held = {f"{own.effect}.{name}": value for name, value in same.held}
     if all(own.held[name] == value for name, value in held.items()):
         return single
-    alike = trial.fitted([replace(own, held=own.held | held)], start.fit, trial.white)
+    alike = trial.fitted([replace(own, held=own.held | held)], search.start.fit, trial.white)
     if alike is None:
         return single
-    shaped, free = (share_left(c, start, trial.compared) for c in (alike, single))
+    shaped, free = map(search.share_left, (alike, single))
     return single if shaped > free + FORM_SHARE_ALIKE else replace(alike, gain=single.gain)
 
 
@@ -948,12 +922,12 @@ def _as_other(
     usual = {f"{same.effect}.{p.name}": p.default for p in own}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
     return trial.fitted(
-        [Start(same.effect, usual, {}, (), False, same.form)], start.fit, trial.white
+        [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.white
     )
 
 
 def _as_twin(
-    trial: Attempts, start: Candidate, single: Candidate, twin: str, same: SameData
+    trial: Attempts, start: Candidate, single: Candidate, twin: Term, same: SameData
 ) -> Candidate | None:
     """The effect that leaves the same recordings as this one, where this one has a size."""
     size = single.fit.values.get(f"{same.effect}.{same.parameter}", 0.0)

@@ -40,7 +40,7 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 from pamrs.units import measured_from, parse_unit
 
-__all__ = ["Reading", "misread", "reading_errors"]
+__all__ = ["Reading", "find_misread", "reading_errors"]
 
 # [variances of the noise] from which units are doubted: a wrong one leaves hundreds, drives two
 _SUSPECT = 3.0
@@ -155,7 +155,7 @@ class Reading:
         return replace(problem, recordings=[self.of(p) for p in problem.recordings])
 
 
-def misread(problem: Problem, nominal: Rig) -> Reading | None:
+def find_misread(problem: Problem, nominal: Rig) -> Reading | None:
     """The way to read channels that explains what the model misses, where there is one.
 
     Parameters
@@ -174,7 +174,7 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
     every = list(_readings(problem, nominal))
     settings = problem.settings
     small = [r for r in every if not r.offset and r.size < _SMALL_STEP]
-    large = _promising(problem, nominal, [r for r in every if r not in small])
+    large = _worth_a_fit(problem, nominal, [r for r in every if r not in small])
     # what is no more than a gauge's slope may be off by tells nothing
     small = [r for r in small if r.size >= _STDS * settings.gauge_error]
     if not (small or large):
@@ -183,14 +183,14 @@ def misread(problem: Problem, nominal: Rig) -> Reading | None:
         was = refitted(problem, nominal, _white(problem))
     except SimulationError:
         return None
-    found = [_fitted(problem, nominal, was, reading) for reading in large]
+    found = [_fit_reading(problem, nominal, was, reading) for reading in large]
     if _power(problem, was) <= _SUSPECT:
-        found += [_told_by_gain(problem, nominal, was, reading) for reading in small]
+        found += [_fit_gain(problem, nominal, was, reading) for reading in small]
     believed = [r for r in found if r is not None and r.fit is not None]
     return min(believed, key=lambda r: r.fit.cost if r.fit else math.inf, default=None)
 
 
-def _promising(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
+def _worth_a_fit(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> list[Reading]:
     """Those that take most of what one step of the parameters leaves, where that is much."""
     names = free_baseline(problem, nominal)
     left = _linear(problem, nominal, names)
@@ -207,7 +207,7 @@ def _promising(problem: Problem, nominal: Rig, readings: Sequence[Reading]) -> l
     return worth[:_FITTED]
 
 
-def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
+def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
     """A reading with its fit, where the recordings ask for it."""
     own = reading.read(problem)
     try:
@@ -220,7 +220,7 @@ def _fitted(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Readi
     return replace(reading, before=before, after=after, fit=now, was=was)
 
 
-def _told_by_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
+def _fit_gain(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> Reading | None:
     """A reading by a factor of a few per cent, where the recordings ask for it.
 
     Parameters inside their tolerances take up most of what it misses, and what it takes is less

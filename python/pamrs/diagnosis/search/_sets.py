@@ -5,7 +5,7 @@ together.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,8 +14,10 @@ from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     Attempts,
     Candidate,
+    Weighing,
     explains,
-    room_beside,
+    log_weight,
+    possible_gain,
     share_left,
     significant,
 )
@@ -24,24 +26,24 @@ from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import (
     Score,
     Screen,
-    Stand,
+    Tangent,
     best_of_each_kind,
     by_effect,
-    stand_of,
+    tangent_of,
 )
-from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, strained_parameters
-from pamrs.effects import exclude, id_of
+from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
+from pamrs.effects import Hypothesis, Term
 
 __all__ = [
     "Say",
-    "Weight",
-    "beside_wrong",
+    "Search",
+    "with_freed_values",
     "far_above_noise",
     "in_best_forms",
-    "left_everywhere",
-    "no_room_beside",
+    "log_misfit",
+    "cannot_gain",
     "settles",
-    "several",
+    "combine",
     "without_needless",
 ]
 
@@ -64,19 +66,58 @@ _MUCH_LEFT = 0.5  # share of a mismatch from which an effect leaves most of it (
 
 
 Say = Callable[[str], None]
-Weight = Callable[[Candidate], float]
-"""Logarithm of what a hypothesis weighs beside others."""
 
 
-def several(
-    trial: Attempts,
-    screened: Screen,
-    start: Candidate,
-    singles: list[Candidate],
-    mistaken: list[Candidate],
-    transient: list[str],
-    weight: Weight,
-    tell: Say,
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What hypotheses for a mismatch are found with.
+
+    Attributes
+    ----------
+    trial : Attempts
+        Recordings, model, noise levels.
+    screened : Screen
+        Signatures of the effects.
+    start : Candidate
+        The refitted baseline.
+    weighing : Weighing
+        What they are weighed by.
+    tell : callable
+        Receives progress.
+    value : Candidate, optional
+        The most probable wrong value alone, where none of the effects alone weighs more.
+    """
+
+    trial: Attempts
+    screened: Screen
+    start: Candidate
+    weighing: Weighing
+    tell: Say
+    value: Candidate | None = None
+
+    def weight(self, candidate: Candidate) -> float:
+        """Logarithm of what a hypothesis weighs against others."""
+        compared = self.trial.compared
+        return log_weight(candidate, self.start, compared, self.weighing, self.value)
+
+    def share_left(self, candidate: Candidate) -> float:
+        """Share of the mismatch that a hypothesis leaves."""
+        return share_left(candidate, self.start, self.trial.compared)
+
+    def heaviest_first(self, candidates: Iterable[Candidate]) -> list[Candidate]:
+        """Hypotheses in the order of their weight."""
+        return sorted(candidates, key=self.weight, reverse=True)
+
+    def rank(self, base: Candidate) -> tuple[Tangent, dict[Term, list[Score]]]:
+        """The tangent space of a set, and the starts of each effect by what they would take of what
+        the set leaves.
+        """
+        tangent = tangent_of(base.fit, self.trial.inner, self.trial.white)
+        return tangent, by_effect(self.screened.scores(tangent, without=base.effects))
+
+
+def combine(
+    search: Search, singles: list[Candidate], mistaken: list[Candidate], transient: list[Term]
 ) -> list[Candidate]:
     """Sets of two hypotheses and more, where no single one settles the mismatch.
 
@@ -86,46 +127,35 @@ def several(
 
     Parameters
     ----------
-    trial : Attempts
-        Recordings, model, noise levels.
-    screened : Screen
-        Signatures of the effects.
-    start : Candidate
-        The refitted baseline.
+    search : Search
+        What they are found with.
     singles, mistaken : list of Candidate
         Single effects and values that are wrong, fitted by themselves.
-    transient : list of str
+    transient : list of Term
         Effects that happen at times of their own.
-    weight : callable
-        What a hypothesis weighs.
-    tell : callable
-        Receives progress.
 
     Returns
     -------
     list of Candidate
     """
-    roots = sorted(
-        (c for c in (*singles, *mistaken) if c.fit.events is None), key=weight, reverse=True
-    )
-    growing = _Growing(trial, screened, start, roots, weight, tell)
-    sets = [s for root in roots[:MOST_PAIRED] for s in growing.widened(root)]
+    roots = search.heaviest_first(c for c in (*singles, *mistaken) if c.fit.events is None)
+    growing = _Growing(search, roots)
+    sets = [s for root in roots[:MOST_PAIRED] for s in growing.widen(root)]
     happening = []
-    for effect, beside in _beside(trial, screened, start, singles, transient, weight):
-        tell(f"looking for {effect} with {beside.effects[0]}")
-        found = trial.transient(effect, beside)
+    for effect, beside in _event_partners(search, singles, transient):
+        search.tell(f"looking for {effect} with {beside.effects[0]}")
+        found = search.trial.transient(effect, beside)
         happening += [] if found is None else [found]
-    return [*sets, *happening, *growing.grown(sets)]
+    return [*sets, *happening, *growing.grow(sets)]
 
 
-def beside_wrong(trial: Attempts, single: Candidate, tell: Say) -> list[Candidate]:
+def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
     """An effect beside a file that is wrong: parameters that it moves far, freed one at a time."""
-    (effect,) = single.effects
-    begun = [trial.start_of(single.fit, effect)]
     found = []
-    for name in strained_parameters(trial, single.fit):
-        tell(f"trying {effect} with another {name}")
-        beside = trial.together(begun, single.fit, (name,))
+    for name in far_parameters(search.trial, single.fit):
+        search.tell(f"trying {single.hypothesis} with another {name}")
+        begun = search.trial.starts_of(single)
+        beside = search.trial.together(begun, single.fit, (name,))
         found += [] if beside is None else [beside]
     return found
 
@@ -136,20 +166,22 @@ class _Partner:
 
     Attributes
     ----------
-    names : tuple of str
-        Its name, an effect or a parameter that is wrong; two where one mistake makes two wrong.
     starts : list of Start
-        Where its effect begins.
+        Where its effects begin.
     wrong : tuple of str
-        Those of the names that are parameters.
+        Parameters that are wrong; two where one mistake makes two wrong.
     values : dict of str to float
         Where these begin, SI.
     """
 
-    names: tuple[str, ...]
     starts: list[Start]
     wrong: tuple[str, ...] = ()
     values: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """What the set gets."""
+        return (*(start.effect for start in self.starts), *map(Term, self.wrong))
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,43 +190,37 @@ class _Growing:
 
     Attributes
     ----------
-    trial : Attempts
-        Recordings, model, noise levels.
-    screened : Screen
-        Signatures of the effects.
-    start : Candidate
-        The refitted baseline.
+    search : Search
+        What they are found with.
     roots : list of Candidate
         Single effects and values that are wrong, fitted by themselves, those that weigh most first.
-    weight : callable
-        What a hypothesis weighs.
-    tell : callable
-        Receives progress.
-    done : set
-        Names of the sets that were fitted.
+    done : set of Hypothesis
+        Those that were fitted.
     likely : list of _Partner
         What leaves least beside the single hypothesis that weighs most, which the others get too.
     """
 
-    trial: Attempts
-    screened: Screen
-    start: Candidate
+    search: Search
     roots: list[Candidate]
-    weight: Weight
-    tell: Say
-    done: set[frozenset[str]] = field(default_factory=set)
+    done: set[Hypothesis] = field(default_factory=set)
     likely: list[_Partner] = field(default_factory=list)
 
-    def grown(self, sets: list[Candidate]) -> list[Candidate]:
+    @property
+    def trial(self) -> Attempts:
+        """Recordings, model, noise levels."""
+        return self.search.trial
+
+    def grow(self, sets: list[Candidate]) -> list[Candidate]:
         """The best set with one term after the other."""
-        best = max(sets, key=self.weight, default=None)
+        weight = self.search.weight
+        best = max(sets, key=weight, default=None)
         found: list[Candidate] = []
-        while best is not None and len(best.names) < self.trial.settings.most_terms:
+        while best is not None and len(best.terms) < self.trial.settings.most_terms:
             formed = self._in_best_forms(best, [*sets, *found])
             found += formed
-            best = max(formed, key=self.weight)
-            tried = self.widened(best)
-            further = max(tried, key=self.weight, default=None)
+            best = max(formed, key=weight)
+            tried = self.widen(best)
+            further = max(tried, key=weight, default=None)
             if further is None or not _predicts_better(further, best, self.trial):
                 break
             found += tried
@@ -206,13 +232,14 @@ class _Growing:
         which of them leaves least must not depend on whose forms were looked at.
         """
         trial = self.trial
-        best = in_best_forms(trial, self.screened, base, self.tell)
+        best = in_best_forms(self.search, base)
         before, after = (
             {e: trial.start_of(c.fit, e).kind for e in base.effects} for c in (base, best)
         )
         mended = {e for e in base.effects if before[e] != after[e]}
-        rivals = [c for c in others if mended & set(c.effects) and c.fit.events is None]
-        rivals.sort(key=self.weight, reverse=True)
+        rivals = self.search.heaviest_first(
+            c for c in others if mended & set(c.effects) and c.fit.events is None
+        )
 
         def formed(rival: Candidate) -> Candidate | None:
             starts = [
@@ -223,14 +250,14 @@ class _Growing:
         tried = two_at_a_time(formed, rivals[: trial.settings.most_polished])
         return [best, *(c for c in tried if c is not None)]
 
-    def widened(self, base: Candidate) -> list[Candidate]:
-        """A set with each of its likely partners, fitted from where both stand."""
-        begun = [self.trial.start_of(base.fit, effect) for effect in base.effects]
+    def widen(self, base: Candidate) -> list[Candidate]:
+        """A set with each of its likely partners, fitted from where both tangent."""
+        begun = self.trial.starts_of(base)
         partners = []
         for partner in self._partners(base, begun):
-            if not self._was_tried(base, partner.names):
-                self.done.add(frozenset({*base.names, *partner.names}))
-                self.tell(f"trying {' + '.join([*base.names, *partner.names])}")
+            if not self._was_tried(base, partner.terms):
+                self.done.add(Hypothesis((*base.terms, *partner.terms)))
+                self.search.tell(f"trying {Hypothesis((*base.terms, *partner.terms))}")
                 partners.append(partner)
 
         def fitted(partner: _Partner) -> Candidate | None:
@@ -240,54 +267,47 @@ class _Growing:
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
-    def _was_tried(self, base: Candidate, names: tuple[str, ...]) -> bool:
-        """Whether a set was fitted with some more names."""
-        return frozenset({*base.names, *names}) in self.done
+    def _was_tried(self, base: Candidate, terms: tuple[Term, ...]) -> bool:
+        """Whether a set was fitted with some more terms."""
+        return Hypothesis((*base.terms, *terms)) in self.done
 
     def _partners(self, base: Candidate, begun: list[Start]) -> Iterator[_Partner]:
         """What may be missing beside a set: effects whose signature is in what it leaves, what
         tells by itself, and parameters that it moves far.
         """
         if far_above_noise(self.trial, base):
-            alone = len(base.names) == 1
+            alone = len(base.terms) == 1
             found = (alone and self.likely) or self._shortlisted(base, begun)
             if alone:
                 self.likely[:] = found
             for partner in found:
-                if not any(exclude(name, base.effects) for name in partner.names):
+                if not any(term.excluded_by(base.effects) for term in partner.terms):
                     yield partner
         else:
             for scores in self._signatures(base):
                 if not self._was_tried(base, (scores[0].effect,)):
                     yield self._begun_best(base, begun, scores)
         yield from self._telling(base)
-        strained = strained_parameters(self.trial, base.fit) if base.effects else []
-        yield from (_Partner((name,), [], (name,)) for name in strained if name not in base.wrong)
+        strained = far_parameters(self.trial, base.fit) if base.effects else []
+        yield from (_Partner([], (name,)) for name in strained if name not in base.wrong)
 
     def _shortlisted(self, base: Candidate, begun: list[Start]) -> list[_Partner]:
         """The effects that leave least beside a set after a few steps, of all that act.
 
         Signatures are linear in what a strong mismatch is not: they rank the starts of a form.
         """
-        _, ranked = self._ranked(base)
+        _, ranked = self.search.rank(base)
         starts = [
             score.start.scaled(score.size)
             for effect in _one_place_each(list(ranked))
             if not self._was_tried(base, (effect,))
             for score in best_of_each_kind(ranked[effect])
         ]
-        best: dict[str, _Partner] = {}
+        best: dict[Term, _Partner] = {}
         for found, start in self._shortly(base, begun, starts):
             own = self.trial.start_of(found.fit, start.effect)
-            best.setdefault(start.effect, _Partner((start.effect,), [own]))
+            best.setdefault(start.effect, _Partner([own]))
         return list(best.values())[:_MOST_PARTNERS]
-
-    def _ranked(self, base: Candidate) -> tuple[Stand, dict[str, list[Score]]]:
-        """Where a set stands, and the starts of each effect by what they would take of what it
-        leaves.
-        """
-        stand = stand_of(base.fit, self.trial.inner, self.trial.white)
-        return stand, by_effect(self.screened.scores(stand, without=base.effects))
 
     def _shortly(
         self, base: Candidate, begun: list[Start], starts: list[Start]
@@ -301,26 +321,26 @@ class _Growing:
 
         tried = zip(two_at_a_time(begin, starts), starts, strict=True)
         found = [(c, start) for c, start in tried if c is not None]
-        return sorted(found, key=lambda one: self.weight(one[0]), reverse=True)
+        return sorted(found, key=lambda one: self.search.weight(one[0]), reverse=True)
 
     def _begun_best(self, base: Candidate, begun: list[Start], scores: list[Score]) -> _Partner:
         """An effect beside a set, from the start that leaves least after a few steps."""
         starts = [s.start.scaled(s.size) for s in scores[:MOST_STARTS]]
         short = self._shortly(base, begun, starts if len(starts) > 1 else [])
-        return _Partner((scores[0].effect,), [short[0][1] if short else starts[0]])
+        return _Partner([short[0][1] if short else starts[0]])
 
     def _signatures(self, base: Candidate) -> list[list[Score]]:
         """The effects that would take most of what a set leaves, each from all its starts."""
         trial = self.trial
-        stand, ranked = self._ranked(base)
-        alone = len(base.names) == 1
+        tangent, ranked = self.search.rank(base)
+        alone = len(base.terms) == 1
         # what a term leaves is a mismatch of its own, however large what it takes is
-        least = max(LEAST_GAIN, PARTNER_SHARE * stand.power_left)
+        least = max(LEAST_GAIN, PARTNER_SHARE * tangent.power_left)
         likely = [e for e, scores in ranked.items() if scores[0].gain > least]
         best = _one_place_each(likely)[:_MOST_PARTNERS]
         # what is left in one block may be little beside what another one had: an effect of that
         # block alone is tested by itself
-        for block in _untouched(base, self.start, trial) if alone else []:
+        for block in _blocks_untouched(base, self.search.start, trial) if alone else []:
             there = [
                 effect
                 for effect, scores in ranked.items()
@@ -336,19 +356,17 @@ class _Growing:
         The signature of a strong effect beside another one is linear in what is not; where both
         were fitted, both are known.
         """
-        trial = self.trial
         telling = [
             c
             for c in self.roots
-            if share_left(c, self.start, trial.compared) < _TELLING_LEFT
-            and not set(c.names) & set(base.names)
+            if self.search.share_left(c) < _TELLING_LEFT
+            and c.hypothesis.set.isdisjoint(base.terms)
             and (c.effects or base.effects)
-            and not any(exclude(e, base.effects) for e in c.effects)
+            and not any(e.excluded_by(base.effects) for e in c.effects)
         ]
         return [
             _Partner(
-                c.names,
-                [trial.start_of(c.fit, effect) for effect in c.effects],
+                self.trial.starts_of(c),
                 c.wrong,
                 {name: c.fit.values[name] for name in c.wrong},
             )
@@ -356,37 +374,30 @@ class _Growing:
         ]
 
 
-def _one_place_each(terms: list[str]) -> list[str]:
+def _one_place_each(terms: list[Term]) -> list[Term]:
     """The first place of each effect, wherever it acts."""
-    best: dict[str, str] = {}
+    best: dict[str, Term] = {}
     for term in terms:
-        best.setdefault(id_of(term), term)
+        best.setdefault(term.id, term)
     return list(best.values())
 
 
-def _beside(
-    trial: Attempts,
-    screened: Screen,
-    start: Candidate,
-    singles: list[Candidate],
-    happening: list[str],
-    weight: Weight,
-) -> list[tuple[str, Candidate]]:
+def _event_partners(
+    search: Search, singles: list[Candidate], happening: list[Term]
+) -> list[tuple[Term, Candidate]]:
     """Effects with times of their own, each with a persistent one that it may have happened beside.
 
     That is the persistent effect that weighs most, if it leaves much; and, of those that were
     fitted, the one whose signature is in what the events leave.
     """
-
-    def left_by(candidate: Candidate) -> float:
-        return share_left(candidate, start, trial.compared)
-
+    trial, screened, start = search.trial, search.screened, search.start
     steady = [c for c in singles if c.fit.events is None]
-    best = max(steady, key=weight, default=start)
-    found = [(e, best) for e in happening] if _TRANSIENT_BESIDE < left_by(best) < _MUCH_LEFT else []
-    mismatch = float(screened.stand.rows @ screened.stand.rows)
+    best = max(steady, key=search.weight, default=start)
+    asked = _TRANSIENT_BESIDE < search.share_left(best) < _MUCH_LEFT
+    found = [(e, best) for e in happening] if asked else []
+    mismatch = float(screened.tangent.rows @ screened.tangent.rows)
     for single in singles:
-        if single.fit.events is None or left_by(single) > _MUCH_LEFT:
+        if single.fit.events is None or search.share_left(single) > _MUCH_LEFT:
             continue
         # what the baseline can do is taken as without the events
         kept = start.fit.residuals
@@ -396,7 +407,9 @@ def _beside(
         beside = replace(start.fit, residuals=left, moved=single.fit.moved)
         least = max(LEAST_GAIN, PARTNER_SHARE * mismatch)
         told = [
-            s for s in screened.scores(stand_of(beside, trial.inner, trial.white)) if s.gain > least
+            s
+            for s in screened.scores(tangent_of(beside, trial.inner, trial.white))
+            if s.gain > least
         ]
         partner = next((c for s in told for c in steady if c.effects == (s.effect,)), None)
         if partner is not None and (single.effects[0], partner) not in found:
@@ -404,38 +417,34 @@ def _beside(
     return found
 
 
-def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say) -> Candidate:
+def in_best_forms(search: Search, base: Candidate) -> Candidate:
     """A set with each of its effects in the form that leaves least beside the others.
 
     The form that an effect had alone is the one that did best for everything that was missing.
 
     Parameters
     ----------
-    trial : Attempts
-        Recordings, model, noise levels.
-    screened : Screen
-        Signatures of the effects, from which other forms begin.
+    search : Search
+        With the signatures from which other forms begin.
     base : Candidate
         A set of lasting effects and values that are wrong, fitted.
-    tell : callable
-        Receives progress.
 
     Returns
     -------
     Candidate
         The set itself where it leaves noise, and where no other form leaves less.
     """
-    if base.forms_tried or len(base.names) < 2 or base.fit.events is not None:
+    if base.forms_tried or len(base.terms) < 2 or base.fit.events is not None:
         return base
 
     def leaves_more() -> bool:
-        return any(significant(best.fitted[b.name]) for b in trial.suspects)
+        return any(significant(best.fitted[b.name]) for b in search.trial.suspects)
 
     best = base
-    ranked = by_effect(screened.scores()) if leaves_more() else {}
+    ranked = by_effect(search.screened.scores()) if leaves_more() else {}
     for effect in base.effects:
         while leaves_more():
-            other = _in_another_form(trial, best, effect, ranked.get(effect, []), tell)
+            other = _in_another_form(search, best, effect, ranked.get(effect, []))
             if other is None:
                 break
             best = other
@@ -443,9 +452,10 @@ def in_best_forms(trial: Attempts, screened: Screen, base: Candidate, tell: Say)
 
 
 def _in_another_form(
-    trial: Attempts, base: Candidate, effect: str, scores: list[Score], tell: Say
+    search: Search, base: Candidate, effect: Term, scores: list[Score]
 ) -> Candidate | None:
     """A set with one effect in another form, where one leaves clearly less."""
+    trial = search.trial
     now = trial.start_of(base.fit, effect)
     others = [
         score.start.scaled(score.size)
@@ -454,7 +464,7 @@ def _in_another_form(
     ]
     if not others:
         return None
-    tell(f"trying other forms of {effect} in {base.key}")
+    search.tell(f"trying other forms of {effect} in {base.hypothesis}")
     rest = [trial.start_of(base.fit, e) for e in base.effects if e != effect]
 
     def begin(start: Start) -> Candidate | None:
@@ -467,55 +477,52 @@ def _in_another_form(
     best = min(short, key=lambda c: c.misfit, default=None)
     if best is None or best.misfit > base.misfit / NEAR_PLACE:
         return None
-    begun = [trial.start_of(best.fit, e) for e in base.effects]
-    found = trial.together(begun, best.fit, base.wrong)
-    if found is None or left_everywhere(found) > left_everywhere(base) - FORM_SHARE_ALIKE:
+    found = trial.together(trial.starts_of(best), best.fit, base.wrong)
+    if found is None or log_misfit(found) > log_misfit(base) - FORM_SHARE_ALIKE:
         return None
     return replace(found, gain=base.gain)
 
 
 def without_needless(
-    trial: Attempts, candidates: list[Candidate], sets: list[Candidate], tell: Say
+    search: Search, candidates: list[Candidate], sets: list[Candidate]
 ) -> list[Candidate]:
-    """Sets with one term fewer that leave nearly as little, fitted from where the larger one is.
+    """Sets with one term fewer that leave nearly as little, fitted from the larger set's values.
 
-    A fit of the smaller set from elsewhere may have ended in a hollow of its own, so that the
-    larger one seems to be asked for.
+    A fit of the smaller set from elsewhere may have ended in another local minimum, so that the
+    larger one seems to be needed.
 
     Parameters
     ----------
-    trial : Attempts
-        Recordings, model, noise levels.
+    search : Search
+        What they are found with.
     candidates : list of Candidate
         Every hypothesis that was fitted.
     sets : list of Candidate
         Those whose terms are taken out, one at a time.
-    tell : callable
-        Receives progress.
 
     Returns
     -------
     list of Candidate
-        Those that leave less than the fits of the same names before, at most one for each.
+        Those that leave less than the fits of the same terms before, at most one for each.
     """
-    known: dict[frozenset[str], float] = {}
+    known: dict[Hypothesis, float] = {}
     for c in candidates:
-        known[frozenset(c.names)] = min(c.misfit, known.get(frozenset(c.names), math.inf))
-    found: dict[frozenset[str], Candidate] = {}
-    for larger in (c for c in sets if len(c.names) > 1 and c.fit.events is None):
-        for needless in larger.names:
-            names = frozenset(larger.names) - {needless}
-            if (1.0 - FURTHER_SHARE) * known.get(names, math.inf) < larger.misfit:
+        known[c.hypothesis] = min(c.misfit, known.get(c.hypothesis, math.inf))
+    found: dict[Hypothesis, Candidate] = {}
+    for larger in (c for c in sets if len(c.terms) > 1 and c.fit.events is None):
+        for needless in larger.terms:
+            rest = Hypothesis(tuple(t for t in larger.terms if t != needless))
+            if (1.0 - FURTHER_SHARE) * known.get(rest, math.inf) < larger.misfit:
                 continue
-            tell(f"trying {' + '.join(sorted(names))} from {' + '.join(sorted(larger.names))}")
-            smaller = trial.without(larger, needless)
-            if smaller is not None and smaller.misfit < known.get(names, math.inf):
-                found[names], known[names] = smaller, smaller.misfit
-    walls = trial.settings.most_tolerances
+            search.tell(f"trying {rest} from {larger.hypothesis}")
+            smaller = search.trial.without(larger, needless)
+            if smaller is not None and smaller.misfit < known.get(rest, math.inf):
+                found[rest], known[rest] = smaller, smaller.misfit
+    walls = search.trial.settings.most_tolerances
     return [c for c in found.values() if c.is_wrong(walls)]
 
 
-def _untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
+def _blocks_untouched(candidate: Candidate, start: Candidate, trial: Attempts) -> list[Block]:
     """Blocks in which a set leaves most of what was too much there, in recordings that were fitted
     or held out.
     """
@@ -561,16 +568,14 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     return explains(candidate, start, trial.compared)
 
 
-def no_room_beside(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
-    """Whether even an effect of one parameter that left nothing beside a hypothesis would weigh
-    less with it than the hypothesis does alone.
-    """
+def cannot_gain(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+    """Whether no further one-parameter effect could pay for itself."""
     evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
-    return room_beside(candidate, start, trial.compared, evidence) < least
+    return possible_gain(candidate, start, trial.compared, evidence) < least
 
 
-def left_everywhere(candidate: Candidate) -> float:
+def log_misfit(candidate: Candidate) -> float:
     """Logarithm of what a hypothesis leaves of each block, on fitted and on held-out recordings:
     by it the forms of an effect are compared.
     """

@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, Candidate, Group, significant
+from pamrs.diagnosis.evidence import WALL_TOLERANCES, Attempts, BlockGroup, Candidate, significant
 from pamrs.diagnosis.fit import (
     Fit,
     Problem,
@@ -28,8 +28,9 @@ from pamrs.diagnosis.fit import (
 )
 from pamrs.diagnosis.prepare import Block
 from pamrs.rig import Rig
+from pamrs.rig.schema import split_name
 
-__all__ = ["beside_quiet", "freed", "strained_parameters", "suspected"]
+__all__ = ["find_wrong_values", "free_suspects", "far_parameters", "suspects_at_wall"]
 
 # evaluations of the linear model that predicts the gain of freeing a parameter: to its end
 _PREDICTED_GAIN_EVALUATIONS = 50
@@ -60,7 +61,7 @@ _WRONG_TOGETHER = (
 Array = NDArray[np.float64]
 
 
-def suspected(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
+def suspects_at_wall(fitted: Fit, blocks: list[Block]) -> list[tuple[str, ...]]:
     """Parameters at their wall, alone and in pairs that one mistake makes wrong together.
 
     Parameters
@@ -94,18 +95,17 @@ def _same_owner(one: str, other: str) -> bool:
     """Whether two parameters may belong to one mistake: of blocks of one kind they have to belong
     to the same block.
     """
-    return (
-        one.partition(".")[0] != other.partition(".")[0]
-        or one.rpartition(".")[0] == other.rpartition(".")[0]
-    )
+    first, second = split_name(one), split_name(other)
+    return first[0] != second[0] or first[1] == second[1]
 
 
 def _kind(name: str) -> str:
     """Kind of block and key of a dotted name, without the block's own: ``chamber.dead_volume``."""
-    return f"{name.partition('.')[0]}.{name.rpartition('.')[2]}"
+    kind, _, key = split_name(name)
+    return f"{kind}.{key}"
 
 
-def freed(
+def free_suspects(
     trial: Attempts,
     baseline: Fit,
     first: Fit,
@@ -135,9 +135,11 @@ def freed(
     """
     walls = trial.settings.most_tolerances
     suspects = [
-        names for found in (baseline, first) for names in suspected(found, trial.inner.blocks)
+        names
+        for found in (baseline, first)
+        for names in suspects_at_wall(found, trial.inner.blocks)
     ]
-    gains = _promising(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
+    gains = _worth_a_fit(trial, baseline, list(dict.fromkeys(suspects)), trial.white)
     # the linear model says little of what is far away: each parameter at its wall is fitted,
     # whatever its predicted gain beside others
     least = _PAIR_SHARE * max(gains.values(), default=0.0)
@@ -146,13 +148,13 @@ def freed(
     ]
     found = []
     sets = [names for names in gains if len(names) == 1 or names in pairs]
-    for names, candidate in _tried(trial, sets, baseline, say, share).items():
+    for names, candidate in _fit_freed(trial, sets, baseline, say, share).items():
         if candidate is not None and candidate.is_wrong(walls):
             found.append(replace(candidate, gain=gains[names]))
     return found
 
 
-def strained_parameters(trial: Attempts, found: Fit) -> list[str]:
+def far_parameters(trial: Attempts, found: Fit) -> list[str]:
     """Parameters that a fit with effects moved far, and whose freeing promises most by the linear
     model; the most promising first.
 
@@ -166,11 +168,11 @@ def strained_parameters(trial: Attempts, found: Fit) -> list[str]:
     far: list[tuple[str, ...]] = [
         (name,) for name, moved in found.moved.items() if abs(moved) >= _FAR_TOLERANCES
     ]
-    gains = _promising(trial, found, far, trial.autocorrelation(found))
+    gains = _worth_a_fit(trial, found, far, trial.autocorrelation(found))
     return [name for (name,) in gains][:_MOST_BESIDE]
 
 
-def _promising(
+def _worth_a_fit(
     trial: Attempts, found: Fit, sets: list[tuple[str, ...]], inflation: dict[str, float]
 ) -> dict[tuple[str, ...], float]:
     """Sets of parameters whose freeing is worth a fit by the linear model, with their gain in
@@ -184,7 +186,7 @@ def _promising(
     }
 
 
-def _tried(
+def _fit_freed(
     trial: Attempts,
     sets: list[tuple[str, ...]],
     baseline: Fit,
@@ -273,7 +275,7 @@ def _predicted_gain(
     return {loose: was - cost(loose) for loose in suspects}
 
 
-def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> Group:
+def find_wrong_values(trial: Attempts, quiet: BlockGroup, say: Callable[[str], None]) -> BlockGroup:
     """A group whose baseline leaves only noise, but needs a parameter at its wall for it: which one
     the file is wrong about.
 
@@ -282,7 +284,7 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     group found, by what they lose.
     """
     start = quiet.candidates[0]
-    found = freed(trial, start.fit, start.fit, say, share=0.0)
+    found = free_suspects(trial, start.fit, start.fit, say, share=0.0)
     shown = [
         c
         for c in found
@@ -293,7 +295,9 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     autocorrelation = trial.autocorrelation(start.fit)
     before = with_priors(trial.inner, start.fit, autocorrelation)
     effects = [
-        c for c in quiet.candidates if c.effects and quiet.probabilities.get(c.key, 0.0) > 0.0
+        c
+        for c in quiet.candidates
+        if c.effects and quiet.probabilities.get(c.hypothesis, 0.0) > 0.0
     ]
     # a file that is further outside its tolerances is rarer, but less and less so
     settings, walls = trial.settings, trial.settings.most_tolerances
@@ -306,10 +310,9 @@ def beside_quiet(trial: Attempts, quiet: Group, say: Callable[[str], None]) -> G
     top = max(0.0, *scores.values())
     weights = {c: math.exp(max(-60.0, score - top)) for c, score in scores.items()}
     total = math.exp(-top) + sum(weights.values())
-    share = {c.key: weights[c] / total for c in shown}
-    probabilities = {
-        key: p * (1.0 - sum(share.values())) for key, p in quiet.probabilities.items()
-    } | share
+    share = {c.hypothesis: weights[c] / total for c in shown}
+    kept = 1.0 - sum(share.values())
+    probabilities = {h: p * kept for h, p in quiet.probabilities.items()} | share
     return replace(quiet, candidates=[*quiet.candidates, *shown], probabilities=probabilities)
 
 
