@@ -31,8 +31,6 @@ from pamrs.control._sliding import SlidingController
 from pamrs.control._values import as_value, clip
 from pamrs.errors import ParameterError
 
-__all__ = ["AdaptiveSliding", "dead"]
-
 _NAMES: Final = ("inertia", "viscous", "weight")
 
 #: Table 5.2, by trial: gains of I, b, m g r.

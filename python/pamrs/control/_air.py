@@ -23,8 +23,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["AirModel", "ConductanceInverse", "OrificeInverse"]
-
 Array = NDArray[np.float64]
 
 _LAMINAR: Final = (

@@ -11,8 +11,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
-__all__ = ["check_smooth", "resting", "without_dry_friction"]
-
 
 def check_smooth(rig: Rig, *, supplies: bool) -> None:
     """Refuse a rig with a dead time, or with an effect that has no derivative where a valve is

@@ -21,8 +21,6 @@ from pamrs.control._protocol import (
 from pamrs.control._sampled import Fixed, Restorer, SampledController
 from pamrs.errors import ParameterError
 
-__all__ = ["Cascade", "PressureLoop", "cascaded_pid"]
-
 #: Not printed: found on the simulated shoulder, see :func:`cascaded_pid`.
 _ANGLE_GAINS: Final[Mapping[str, float]] = {"kp": 6e5, "ki": 1.2e6, "kd": 1e5}
 

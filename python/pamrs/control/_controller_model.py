@@ -15,8 +15,6 @@ from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, Reference, commands_of
 from pamrs.errors import ParameterError
 
-__all__ = ["LinearController", "heard", "linear_controller"]
-
 Array = NDArray[np.float64]
 
 #: Half width of the differences in what is measured [SI].

@@ -21,8 +21,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Feedforward", "FeedforwardPressure", "Parallel"]
-
 
 def _torque(arm: JointModel, aim: Reference, friction: bool) -> Value:
     """``tau_d`` [N m] of (4.11), with or without viscous friction."""

@@ -17,8 +17,6 @@ from pamrs.control._sampled import Fixed
 from pamrs.control._values import as_value, clip, positive_gain
 from pamrs.errors import ParameterError
 
-__all__ = ["FUZZY_SETS", "Fuzzy", "fuzzy_rules", "fuzzy_surface"]
-
 FUZZY_SETS: Final = ("NB", "NM", "NS", "ZE", "PS", "PM", "PB")
 """Names of the sets, centres -1, -2/3, ... 1."""
 _HALF: Final = 3  # sets on each side of zero

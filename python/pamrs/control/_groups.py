@@ -11,17 +11,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = [
-    "Feed",
-    "Group",
-    "beyond_sine",
-    "direct_regulators",
-    "groups_of",
-    "highest_pressure",
-    "joints_of",
-    "named",
-]
-
 
 def named(word: str, name: str) -> str:
     """A channel, or a block in full: the bare word for a block without a name."""

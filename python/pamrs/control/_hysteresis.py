@@ -32,8 +32,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["DeadZoneCompensation", "HysteresisCompensation", "HystereticTorque", "SlipMemory"]
-
 _SHARE: Final = (0.125, 0.25, 0.5, 1.0)  # of the presliding distance, by element, as in the core
 _LEAST: Final = 0.05  # of C1 without friction that stays in any case
 

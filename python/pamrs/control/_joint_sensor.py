@@ -13,8 +13,6 @@ from pamrs.control._sampled import Stateful
 if TYPE_CHECKING:
     from pamrs.control._sampled import SampledController
 
-__all__ = ["JointSensor"]
-
 
 class JointSensor(Stateful):
     """Angle and rate of the joint.

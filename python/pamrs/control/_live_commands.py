@@ -13,8 +13,6 @@ from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, check_drives_valve, commands_of
 from pamrs.errors import ParameterError
 
-__all__ = ["Command", "LiveCommands", "pair"]
-
 #: A number, or a number for each of several commands: ``valve_command.flexor`` -> V.
 Command: TypeAlias = "float | Mapping[str, float]"
 #: Of a valve that a controller drives by itself: closed, and the whole range [V].

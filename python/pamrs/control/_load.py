@@ -23,8 +23,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["ByLength", "LoadModel"]
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LoadModel(JointModel):

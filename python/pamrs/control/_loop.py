@@ -23,16 +23,6 @@ from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_sam
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = [
-    "Actuation",
-    "ClosedLoop",
-    "actuation_of",
-    "closed_loop",
-    "measured_by",
-    "tracked_of",
-    "trajectories_of",
-]
-
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
 #: ``lambda u: {"valve_command": {"flexor": u, ...}}``.

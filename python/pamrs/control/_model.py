@@ -19,8 +19,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["ArmModel", "JointModel", "Parameter"]
-
 
 class Parameter(NamedTuple):
     """A number of the equation of motion that is linear in it, which a controller may estimate."""

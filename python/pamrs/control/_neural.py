@@ -34,8 +34,6 @@ from pamrs.control._sliding import SlidingController
 from pamrs.control._values import as_value, clip
 from pamrs.errors import ParameterError
 
-__all__ = ["NETWORKS", "Neural"]
-
 Array = NDArray[np.float64]
 
 NETWORKS: Final = ("H", "C", "G")

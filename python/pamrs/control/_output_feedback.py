@@ -14,8 +14,6 @@ from pamrs.control._sampled import Fixed, SampledController
 from pamrs.control._values import angle_factor, limits_around
 from pamrs.errors import ParameterError
 
-__all__ = ["OutputFeedback"]
-
 
 class OutputFeedback(SampledController):
     """A controller of the joint angle by the valve, which a feedforward can be added to.

@@ -17,8 +17,6 @@ from pamrs.control._sampled import Stateful
 from pamrs.control._values import as_value, positive_number
 from pamrs.errors import ParameterError
 
-__all__ = ["ANTI_WINDUP", "FilteredDerivative", "Integrator", "LowPass"]
-
 ANTI_WINDUP: Final = ("clamping", "back_calculation", "none")
 """How an integral is kept from growing while the output is at a limit; ``none`` as in the
 dissertation."""

@@ -13,8 +13,6 @@ from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, Stateful
 from pamrs.control._values import as_value, clip, limits_around
 
-__all__ = ["PID", "PIDLaw"]
-
 #: Gains as printed: 4.4.2 (with feedforward, kM 1.0), 4.5.1.2 (best combined at 23 kg), Fig. 4.9
 #: (about, at 11 kg).
 _PRINTED: Final[Mapping[str, Mapping[str, float]]] = {

@@ -32,8 +32,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["JointTorques", "PlanarArmModel"]
-
 Array = NDArray[np.float64]
 
 

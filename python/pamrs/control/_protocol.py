@@ -25,18 +25,6 @@ from numpy.typing import NDArray
 from pamrs.channels import dotted
 from pamrs.errors import ParameterError
 
-__all__ = [
-    "Controller",
-    "Measurement",
-    "Reference",
-    "Value",
-    "check_answers_pressure",
-    "check_controller",
-    "check_drives_valve",
-    "commands_of",
-    "keywords_of",
-]
-
 #: A float, or one number for each plant of a batch.
 Value: TypeAlias = "float | NDArray[np.float64]"
 #: Channel -> value.

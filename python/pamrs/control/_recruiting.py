@@ -26,8 +26,6 @@ from pamrs.control._torque import GroupTorque
 from pamrs.control._values import clip, positive_number, sin, where
 from pamrs.errors import ParameterError
 
-__all__ = ["Recruitment"]
-
 _FILL = 0.3  # of the ramp: how long a group is filled before it pulls
 _LEAST_LEVER = 0.1  # sine of an angle below which a torque says little about a weight
 _SLOWEST = 0.1  # of the ramp's rate, however low the supply

@@ -13,8 +13,6 @@ from pamrs.channels import dotted
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator
 
-__all__ = ["SAMPLE", "after", "closed", "kept", "slowest"]
-
 #: How long it is looked at [s].
 SAMPLE: Final = 2.5e-4
 #: Rate after that time, of the range between the stops [1/s], below which something rests: in a

@@ -39,8 +39,6 @@ from pamrs.control._ways import FlowInverse, SetPoint
 from pamrs.errors import ParameterError
 from pamrs.simulation import Simulator, core_rig
 
-__all__ = ["RigController"]
-
 _STEPS: Final = 20  # of Newton's method on the torque that holds; one or two are enough
 _STILL: Final = 1e-3  # of the rate below which a joint rests: a linear model is far from its limit
 

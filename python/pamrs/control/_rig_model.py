@@ -25,8 +25,6 @@ from pamrs.errors import ParameterError
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["RigModel"]
-
 Array = NDArray[np.float64]
 _CROSSOVER: Final = 110.0  # 1/s, that of the shoulder's pressure loop with its default gains
 _RESET: Final = 1.0  # 1/s, ki/kp of the same

@@ -23,8 +23,6 @@ from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._values import as_value, positive_number
 from pamrs.errors import ParameterError
 
-__all__ = ["Fixed", "Restorer", "SampledController", "Stateful"]
-
 
 class Stateful:
     """Something with a state that can be read, given back and forgotten.

@@ -14,8 +14,6 @@ import numpy as np
 from pamrs.control._protocol import Measurement, Value
 from pamrs.errors import ParameterError
 
-__all__ = ["Reader", "Sensors", "reader_of"]
-
 
 @dataclass(frozen=True)
 class Sensors:

@@ -19,8 +19,6 @@ from pamrs.control._torque import GroupTorque
 from pamrs.control._values import as_value, clip
 from pamrs.errors import ParameterError
 
-__all__ = ["CoContraction", "Demand", "Share", "Together", "stiffness_of"]
-
 #: A number for all time, or a function of time [s].
 Stiffness: TypeAlias = "Value | Callable[[float], Value]"
 _LEAST_GAIN = 1e-12  # N m/rad per Pa: below it the pressures do not change the stiffness

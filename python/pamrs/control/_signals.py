@@ -7,8 +7,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError
 
-__all__ = ["checked", "integral", "plain"]
-
 Array = NDArray[np.float64]
 
 

@@ -27,8 +27,6 @@ from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, SampledController
 from pamrs.control._values import as_value, clip, positive_gain, sign
 
-__all__ = ["Sliding", "SlidingController", "Surface"]
-
 
 class Surface(NamedTuple):
     """Where a sample stands relative to the sliding surface."""

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from pamrs.control._protocol import Value
 
-__all__ = ["Spline"]
-
 
 class Spline:
     """Cubic spline through values at even places, held beyond the ends; the same for floats and

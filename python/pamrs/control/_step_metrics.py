@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs.control._signals import checked, plain
 from pamrs.errors import ParameterError
 
-__all__ = ["overshoot", "rise_time", "settling_time"]
-
 Array = NDArray[np.float64]
 
 

@@ -23,8 +23,6 @@ from pamrs.simulation import default_step, whole_samples
 if TYPE_CHECKING:
     from pamrs.simulation import BatchRun
 
-__all__ = ["Sweep", "sweep"]
-
 Array = NDArray[np.float64]
 
 

@@ -24,21 +24,6 @@ from pamrs.rig import Joint
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-__all__ = [
-    "BundleTorque",
-    "FullTorque",
-    "GaylordTorque",
-    "GroupTorque",
-    "OpposedTorque",
-    "SimplifiedTorque",
-    "TorqueModel",
-    "active_groups",
-    "group_torques",
-    "joint_torque",
-    "rest_length_of",
-    "torque_line",
-]
-
 Array = NDArray[np.float64]
 
 _NODES: Final = (

@@ -12,18 +12,6 @@ import numpy as np
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
-__all__ = [
-    "angle_factor",
-    "as_value",
-    "clip",
-    "limits_around",
-    "positive_gain",
-    "positive_number",
-    "sign",
-    "sin",
-    "where",
-]
-
 #: How many of a unit are in a radian.
 _PER_RADIAN: Final[dict[str, float]] = {"rad": 1.0, "deg": 180.0 / math.pi}
 

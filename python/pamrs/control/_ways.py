@@ -10,8 +10,6 @@ from pamrs.control._protocol import Measurement, Value
 from pamrs.control._sampled import Stateful
 from pamrs.control._values import as_value, clip, positive_gain
 
-__all__ = ["AirWay", "FlowInverse", "SetPoint"]
-
 
 class AirWay(Protocol):
     """From a wanted pressure to a command; a part of a controller, with a state."""

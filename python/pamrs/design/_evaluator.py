@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs.errors import ParameterError
 
-__all__ = ["Array", "Evaluator", "Genetic", "History", "Objective", "Progress", "Search"]
-
 Array = NDArray[np.float64]
 Objective = Callable[[Array], Array]
 Progress = Callable[[int, int], None]

@@ -12,8 +12,6 @@ from pamrs import _core
 from pamrs._checks import positive
 from pamrs.errors import ParameterError
 
-__all__ = ["Filling"]
-
 _HEAT_CAPACITY_RATIO: Final = 1.4
 _CHOKED: Final = (2.0 / (_HEAT_CAPACITY_RATIO + 1.0)) ** (
     _HEAT_CAPACITY_RATIO / (_HEAT_CAPACITY_RATIO - 1.0)

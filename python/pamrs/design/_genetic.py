@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from pamrs.design._evaluator import Evaluator, Genetic
 
-__all__ = ["child", "decode", "evolve", "evolve_two", "redraw_one"]
-
 Array = NDArray[np.float64]
 Member = Any  # a list of genes with a fitness
 

@@ -17,8 +17,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 from pamrs.units import bar_and_psi
 
-__all__ = ["AREA_TOLERANCE", "JointDesign", "MethodComparison", "compare_methods", "optimise"]
-
 Array = NDArray[np.float64]
 
 #: Area below the threshold that counts as "essentially zero", over the area under the threshold

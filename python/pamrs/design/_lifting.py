@@ -25,8 +25,6 @@ from pamrs.rig import Joint
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = ["Lift", "lift"]
-
 Array = NDArray[np.float64]
 
 #: Ports at which an effect changes no static torque at a given pressure: those of the gas, and of

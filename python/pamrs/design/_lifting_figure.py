@@ -19,8 +19,6 @@ from pamrs.report.figures import COLOURS, STYLE
 if TYPE_CHECKING:
     from pamrs.design._lifting import Lift
 
-__all__ = ["lift_png"]
-
 _INK: Final = "#374151"
 
 

@@ -18,15 +18,6 @@ from pamrs.design._search import PUBLISHED_EVALUATIONS, search, seeded
 from pamrs.errors import ParameterError, missing_package
 from pamrs.units import bar_and_psi
 
-__all__ = [
-    "ParetoFront",
-    "PressureSearch",
-    "Trial",
-    "least_pressure",
-    "minimum_pressure",
-    "pareto_front",
-]
-
 Array = NDArray[np.float64]
 
 

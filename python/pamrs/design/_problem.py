@@ -18,8 +18,6 @@ from pamrs.rig import Joint
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["DEFAULT_BOUNDS", "LENGTHS", "SYMBOLS", "JointProblem", "Scores"]
-
 Array = NDArray[np.float64]
 
 #: The four lengths, in the order of a design's columns.

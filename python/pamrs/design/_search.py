@@ -15,8 +15,6 @@ from numpy.typing import ArrayLike
 from pamrs.design._evaluator import Array, Evaluator, Genetic, Objective, Progress, Search
 from pamrs.errors import ParameterError, missing_package
 
-__all__ = ["METHODS", "PUBLISHED_EVALUATIONS", "search", "seeded"]
-
 #: Genetic algorithm of 3.5, differential evolution, CMA-ES, and independent random points.
 METHODS: Final = ("ga", "de", "cma", "random")
 

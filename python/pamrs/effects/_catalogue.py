@@ -11,16 +11,6 @@ from typing import Any, Final
 from pamrs import _core
 from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
 
-__all__ = [
-    "CATALOGUE",
-    "CLOSURE_OF",
-    "EFFECTS",
-    "MEMORY_OF",
-    "CLOSURE_TERMS",
-    "WORDS",
-    "ports_of",
-]
-
 
 def _words(effect: str) -> dict[str, Any]:
     """The words of an effect."""

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["EffectInfo", "EffectParameter", "Form", "SameData", "ClosureTerm", "Words"]
-
 
 @dataclass(frozen=True, slots=True)
 class EffectParameter:

@@ -24,21 +24,6 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS, qualified
 from pamrs.simulation import Simulation, Simulator, has_frame, regulators_of, simulate
 
-__all__ = [
-    "Chain",
-    "Range",
-    "Spans",
-    "can_shut",
-    "chains_of",
-    "commands_for",
-    "driving",
-    "is_sealed",
-    "joined",
-    "pressure_range",
-    "spans_of",
-    "top_of",
-]
-
 BANDWIDTH = 15.0  # [rad/s] bandwidth of the pressure loop by which commands are found on the model
 # [s] rise of several chains' pressures to find where joints move: slow beside lags
 _RAMP_TIME = 15.0

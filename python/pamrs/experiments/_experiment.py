@@ -16,8 +16,6 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import Simulation, has_frame, simulate
 
-__all__ = ["Experiment", "in_bar", "in_mm", "limited", "other_payload", "protocol_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -22,8 +22,6 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import reading, simulate
 
-__all__ = ["Frame", "Rates", "Seen", "frame_of", "seen_in"]
-
 # stroke, share of the length: well beyond presliding, well inside what muscles do
 _LEAST_STROKE = 0.1
 _WORTH_STROKE = 0.01  # least stroke worth moving, share of the length: a few times presliding

@@ -35,8 +35,6 @@ from pamrs.experiments._frame import Frame
 from pamrs.rig import Rig
 from pamrs.simulation import simulate
 
-__all__ = ["Maker", "rows"]
-
 # [Hz] of a multisine, lowest first: from slow creep to the band of an arm's joint
 MULTISINE_FREQUENCIES = np.array([0.1, 0.23, 0.41, 0.73, 1.13, 1.9, 3.1])
 # from one to the next, shared by multisines of several chains: just below their mean, 1.77

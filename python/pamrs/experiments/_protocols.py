@@ -33,8 +33,6 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, simulate
 
-__all__ = ["experiments_of", "library"]
-
 _SAMPLE_TIME = 0.005  # [s] sample time of an experiment where no recording tells
 _LEAST_SAMPLE_TIME = 0.002  # [s] shortest sample time
 _SEALED_SAMPLE_TIME = 0.1  # [s] sample time for a chamber without a valve, which changes slowly

@@ -14,21 +14,6 @@ import numpy.typing as npt
 from pamrs.declared import told
 from pamrs.findings._entry import Entry
 
-__all__ = [
-    "BlockResidual",
-    "ConditionMap",
-    "Considered",
-    "Curves",
-    "Form",
-    "NextExperiment",
-    "PairExperiment",
-    "Protocol",
-    "RankedExperiment",
-    "RecordingUsed",
-    "Tested",
-    "Tried",
-]
-
 FloatArray = npt.NDArray[np.float64]
 
 

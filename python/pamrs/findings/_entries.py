@@ -9,31 +9,6 @@ from typing import Any, Final
 from pamrs.declared import told
 from pamrs.findings._entry import Entry
 
-__all__ = [
-    "HEALTHY",
-    "NOT_JUDGED",
-    "VERDICTS",
-    "BlockMismatch",
-    "BlockVerdict",
-    "BudgetTerm",
-    "ChannelError",
-    "Condition",
-    "EffectFound",
-    "EffectParameterFound",
-    "Faulty",
-    "FitErrors",
-    "FreeRun",
-    "FreeRunError",
-    "MismatchSize",
-    "MismatchStages",
-    "Misread",
-    "ParameterFound",
-    "StageError",
-    "Unexplained",
-    "Where",
-    "WrongParameter",
-]
-
 VERDICTS: Final = ("none", "parameters", "effects", "unlisted", "units")
 """Allowed verdicts."""
 HEALTHY: Final = VERDICTS[:2]

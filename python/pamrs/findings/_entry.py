@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["Entry", "to_plain"]
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Entry(Mapping[str, Any]):

@@ -33,8 +33,6 @@ from pamrs.findings._entries import (
 )
 from pamrs.findings._trace import ModelFile, Trace
 
-__all__ = ["Findings", "channels_off"]
-
 
 def channels_off(runs: Sequence[FreeRun]) -> dict[str, FreeRunError]:
     """Channels that free runs miss by more than noise and what is known of the values explain, the

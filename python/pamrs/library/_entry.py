@@ -14,8 +14,6 @@ from pamrs.units import parse_unit
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["Entry", "Fact", "quantity", "read_entry"]
-
 SCHEMA: Final = "pamrs.library/1"
 RELATIONS: Final = ("equals", "above", "below")
 

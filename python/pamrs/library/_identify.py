@@ -21,8 +21,6 @@ from pamrs.errors import ParameterError
 from pamrs.library._entry import Entry, quantity
 from pamrs.library.evaluate import KINDS
 
-__all__ = ["Identification", "derive", "gent_modulus", "least_norm"]
-
 Array = NDArray[np.float64]
 
 

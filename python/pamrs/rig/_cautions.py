@@ -8,8 +8,6 @@ from typing import Any, Final
 
 from pamrs.rig.schema import qualified, tables_of
 
-__all__ = ["cautions_of"]
-
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from pamrs.rig.schema import BLOCKS, qualified, tables_of
 
-__all__ = ["block_problems", "muscle_problems"]
-
 
 def block_problems(model: Mapping[str, Any]) -> list[str]:
     """Problems within the blocks of a model.

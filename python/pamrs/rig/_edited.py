@@ -18,8 +18,6 @@ from pamrs.rig._writer import block_lines, effect_lines, entry_text, limit_lines
 from pamrs.rig.schema import BLOCKS, PORTS, Key, keys_of, qualified, tables_of
 from pamrs.units import from_si, to_si
 
-__all__ = ["edited_text"]
-
 #: How far a number is looked for that converts to the very same number in SI, in units in the last
 #: place; beyond, the value is written in SI.
 _NEIGHBOURS: Final = 4

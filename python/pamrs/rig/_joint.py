@@ -15,8 +15,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
 
-__all__ = ["Joint"]
-
 Array = NDArray[np.float64]
 
 

@@ -12,8 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs import _core
 from pamrs.errors import ParameterError
 
-__all__ = ["compiled_law", "force_table"]
-
 Array = NDArray[np.float64]
 
 _FIRST: Final = (9, 13)

@@ -18,8 +18,6 @@ from pamrs.rig.schema import qualified, tables_of
 if TYPE_CHECKING:
     from pamrs.rig._reader import Reader
 
-__all__ = ["ERROR_BLOCKS", "ERROR_CHANNELS", "STATED", "error_lines", "read_model_error"]
-
 #: Kinds of block whose error can be stated, as a share.
 ERROR_BLOCKS: Final = (
     "supply", "valve", "line", "chamber", "muscle", "transmission", "joint", "arm", "link", "load",

@@ -13,8 +13,6 @@ from pamrs import _core
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
-__all__ = ["Muscle"]
-
 Array = NDArray[np.float64]
 _FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
 

@@ -13,8 +13,6 @@ from typing import Any, Final
 
 from pamrs.rig.schema import BLOCKS, PORTS, Port, kind_of, qualified, tables_of
 
-__all__ = ["Ports", "bare", "connect", "effect_problem", "hanging_problem", "near_name", "wiring"]
-
 Ports = dict[str, dict[str, dict[str, str]]]
 """Kind of block -> name -> port -> the block at its other end in full, ``""`` for the inlet of a
 line that valves feed."""

@@ -34,8 +34,6 @@ from pamrs.rig.schema import (
 )
 from pamrs.units import to_si, with_unit
 
-__all__ = ["Content", "Reader", "read_model"]
-
 _TOP = ("schema", "name", "description", "case", "limits", "effects", "model_error")
 _QUANTITY = ("value", "unit", "tol", "unknown", "error")
 _OWN = "own"

@@ -30,8 +30,6 @@ from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables
 if TYPE_CHECKING:
     from pamrs.rig._muscle import Muscle
 
-__all__ = ["Parameter", "Rig", "load_rig", "parse_rig"]
-
 #: By the core and from the ports when they are needed; what a rig differs from by numbers only, and
 #: what was made of it.
 _MADE_AGAIN = ("_compiled", "_connected", "_inputs", "_origin", "_grown")

@@ -15,16 +15,6 @@ if TYPE_CHECKING:
     from pamrs.effects import Form
     from pamrs.rig._rig import Rig
 
-__all__ = [
-    "Entry",
-    "effect_parameter",
-    "full_name",
-    "named_entries",
-    "new_entry",
-    "placed",
-    "without",
-]
-
 Entry = dict[str, Any]
 """An effect of a model: ``id``, ``parameters``, and ``at`` and ``form`` where they are given."""
 

@@ -26,15 +26,6 @@ from pamrs.rig.schema import (
     tables_of,
 )
 
-__all__ = [
-    "block_lines",
-    "core_json",
-    "effect_lines",
-    "entry_text",
-    "limit_lines",
-    "toml_text",
-]
-
 _OWN: Final = ', error = "own"'
 _MOUNTING: Final = ("base_angle", "centre_angle")
 

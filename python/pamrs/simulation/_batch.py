@@ -26,8 +26,6 @@ from pamrs.simulation._simulation import (
     whole_samples,
 )
 
-__all__ = ["Batch", "BatchRun", "Failure"]
-
 Array = NDArray[np.float64]
 #: What is made from the rest, and not pickled.
 _MADE = ("_core", "_first", "_inputs", "_channels", "_commands")

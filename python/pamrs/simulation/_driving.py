@@ -18,21 +18,6 @@ from pamrs.simulation._plants import rowwise
 if TYPE_CHECKING:
     from pamrs.rig import Rig
 
-__all__ = [
-    "Inputs",
-    "Signals",
-    "has_frame",
-    "initial_names",
-    "initial_values",
-    "input_names",
-    "inputs_of",
-    "keywords",
-    "regulators_of",
-    "switching_valves",
-    "sensor_zero",
-    "signals_of",
-]
-
 Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
 Signals = ArrayLike | Mapping[str, ArrayLike]

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs._checks import as_numbers, as_said
 from pamrs.errors import ParameterError
 
-__all__ = ["plants_of", "rowwise", "thread_count"]
-
 Array = NDArray[np.float64]
 _MOST_THREADS = 256
 _MOST_PLANTS = 10_000_000

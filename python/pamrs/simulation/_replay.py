@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
 
-__all__ = ["differences", "reading", "replay"]
-
 Array = NDArray[np.float64]
 
 #: State of a recording's first row that a simulation begins with, the block that has it and the

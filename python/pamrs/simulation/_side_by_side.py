@@ -24,8 +24,6 @@ from pamrs.simulation._simulation import (
     rows_of,
 )
 
-__all__ = ["REDUCTIONS", "simulate_batch"]
-
 Array = NDArray[np.float64]
 #: What a run can be reduced to.
 REDUCTIONS = ("final", "min", "max", "peak", "mean", "squared_error")

@@ -24,8 +24,6 @@ from pamrs.simulation._driving import Signals, initial_values, sensor_zero, sign
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Balance", "Event", "Simulation", "core_rig", "simulate"]
-
 Array = NDArray[np.float64]
 
 

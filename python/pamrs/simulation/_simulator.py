@@ -24,8 +24,6 @@ from pamrs.simulation._simulation import (
     whole_samples,
 )
 
-__all__ = ["Simulator"]
-
 Array = NDArray[np.float64]
 
 

@@ -20,8 +20,6 @@ from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, meant
 from pamrs.rig import Rig
 
-__all__ = ["INITIAL", "Axes", "Blocks", "Grid", "Quantity", "Samples", "quantity"]
-
 Array = NDArray[np.float64]
 #: How the name of an initial value begins: ``initial.joint_angle``.
 INITIAL: Final = "initial."

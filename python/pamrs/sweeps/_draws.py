@@ -15,8 +15,6 @@ from pamrs.rig import Rig
 from pamrs.sweeps._axes import Axes, Quantity, chosen, quantity
 from pamrs.units import with_unit
 
-__all__ = ["DrawnSamples", "Range", "ranges", "samples", "whole_number"]
-
 Array = NDArray[np.float64]
 Sequences = Literal["sobol", "halton"]
 #: A normal distribution ends here, in standard deviations.

@@ -22,8 +22,6 @@ from pamrs.rig.schema import qualified
 from pamrs.simulation import REDUCTIONS, core_rig, simulate_batch
 from pamrs.sweeps._axes import INITIAL, Quantity, quantity
 
-__all__ = ["Done", "Drive", "Metric", "OpenLoop", "Task", "metric_of", "run_chunk"]
-
 Array = NDArray[np.float64]
 
 

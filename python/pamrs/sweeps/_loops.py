@@ -24,8 +24,6 @@ from pamrs.sweeps._sweep import run_plan
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["GAIN", "ClosedLoop", "gain_map"]
-
 Array = NDArray[np.float64]
 #: How the name of a gain begins: ``gain.kp``.
 GAIN: Final = "gain."

@@ -16,8 +16,6 @@ from pamrs.sweeps._axes import Axes, Blocks
 from pamrs.sweeps._drives import Drive, Task
 from pamrs.units import with_unit
 
-__all__ = ["SCHEMA", "Plan", "differences"]
-
 SCHEMA: Final = "pamrs.sweep/1"
 _DIGEST: Final = re.compile(r"\b[0-9a-f]{64}\b")
 _FEWEST, _MOST, _PARTS = 1024, 65_536, 64

@@ -7,8 +7,6 @@ import time
 from collections.abc import Callable
 from typing import Final, TextIO
 
-__all__ = ["Progress", "duration_words"]
-
 #: Seconds from one line to the next, on a terminal and elsewhere.
 _TERMINAL, _FILE = 0.5, 15.0
 _MINUTE, _HOUR, _DAY = 60, 3600, 86_400

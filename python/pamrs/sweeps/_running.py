@@ -13,8 +13,6 @@ from pamrs.sweeps._drives import Done, Task, run_chunk
 from pamrs.sweeps._progress import Progress
 from pamrs.sweeps._store import Store
 
-__all__ = ["executor_of", "in_flight_of", "run_missing"]
-
 #: Chunks in flight for each worker: one is worked out, one waits.
 _EACH: Final = 2
 #: How often dask tries a chunk again whose worker was lost.

@@ -20,8 +20,6 @@ from pamrs.sweeps._sweep import sweep
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["METHODS", "sensitivity"]
-
 Array = NDArray[np.float64]
 #: Of Morris' trajectories.
 _LEVELS: Final = 4

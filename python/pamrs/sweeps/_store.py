@@ -31,8 +31,6 @@ if TYPE_CHECKING:
     from pamrs.rig import Rig
     from pamrs.sweeps._drives import Done
 
-__all__ = ["ENDED_AT", "Entry", "Store", "open_sweep", "read_journal"]
-
 Array = NDArray[np.float64]
 #: The array that says when a run ended [s]; NaN where it reached the end.
 ENDED_AT: Final = "ended_at"

@@ -22,8 +22,6 @@ from pamrs.sweeps._store import ENDED_AT, Store, open_sweep
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["run_plan", "sweep"]
-
 
 def sweep(
     rig: Rig,
