@@ -219,8 +219,8 @@ def _muscles() -> list[Comparison]:
     """What the library knows of the chapter's two muscles, and six of the one against two of the
     other.
     """
-    from pamrs.design.elbow_muscles import compare_design
     from pamrs.library.published import compare
+    from reproduction.six_against_two import compare_design
 
     rows = [
         row

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+import numbers
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from pamrs.errors import ParameterError
@@ -13,7 +14,17 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-__all__ = ["as_numbers", "as_said", "check_column", "checked_number", "checked_table", "positive"]
+__all__ = [
+    "as_numbers",
+    "as_said",
+    "check_column",
+    "checked_number",
+    "checked_table",
+    "finite",
+    "one_of",
+    "positive",
+    "whole",
+]
 
 
 def as_said(value: object) -> str:
@@ -83,14 +94,69 @@ def positive(name: str, value: float, *, zero: bool = False) -> float:
     ParameterError
         Naming the argument, its value and what is allowed.
     """
-    allowed = f"a finite number {'from' if zero else 'above'} zero is needed"
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise ParameterError(f"{name} = {as_said(value)} is not allowed: {allowed}") from None
+    number = _number(value)
     if not (math.isfinite(number) and (number > 0.0 or (zero and number == 0.0))):
-        raise ParameterError(f"{name} = {value} is not allowed: {allowed}")
+        raise ParameterError(
+            f"{name} = {as_said(value)} is not allowed: a finite number "
+            f"{'from' if zero else 'above'} zero is needed"
+        )
     return number
+
+
+def finite(name: str, value: Any) -> float:
+    """The value, if it is a finite number; an error names it otherwise."""
+    if not math.isfinite(number := _number(value)):
+        raise ParameterError(f"{name} = {as_said(value)} is not allowed: a finite number is needed")
+    return number
+
+
+def _number(value: Any) -> float:
+    """A value as a number, NaN where it is none."""
+    try:
+        return float(value)
+    except (TypeError, ValueError, OverflowError):
+        return math.nan
+
+
+def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int:
+    """A whole number within bounds.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    value : object
+        What was given.
+    least, most : int
+        Bounds; without ``most`` it has no upper one.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    ParameterError
+        With name, value and what is allowed.
+    """
+    is_whole = isinstance(value, numbers.Integral) and not isinstance(value, bool)
+    if not (is_whole and least <= value and (most is None or value <= most)):
+        upper = " on" if most is None else f" to {most}"
+        raise ParameterError(
+            f"{name} = {as_said(value)} is not allowed: a whole number from {least}{upper} is "
+            "needed"
+        )
+    return int(value)
+
+
+def one_of(name: str, value: Any, allowed: Iterable[Any]) -> None:
+    """Refuse a value that is none of those that are allowed, with an error that names them."""
+    known = list(allowed)
+    if value not in known:
+        raise ParameterError(
+            f"{name} = {as_said(value)} is not allowed: one of {', '.join(map(repr, known))} is "
+            "needed"
+        )
 
 
 def checked_number(

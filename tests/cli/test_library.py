@@ -1,8 +1,6 @@
 """The command line of muscles: the library, and sizing."""
 
 import json
-import re
-import runpy
 from pathlib import Path
 
 import numpy as np
@@ -96,22 +94,11 @@ def test_the_rig_of_a_muscle_has_that_muscle(capsys, tmp_path, name):
     )
 
 
-def test_facts_are_what_the_module_prints(capsys):
-    code, out, _ = run(capsys, "library", "--facts")
-    assert code == 0
-    runpy.run_module("pamrs.library", run_name="__main__")
-    assert capsys.readouterr().out == out
-    assert "they determine 3 of 4 combinations" in out
-    assert "Six against two" in out
-    assert re.search(r"\d+ agree( .*)?, \d+ differ, \d+ cannot tell\n$", out)
-
-
 @pytest.mark.parametrize(
     ("words", "parts"),
     [
         (["elbow"], ["'elbow' is not in the library", "elbow_0625in"]),
         (["--rig", "out.toml"], ["--rig needs the NAME"]),
-        (["pam_a_1in", "--facts"], ["leave out NAME"]),
         (["pam_a_1in", "--rig", "no_folder/out.toml"], ["folder no_folder does not exist"]),
         (["no_such", "--rig", "out.toml"], ["'no_such' is not in the library"]),
     ],

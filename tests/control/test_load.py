@@ -220,7 +220,7 @@ def test_what_cannot_be_is_named():
         whole.update(0.0, {"muscle_pressure": 0.0}, Reference(0.25))
     with pytest.raises(ParameterError, match="rest_length = -1"):
         ARM.replace(rest_length=-1.0)
-    assert math.isfinite(ARM.replace(mass=3.0).mass)
+    assert math.isfinite(ARM.replace(inertia=3.0).inertia)
 
 
 def loops_of_a_length(trajectory):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import pamrs.library as library
-from pamrs.design.elbow_muscles import compare_design, elbow_requirement
 from pamrs.errors import ParameterError
 from pamrs.library import published, read_entry
-from pamrs.library._identify import derive, gent_modulus, least_norm
 from pamrs.library.evaluate import KINDS, activation_pressure, free_contraction, root_between
+from reproduction.identify import derive, gent_modulus, least_norm
+from reproduction.six_against_two import compare_design, elbow_requirement
 from tests.reference.geometry import GeometryReference
 
 INCH, POUND_FORCE, PSI = 0.0254, 4.4482216152605, 6894.757293168361

@@ -19,34 +19,18 @@ def library_command(
     rig: Annotated[
         Path | None, typer.Option(help="Write a rig file: a bench with this muscle.")
     ] = None,
-    facts: Annotated[
-        bool, typer.Option("--facts", help="Compare every published fact with ours.")
-    ] = False,
 ) -> None:
     """List the muscles of the 2014 dissertation, or print one with the origin of each number."""
     check_writable(rig)
-    if facts and (name is not None or rig is not None):
-        raise typer.BadParameter(
-            "--facts prints the facts of all muscles: leave out NAME and --rig"
-        )
     if rig is not None and name is None:
         raise typer.BadParameter("--rig needs the NAME of a muscle")
     from pamrs.library import text
 
     if name is None:
-        typer.echo(_facts() if facts else text.overview())
+        typer.echo(text.overview())
         return
     shown = text.description(name)
     from pamrs.library import entry
     from pamrs.rigs import bench
 
     write({rig: bench(entry(name).muscle, name).to_toml_text() if rig else ""}, shown)
-
-
-def _facts() -> str:
-    """Every published fact of the library, and the comparison of 3.2.3, each with ours."""
-    from pamrs.design.elbow_muscles import compare_design, six_against_two
-    from pamrs.library import text
-
-    rows = [*compare_design("large_2in_effective"), *compare_design("large_2in")]
-    return text.facts(rows, f"Six against two\n\n{six_against_two().table()}")

@@ -24,6 +24,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
+from pamrs._checks import one_of
 from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
@@ -142,8 +143,7 @@ class AdaptiveSliding(SlidingController):
         ParameterError
             If there is no such trial.
         """
-        if trial not in _PUBLISHED:
-            raise ParameterError(f"trial = {trial!r} is not allowed: 1, 2 or 3")
+        one_of("trial", trial, _PUBLISHED)
         return cls(arm, _PUBLISHED[trial], **{"bounds": None, **others})
 
     @property
@@ -220,10 +220,7 @@ def _bounds(
         return None
     parameters = arm.parameters
     if isinstance(bounds, str):
-        if bounds != "default":
-            raise ParameterError(
-                f"bounds = {bounds!r} is not allowed: 'default', three pairs or None"
-            )
+        one_of("bounds", bounds, ("default", None))
         # an arm of which nothing is known: what its muscles could move at all
         lowest, highest = arm.angle_range
         places = np.linspace(lowest, highest, 33)  # of each joint, along the first axis

@@ -11,6 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of
 from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, Reference, commands_of
 from pamrs.errors import ParameterError
@@ -109,10 +110,7 @@ def linear_controller(
         commands than at the point, has a corner there, or no measurement reaches its command: it
         is at a limit.
     """
-    if side not in SIDES:
-        raise ParameterError(
-            f"side = {side!r} is not allowed: one of {', '.join(map(repr, SIDES))}"
-        )
+    one_of("side", side, SIDES)
     whole_rig = controller.answers == "inputs"
     inputs = tuple(
         name

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from pamrs._checks import one_of
 from pamrs.control._air import AirModel
-from pamrs.control._joint_sensor import JointSensor
 from pamrs.control._model import ArmModel, JointModel
-from pamrs.control._parts import LowPass
+from pamrs.control._parts import JointSensor, LowPass
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Fixed, Restorer, SampledController
 from pamrs.control._torque import TorqueModel
@@ -140,10 +140,7 @@ class Feedforward(SampledController):
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        if motion not in ("commanded", "measured"):
-            raise ParameterError(
-                f"motion = {motion!r} is not allowed: 'commanded' or 'measured' is needed"
-            )
+        one_of("motion", motion, ("commanded", "measured"))
         self.arm, self.air, self.motion, self.lengthening = arm, air, motion, lengthening
         self._km = as_value("km", km, lower=0.0)
         self._on: Value = (

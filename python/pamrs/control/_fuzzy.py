@@ -10,6 +10,7 @@ from typing import ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import one_of
 from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import LowPass
 from pamrs.control._protocol import Measurement, Reference, Value
@@ -55,11 +56,7 @@ def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]
     """
     i, j = np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1), indexing="ij")
     if isinstance(table, str):
-        if table not in ("anti_diagonal", "quoted"):
-            raise ParameterError(
-                f"table = {table!r} is not allowed: 'anti_diagonal', 'quoted' or 7 x 7 numbers are "
-                "needed"
-            )
+        one_of("table", table, ("anti_diagonal", "quoted"))
         index = (i + j + (np.sign(j) * (i + j == 0) if table == "quoted" else 0)).astype(np.float64)
         return np.clip(index, -_HALF, _HALF) / _HALF
     given = np.asarray(table, dtype=np.float64)

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Final
 
 import numpy as np
 
+from pamrs._checks import one_of, positive
 from pamrs.control._protocol import Controller, Measurement, Reference, Value, check_drives_valve
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._spline import Spline
@@ -49,10 +50,7 @@ class SlipMemory(Stateful):
     _STATE: ClassVar[Mapping[str, Any]] = {"a": 0.0, "b": 0.0, "c": 0.0, "d": 0.0}
 
     def __init__(self, presliding: float) -> None:
-        if not 0.0 < presliding < float("inf"):
-            raise ParameterError(
-                f"presliding = {presliding} m is not allowed: a finite number above zero is needed"
-            )
+        positive("presliding", presliding)
         self._distance = tuple(share * presliding for share in _SHARE)
         self.reset()
 
@@ -177,10 +175,7 @@ class HysteresisCompensation(SampledController):
     _PARTS: ClassVar[tuple[str, ...]] = ("torque", "controller")
 
     def __init__(self, controller: Controller, rig: Rig, *, source: str = "desired") -> None:
-        if source not in ("desired", "measured"):
-            raise ParameterError(
-                f"source = {source!r} is not allowed: 'desired' or 'measured' is needed"
-            )
+        one_of("source", source, ("desired", "measured"))
         self.source = source
         self.controller: Any = copy.deepcopy(controller)
         owner = _owner(self.controller)

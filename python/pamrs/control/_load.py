@@ -10,14 +10,14 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from pamrs._checks import positive
 from pamrs.control._groups import highest_pressure, joints_of, lengths_of
-from pamrs.control._model import JointModel, Parameter
+from pamrs.control._model import ArmModel
 from pamrs.control._protocol import Controller, Measurement, Reference, Value
 from pamrs.control._sampled import SampledController
 from pamrs.control._torque import TorqueModel, active_groups, joint_torque, rest_length_of
-from pamrs.control._values import as_value, positive_gain
 from pamrs.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -25,14 +25,14 @@ if TYPE_CHECKING:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class LoadModel(JointModel):
+class LoadModel(ArmModel):
     """Equation of motion of a hanging mass, ``m x'' + c x' + m g = C1(x) P + C2(x)`` over the
     shortening ``x`` of its muscles; dry friction is in no model here.
 
     Attributes
     ----------
-    mass : float or ndarray, shape (n,)
-        ``m`` [kg].
+    inertia : float or ndarray, shape (n,)
+        The mass ``m`` [kg].
     viscous : float or ndarray, shape (n,)
         ``c`` [N s/m].
     weight : float or ndarray, shape (n,)
@@ -47,25 +47,11 @@ class LoadModel(JointModel):
         ``L0`` of the muscles [m].
     """
 
-    mass: Value
-    viscous: Value
-    weight: Value
-    torque: TorqueModel = dataclasses.field(repr=False)
-    pressure_limit: float
-    angle_range: tuple[float, float]
-    rest_length: float
+    rest_length: float = math.nan
 
     def __post_init__(self) -> None:
-        for name in ("mass", "viscous", "weight"):
-            object.__setattr__(self, name, as_value(name, getattr(self, name)))
-        for name in ("pressure_limit", "rest_length"):
-            object.__setattr__(self, name, float(positive_gain(name, getattr(self, name))))
-        low, high = (float(value) for value in self.angle_range)
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(
-                f"angle_range = {self.angle_range} is not allowed: two finite numbers, the first "
-                "below the second"
-            )
+        super().__post_init__()
+        positive("rest_length", self.rest_length)
 
     @classmethod
     def from_rig(
@@ -108,7 +94,7 @@ class LoadModel(JointModel):
             )
         rest, groups = rest_length_of(rig), active_groups(rig, active)
         return cls(
-            mass=load["mass"],
+            inertia=load["mass"],
             viscous=load["viscous"],
             weight=load["mass"] * load["gravity"],
             torque=joint_torque(rig, name, torque, groups, False)
@@ -119,35 +105,9 @@ class LoadModel(JointModel):
             rest_length=rest,
         )
 
-    def replace(self, **changes: Any) -> LoadModel:
-        """The same with other attributes."""
-        return dataclasses.replace(self, **changes)
-
-    @property
-    def joints(self) -> int:
-        """1."""
-        return 1
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """``m``, ``c`` and ``m g``."""
-        return (
-            Parameter("inertia", 0, self.mass),
-            Parameter("viscous", 1, self.viscous),
-            Parameter("weight", 2, self.weight),
-        )
-
-    def inverse_dynamics(
-        self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
-    ) -> Value:
-        """Pull [N] ``m a + c v + m g``; see :meth:`JointModel.inverse_dynamics`."""
-        return self.mass * acceleration + self.viscous * wanted_rate + self.weight + 0.0 * angle
-
-    def regressor(
-        self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
-    ) -> tuple[Value, ...]:
-        """``a``, ``v`` and 1; see :meth:`JointModel.regressor`."""
-        return acceleration, wanted_rate, 1.0 + 0.0 * angle
+    def lever(self, angle: Value) -> Value:
+        """1: a mass weighs the same everywhere."""
+        return 1.0 + 0.0 * angle
 
 
 def shortened(reference: Reference, rest_length: float) -> Reference:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import finite, one_of
 from pamrs.channels import channel_of, rate_of, unit_of
 from pamrs.control._groups import joints_of, lengths_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
@@ -104,19 +105,13 @@ class ClosedLoop:
         wanted, trajectory, channel = self.reference.angle, self.trajectory, self.joint
         if isinstance(trajectory, JointTrajectories):
             names = list(trajectory.of_joint)
-            if joint not in names:
-                raise ParameterError(
-                    f"joint = {joint!r} is not allowed: one of {', '.join(names)} is needed"
-                )
+            one_of("joint", joint, names)
             k = names.index(joint)
             channel, wanted = self.joints[k], np.asarray(wanted)[k]
             trajectory = trajectory.of_joint[joint]
         own = unit_of(channel)
         allowed = ("rad", "deg") if own == "rad" else (own,)
-        if unit is not None and unit not in allowed:
-            raise ParameterError(
-                f"unit = {unit!r} is not allowed: one of {', '.join(allowed)} is needed"
-            )
+        one_of("unit", unit or own, allowed)
         return evaluate(
             self.time,
             wanted,
@@ -246,8 +241,7 @@ def closed_loop(
     total = whole_samples(
         "duration", wanted_of.duration if duration is None else duration, dt, least=1
     )
-    if not math.isfinite(start):
-        raise ParameterError(f"start = {start} s is not allowed: a finite number is needed")
+    finite("start", start)
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
     began = (
         round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt

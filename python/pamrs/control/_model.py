@@ -8,8 +8,9 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
+from pamrs._checks import finite
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, active_groups, joint_torque
@@ -173,7 +174,7 @@ class ArmModel(JointModel):
         low, high = (float(value) for value in self.angle_range)
         if not (math.isfinite(low) and math.isfinite(high) and low < high):
             raise ParameterError(
-                f"angle_range = {self.angle_range} is not allowed: two finite angles, the first "
+                f"angle_range = {self.angle_range} is not allowed: two finite numbers, the first "
                 "below the second"
             )
         stiffness, rest = (float(value) for value in self.spring)
@@ -182,8 +183,7 @@ class ArmModel(JointModel):
                 f"spring = {self.spring} is not allowed: a finite stiffness of zero or more "
                 "[N m/rad] and a finite angle [rad]"
             )
-        if not math.isfinite(self.tilt):
-            raise ParameterError(f"tilt = {self.tilt} rad is not allowed: a finite angle")
+        finite("tilt", self.tilt)
 
     @classmethod
     def from_rig(
@@ -244,11 +244,11 @@ class ArmModel(JointModel):
             spring=(joint.get("stiffness", 0.0), joint.get("spring_angle", 0.0)),
         )
 
-    def replace(self, **changes: Any) -> ArmModel:
+    def replace(self, **changes: Any) -> Self:
         """The same with other attributes."""
         return dataclasses.replace(self, **changes)
 
-    def scaled(self, factor: Value) -> ArmModel:
+    def scaled(self, factor: Value) -> Self:
         """With ``I``, ``b`` and ``m g r`` times a factor: the wrong estimates of 5.4.1, 0.1
         and 10.
         """
@@ -279,7 +279,11 @@ class ArmModel(JointModel):
         :meth:`JointModel.inverse_dynamics`.
         """
         moved = self.inertia * acceleration + self.viscous * wanted_rate
-        return moved + self.weight * sin(angle + self.tilt) + self.springs(angle)
+        return moved + self.weight * self.lever(angle) + self.springs(angle)
+
+    def lever(self, angle: Value) -> Value:
+        """What gravity pulls with, of :attr:`weight`: ``sin(theta + tilt)``."""
+        return sin(angle + self.tilt)
 
     def springs(self, angle: Value) -> Value:
         """``k (theta - theta_k)``; see :meth:`JointModel.springs`."""
@@ -290,7 +294,7 @@ class ArmModel(JointModel):
         self, angle: Value, rate: Value, wanted_rate: Value, acceleration: Value
     ) -> tuple[Value, ...]:
         """``a``, ``v`` and ``sin(theta + tilt)``; see :meth:`JointModel.regressor`."""
-        return acceleration, wanted_rate, sin(angle + self.tilt)
+        return acceleration, wanted_rate, self.lever(angle)
 
 
 def _weight(arm: Mapping[str, Any]) -> tuple[float, float]:

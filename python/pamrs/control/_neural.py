@@ -25,6 +25,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, whole
 from pamrs._writing import write_atomically
 from pamrs.control._adaptive import dead, held
 from pamrs.control._model import JointModel
@@ -107,12 +108,8 @@ class Neural(SlidingController):
         hold_at_limit: bool = True,
         **others: Any,
     ) -> None:
-        if start not in ("zero", "model"):
-            raise ParameterError(f"start = {start!r} is not allowed: 'zero' or 'model' is needed")
-        if not (isinstance(nodes, int) and not isinstance(nodes, bool) and 2 <= nodes <= 10_000):
-            raise ParameterError(
-                f"nodes = {nodes} is not allowed: a whole number from 2 to 10000 is needed"
-            )
+        one_of("start", start, ("zero", "model"))
+        whole("nodes", nodes, 2, 10_000)
         if len(gains) != 3:
             raise ParameterError(
                 f"gains has {len(gains)} entries: three are needed, for H, C and G"

@@ -8,11 +8,11 @@ import abc
 from collections.abc import Iterable, Mapping
 from typing import Any, ClassVar, Self
 
-from pamrs.control._joint_sensor import JointSensor
+from pamrs._checks import one_of
+from pamrs.control._parts import JointSensor
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, SampledController
 from pamrs.control._values import angle_factor, limits_around
-from pamrs.errors import ParameterError
 
 
 class OutputFeedback(SampledController):
@@ -84,10 +84,7 @@ class OutputFeedback(SampledController):
         ParameterError
             If there is no such set of gains.
         """
-        if name not in cls._PUBLISHED:
-            raise ParameterError(
-                f"name = {name!r} is not allowed: one of {', '.join(cls._PUBLISHED)}"
-            )
+        one_of("name", name, cls._PUBLISHED)
         return cls(**{**cls._PUBLISHED[name], "unit": "rad", **others})
 
     def update(self, time: float, measurement: Measurement, reference: Reference) -> Value:

@@ -12,10 +12,10 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs.control._protocol import Value
-from pamrs.control._sampled import Stateful
+from pamrs._checks import one_of
+from pamrs.control._protocol import Measurement, Value
+from pamrs.control._sampled import SampledController, Stateful
 from pamrs.control._values import as_value, positive_number
-from pamrs.errors import ParameterError
 
 ANTI_WINDUP: Final = ("clamping", "back_calculation", "none")
 """How an integral is kept from growing while the output is at a limit; ``none`` as in the
@@ -150,10 +150,7 @@ class Integrator(Stateful):
     def __init__(
         self, period: float, *, anti_windup: str = "clamping", tracking_time: Value = 0.5
     ) -> None:
-        if anti_windup not in ANTI_WINDUP:
-            raise ParameterError(
-                f"anti_windup = {anti_windup!r} is not allowed: one of {', '.join(ANTI_WINDUP)}"
-            )
+        one_of("anti_windup", anti_windup, ANTI_WINDUP)
         self._period = positive_number("period", period)
         self._mode = ANTI_WINDUP.index(anti_windup)
         # from one sample to the next not more than the whole excess is taken off
@@ -184,3 +181,54 @@ class Integrator(Stateful):
         elif self._mode == 1:
             rate = rate - excess / self._tracking
         self._integral: Value = self._integral + rate * self._period
+
+
+class JointSensor(Stateful):
+    """Angle and rate of the joint.
+
+    Parameters
+    ----------
+    period : float
+        Time between two samples [s].
+    angle_filter : float or ndarray, shape (n,)
+        Time constant of the angle's low-pass [s]; 0: none.
+    rate_filter : float or ndarray, shape (n,)
+        Time constant of the rate's low-pass [s].
+    measured_rate : bool
+        Whether ``joint_rate`` is read; by default the rate is the filtered derivative of the angle,
+        since the rigs of the dissertation measure angle and pressure only.
+    """
+
+    _PARTS: ClassVar[tuple[str, ...]] = ("low_pass", "slope")
+
+    def __init__(
+        self,
+        period: float,
+        *,
+        angle_filter: Value = 0.0,
+        rate_filter: Value = 0.02,
+        measured_rate: bool = False,
+    ) -> None:
+        self.measured_rate = bool(measured_rate)
+        self.low_pass = LowPass(angle_filter, period)
+        self.slope: LowPass | FilteredDerivative
+        self.slope = (
+            LowPass(rate_filter, period)
+            if measured_rate
+            else FilteredDerivative(rate_filter, period)
+        )
+        self._through = angle_filter.__class__ is float and angle_filter == 0.0
+
+    def read(
+        self, owner: SampledController, measurement: Measurement
+    ) -> tuple[Value, Value | None]:
+        """Angle [rad] and, where it is measured, rate [rad/s] of a sample, checked; changes
+        nothing.
+        """
+        angle = owner._read(measurement, "joint_angle")
+        return angle, owner._read(measurement, "joint_rate") if self.measured_rate else None
+
+    def update(self, angle: Value, rate: Value | None) -> tuple[Value, Value]:
+        """Filtered angle [rad] and rate [rad/s] of what :meth:`read` gave."""
+        slope = self.slope.update(angle if rate is None else rate)
+        return (angle if self._through else self.low_pass.update(angle)), slope

@@ -15,13 +15,13 @@ Li, Applied Nonlinear Control, 1991, 9.1).
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import finite
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._model import JointModel, Parameter
 from pamrs.control._protocol import Value
@@ -122,8 +122,7 @@ class PlanarArmModel(JointModel):
                 )
             value.flags.writeable = False
             object.__setattr__(self, name, value)
-        if not math.isfinite(self.tilt):
-            raise ParameterError(f"tilt = {self.tilt} rad is not allowed: a finite angle")
+        finite("tilt", self.tilt)
         if self.spring is not None:
             stiffness, rest = (np.array(part, dtype=np.float64) for part in self.spring)
             both = np.concatenate([stiffness.ravel(), rest.ravel()])

@@ -19,11 +19,12 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from pamrs._checks import positive, whole
 from pamrs.control._parts import FilteredDerivative
 from pamrs.control._protocol import Value
 from pamrs.control._sharing import Demand, Share
 from pamrs.control._torque import GroupTorque
-from pamrs.control._values import clip, positive_number, sin, where
+from pamrs.control._values import clip, greater, positive_number, sin, where
 from pamrs.errors import ParameterError
 
 _FILL = 0.3  # of the ramp: how long a group is filled before it pulls
@@ -101,17 +102,12 @@ class Recruitment(Share):
                 "<= 1 is needed, so that a group that was dropped is not needed at once"
             )
         count = len(self.groups)
-        if not (isinstance(least, int) and 1 <= least <= count):
-            raise ParameterError(
-                f"least = {least!r} is not allowed: a whole number from 1 to {count} is needed"
-            )
-        for name, value in (("dwell", dwell), ("horizon", horizon), ("reserve", reserve)):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ParameterError(f"{name} = {value} is not allowed: zero or more is needed")
         self.period, self.ramp = positive_number("period", period), positive_number("ramp", ramp)
         self.add_at, self.drop_at = float(add_at), float(drop_at)
-        self.dwell, self.horizon, self.reserve = float(dwell), float(horizon), float(reserve)
-        self.least = least
+        self.dwell = positive("dwell", dwell, zero=True)
+        self.horizon = positive("horizon", horizon, zero=True)
+        self.reserve = positive("reserve", reserve, zero=True)
+        self.least = whole("least", least, 1, count)
         if reach is not None and not 0.0 < reach < math.pi:
             raise ParameterError(
                 f"reach = {reach} rad is not allowed: above 0 and below pi is needed"
@@ -164,7 +160,7 @@ class Recruitment(Share):
         drive = clip(self._drive(torque, lines, weights), 0.0, limit)
         supply = demand.supplies[0]
         for other in demand.supplies[1:]:
-            supply = _lower(supply, other)
+            supply = -greater(-supply, -other)
         self._move(supply, self._choose(torque, angle, lines, supply))
         answers: list[Value] = []
         for share, weight, (c1, c2) in zip(self.shares, weights, lines, strict=True):
@@ -213,13 +209,13 @@ class Recruitment(Share):
         later = torque + self.horizon * self.torque_rate.update(torque)
         ahead = [group.at(soon) for group in self.groups]
         pairs = zip(self._needed(torque, lines), self._needed(later, ahead), strict=True)
-        needed = [_higher(now, then) for now, then in pairs]
+        needed = [greater(now, then) for now, then in pairs]
         if self.reach is not None:
             far = clip(angle, self.reach, high)
             lever = sin(far) / clip(sin(angle), _LEAST_LEVER, 1.0)
             lines = [group.at(far) for group in self.groups]
             most = self._needed(clip(torque, 0.0, math.inf) * lever, lines)
-            needed = [_higher(a, b) for a, b in zip(needed, most, strict=True)]
+            needed = [greater(a, b) for a, b in zip(needed, most, strict=True)]
         there = clip(supply - self.reserve, self.reserve, self.pressure_limit)
         active, waited = self._active, self._waited + self.period
         wanted = _count(needed, self.add_at * there, self.least)
@@ -253,18 +249,6 @@ class Recruitment(Share):
                     clip(share - step, -_FILL, 1.0),
                 ),
             )
-
-
-def _lower(a: Value, b: Value) -> Value:
-    if a.__class__ is float and b.__class__ is float:
-        return a if a < b else b
-    return np.minimum(a, b)
-
-
-def _higher(a: Value, b: Value) -> Value:
-    if a.__class__ is float and b.__class__ is float:
-        return a if a > b else b
-    return np.maximum(a, b)
 
 
 def _both(a: Any, b: Any) -> Any:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import numbers
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from pamrs._checks import checked_table, positive, whole
 from pamrs.control._protocol import Measurement, Value
 from pamrs.errors import ParameterError
 
@@ -53,37 +52,12 @@ class Sensors:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        for label, table, zero in (
-            ("noise", self.noise, True),
-            ("resolution", self.resolution, False),
-        ):
-            if not isinstance(table, Mapping):
-                raise ParameterError(
-                    f"{label} = {table!r} is not allowed: a mapping of channels to numbers is "
-                    "needed"
-                )
+        for label, zero in (("noise", True), ("resolution", False)):
+            table = checked_table(label, getattr(self, label))
             for channel, value in table.items():
-                if not (
-                    isinstance(value, numbers.Real)
-                    and math.isfinite(value)
-                    and (value > 0.0 or (zero and value == 0.0))
-                ):
-                    need = "zero or more" if zero else "a number above zero"
-                    raise ParameterError(
-                        f"{label} of {channel} = {value} is not allowed: {need} is needed"
-                    )
-        if not (
-            isinstance(self.delay, numbers.Real) and math.isfinite(self.delay) and self.delay >= 0.0
-        ):
-            raise ParameterError(f"delay = {self.delay} s is not allowed: zero or more is needed")
-        if (
-            isinstance(self.seed, bool)
-            or not isinstance(self.seed, numbers.Integral)
-            or self.seed < 0
-        ):
-            raise ParameterError(
-                f"seed = {self.seed!r} is not allowed: a whole number from 0 on is needed"
-            )
+                positive(f"{label} of {channel}", value, zero=zero)
+        positive("delay", self.delay, zero=True)
+        whole("seed", self.seed)
 
     def started(self, period: float) -> Reader:
         """Sensors at the beginning of a run.

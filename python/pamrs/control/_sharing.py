@@ -16,7 +16,7 @@ import numpy as np
 from pamrs.control._protocol import Value
 from pamrs.control._sampled import Stateful
 from pamrs.control._torque import GroupTorque
-from pamrs.control._values import as_value, clip
+from pamrs.control._values import as_value, clip, greater
 from pamrs.errors import ParameterError
 
 #: A number for all time, or a function of time [s].
@@ -150,8 +150,8 @@ class CoContraction(Share):
         )
         # tau = a p + b q + a0 + b0 with b < 0: a line of pairs, of which the limits cut a piece
         left = demand.torque - a0 - b0
-        first = _larger(down, (a * up - left) / -b)
-        last = -_larger(-high, (left - a * high) / -b)
+        first = greater(down, (a * up - left) / -b)
+        last = -greater(-high, (left - a * high) / -b)
         q = first
         if wanted is not None:
             gain = kb - ka * b / a
@@ -186,7 +186,7 @@ class CoContraction(Share):
         """Least pressure of the groups of a side [Pa]: that at which all of them are taut."""
         low: Value = self.least_pressure
         for k in which:
-            low = _larger(low, self.groups[k].taut(angle, self.least_pressure, self.pressure_limit))
+            low = greater(low, self.groups[k].taut(angle, self.least_pressure, self.pressure_limit))
         return low
 
     def _side(self, which: list[int], angle: Value) -> tuple[Value, Value, Value, Value]:
@@ -202,12 +202,6 @@ class CoContraction(Share):
 def stiffness_of(value: Any) -> Value | None:
     """A stiffness [N m/rad], checked; None as it is."""
     return None if value is None else as_value("stiffness", value, lower=0.0)
-
-
-def _larger(a: Value, b: Value) -> Value:
-    if a.__class__ is float and b.__class__ is float:
-        return a if a > b else b
-    return np.maximum(a, b)
 
 
 def _towards(needed: Value, gain: Value, first: Value, last: Value) -> Value:

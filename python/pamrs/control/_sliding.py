@@ -21,8 +21,8 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from pamrs.control._joint_sensor import JointSensor
 from pamrs.control._model import JointModel
+from pamrs.control._parts import JointSensor
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed, SampledController
 from pamrs.control._values import as_value, clip, positive_gain, sign

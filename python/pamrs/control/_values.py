@@ -9,6 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pamrs._checks import one_of
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
@@ -106,10 +107,7 @@ def angle_factor(unit: str) -> float:
     """How many of a unit, ``"rad"`` or ``"deg"``, are in a radian; a ParameterError for another
     one.
     """
-    if unit not in _PER_RADIAN:
-        raise ParameterError(
-            f"unit = {unit!r} is not allowed: one of {', '.join(_PER_RADIAN)} is needed"
-        )
+    one_of("unit", unit, _PER_RADIAN)
     return _PER_RADIAN[unit]
 
 
@@ -118,6 +116,13 @@ def clip(value: Value, low: Value, high: Value) -> Value:
     if value.__class__ is float and low.__class__ is float and high.__class__ is float:
         return low if value < low else high if value > high else value
     return np.minimum(np.maximum(value, low), high)
+
+
+def greater(a: Value, b: Value) -> Value:
+    """The larger one of two."""
+    if a.__class__ is float and b.__class__ is float:
+        return a if a > b else b
+    return np.maximum(a, b)
 
 
 def sign(value: Value) -> Value:

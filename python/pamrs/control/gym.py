@@ -35,10 +35,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import positive, whole
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import keywords_of
-from pamrs.control._values import positive_number
 from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach, lift_hold_return
 from pamrs.errors import ParameterError, SimulationError, missing_package
 from pamrs.rig import Rig
@@ -115,15 +115,10 @@ class _Task:
         self.rig = rigs.shoulder() if rig is None else rig
         self.moved = _moved(self.rig)
         self.targets = self._targets(targets)
-        if not (
-            math.isfinite(effort) and effort >= 0.0 and math.isfinite(penalty) and penalty >= 0.0
-        ):
-            raise ParameterError(
-                f"effort = {effort} and penalty = {penalty} are not allowed: zero or more is needed"
-            )
-        sample_time = positive_number("sample_time", sample_time)
+        sample_time = positive("sample_time", sample_time)
         self.trajectory = self._given(trajectory)
-        self.sample_time, self.effort, self.penalty = sample_time, effort, penalty
+        self.sample_time, self.effort = sample_time, positive("effort", effort, zero=True)
+        self.penalty = positive("penalty", penalty, zero=True)
         direct = {dotted("supply_command", name) for name in direct_regulators(self.rig)}
         self.inputs = tuple(
             name
@@ -206,7 +201,7 @@ class _Task:
                     f"rig {self.rig.name!r} has a regulator: give pressure_limit, or [limits] "
                     "max_pressure in the rig"
                 )
-            limit = positive_number("pressure_limit", limit)
+            limit = positive("pressure_limit", limit)
             most = max(most, limit)
             ends.append((0.5 * limit, 0.5 * limit))
         if not most > 0.0:
@@ -479,12 +474,7 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
 
         _check_render_mode(render_mode)
         self.render_mode = None
-        whole = isinstance(num_envs, (int, np.integer)) and not isinstance(num_envs, bool)
-        if not whole or num_envs < 1:
-            raise ParameterError(
-                f"num_envs = {num_envs!r} is not allowed: a whole number of rigs, 1 at least, is "
-                "needed; the rig comes behind it, RigVectorEnv(64, rig)"
-            )
+        whole("num_envs", num_envs, 1)  # the rig comes behind it
         self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
         self.num_envs = num_envs

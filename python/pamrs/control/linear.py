@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Final
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, positive
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
 from pamrs.control._controller_model import LinearController, heard, linear_controller
@@ -81,35 +81,6 @@ class LinearModel:
         }  # it allows no dot
         return library.ss(self.a, self.b, self.c, d, **names)
 
-    def driven_by(self, state: str) -> LinearModel:
-        """The model with a state as its only input, for example the pressure of a chamber that a
-        fast inner loop holds.
-
-        Parameters
-        ----------
-        state : str
-            One of :attr:`states`; it is no output any more.
-
-        Returns
-        -------
-        LinearModel
-
-        Raises
-        ------
-        ParameterError
-            If there is no such state.
-        """
-        if state not in self.states:
-            raise ParameterError(
-                f"state = {state!r} is not allowed: one of {', '.join(self.states)}"
-            )
-        k = self.states.index(state)
-        rest = [i for i in range(len(self.states)) if i != k]
-        rows = [i for i, name in enumerate(self.outputs) if name != state]
-        a, b, c = self.a[np.ix_(rest, rest)], self.a[np.ix_(rest, [k])], self.c[np.ix_(rows, rest)]
-        names = tuple(self.states[i] for i in rest), (state,), tuple(self.outputs[i] for i in rows)
-        return LinearModel(a, b, c, *names, self.point, self.side)
-
     def sampled(self, period: float) -> tuple[Array, Array]:
         """State and input matrix from one sample to the next, the input held between (exact).
 
@@ -127,10 +98,7 @@ class LinearModel:
         ParameterError
             If the period is not above zero.
         """
-        if not (math.isfinite(period) and period > 0.0):
-            raise ParameterError(
-                f"period = {period} s is not allowed: a finite time above zero is needed"
-            )
+        positive("period", period)
         from scipy.linalg import expm
 
         n, m = self.b.shape
@@ -262,7 +230,8 @@ def linearise(
         without a linear model (play, dead zone, relay: the message names it), another joint does
         not rest, or a command moves nothing; if there is neither an angle nor ``initial``.
     """
-    _check_choices(side, friction)
+    one_of("side", side, SIDES)
+    one_of("friction", friction, FRICTIONS)
     constant = _held_supplies(rig) if held is None else held
 
     def is_held(name: str) -> bool:
@@ -292,16 +261,6 @@ def linearise(
     return LinearModel(
         a[np.ix_(used, used)], b[used], c[:, used], *names, {**first, **commands}, side
     )
-
-
-def _check_choices(side: str, friction: str) -> None:
-    """Refuse what is no side of a valve, or no way to take dry friction."""
-    if side not in SIDES:
-        raise ParameterError(f"side = {side!r} is not allowed: one of {', '.join(SIDES)}")
-    if friction not in FRICTIONS:
-        raise ParameterError(
-            f"friction = {friction!r} is not allowed: one of {', '.join(FRICTIONS)}"
-        )
 
 
 def _start(

@@ -21,6 +21,7 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import whole
 from pamrs._termination import Termination
 from pamrs.control._live_commands import Command, LiveCommands, pair
 from pamrs.control._loop import trajectories_of
@@ -274,10 +275,7 @@ class _Loop:
     ) -> None:
         check_controller(controller)
         self.commands = LiveCommands(controller, safe, limits)
-        if isinstance(most_missed, bool) or not isinstance(most_missed, int) or most_missed < 0:
-            raise ParameterError(
-                f"most_missed = {most_missed!r} is not allowed: a whole number from 0 on is needed"
-            )
+        whole("most_missed", most_missed)
         self.device, self.controller, self.clock = device, controller, clock
         self.trajectory = trajectories_of(trajectory, controller)
         self.most_missed, self.stamp = most_missed, stamp

@@ -1,4 +1,4 @@
-"""How well a loop follows: the metrics of 4.4.1 and the usual ones of a step; for one run
+"""How well a loop follows, by the metrics of 4.4.1 and the usual ones; for one run
 ``(samples,)`` or a batch ``(n, samples)``.
 
 The curvature (4.16) of the graph of angle over time adds a rate squared to one, so its value, and
@@ -19,8 +19,6 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control._signals import checked, integral, plain
-from pamrs.control._step_metrics import overshoot, rise_time, settling_time
 from pamrs.control._values import angle_factor
 from pamrs.errors import ParameterError
 
@@ -31,11 +29,8 @@ __all__ = [
     "curvature",
     "evaluate",
     "lag",
-    "overshoot",
     "phases",
-    "rise_time",
     "rms",
-    "settling_time",
     "squared_error",
     "steady_error",
     "total_curvature",
@@ -105,7 +100,7 @@ def squared_error(
         and its result is NaN), or the unit is unknown.
     """
     t, e = _error(time, reference, angle)
-    return plain(_factor(unit) ** 2 * integral(t, e * e))
+    return _plain(_factor(unit) ** 2 * _integral(t, e * e))
 
 
 def curvature(
@@ -164,7 +159,7 @@ def total_curvature(
         As :func:`squared_error`.
     """
     _, v = _rate(time, angle, rate, unit)
-    return plain(np.abs(np.diff(slope_sine(v), axis=-1)).sum(axis=-1))
+    return _plain(np.abs(np.diff(slope_sine(v), axis=-1)).sum(axis=-1))
 
 
 def slope_sine(rate: Array) -> Array:
@@ -259,7 +254,7 @@ def rms(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
         As :func:`squared_error`.
     """
     t, e = _error(time, reference, angle)
-    return plain(np.sqrt(integral(t, e * e) / (t[-1] - t[0])))
+    return _plain(np.sqrt(_integral(t, e * e) / (t[-1] - t[0])))
 
 
 def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Array:
@@ -286,7 +281,7 @@ def lag(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> float | Arra
     moved = (change * change / np.diff(t)).sum(axis=-1)
     shared = (change * 0.5 * (e[..., 1:] + e[..., :-1])).sum(axis=-1)
     # nothing moved: zero, or NaN where a run failed
-    return plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0 * shared))
+    return _plain(np.where(moved > 0.0, shared / np.where(moved > 0.0, moved, 1.0), 0.0 * shared))
 
 
 def steady_error(
@@ -316,7 +311,7 @@ def steady_error(
         raise ParameterError(
             f"window = {window} s is not allowed: above 0 and at most {t[-1] - t[0]:g} s is needed"
         )
-    return plain(e[..., t >= t[-1] - window * (1.0 + 1e-12)].mean(axis=-1))
+    return _plain(e[..., t >= t[-1] - window * (1.0 + 1e-12)].mean(axis=-1))
 
 
 def phases(
@@ -354,10 +349,10 @@ def phases(
         part, when = e[..., inside], t[inside]
         length = when[-1] - when[0]
         found[name] = {
-            "rms": plain(np.sqrt(integral(when, part * part) / length)),
-            "largest": plain(np.abs(part).max(axis=-1)),
-            "mean": plain(integral(when, part) / length),
-            "final": plain(part[..., -1]),
+            "rms": _plain(np.sqrt(_integral(when, part * part) / length)),
+            "largest": _plain(np.abs(part).max(axis=-1)),
+            "mean": _plain(_integral(when, part) / length),
+            "final": _plain(part[..., -1]),
         }
     return found
 
@@ -400,8 +395,8 @@ def evaluate(
         squared_error=squared_error(time, reference, angle, unit=unit),
         curvature=total_curvature(time, angle, rate=rate, unit=unit),
         rms=rms(time, reference, angle),
-        largest=plain(np.abs(e).max(axis=-1)),
-        final=plain(e[..., -1]),
+        largest=_plain(np.abs(e).max(axis=-1)),
+        final=_plain(e[..., -1]),
         lag=lag(time, reference, angle),
         phases=phases(time, reference, angle, parts or {}),
         unit=unit,
@@ -410,14 +405,14 @@ def evaluate(
 
 def _error(time: ArrayLike, reference: ArrayLike, angle: ArrayLike) -> tuple[Array, Array]:
     """Checked time and reference minus angle."""
-    t, y = checked(time, "angle", angle)
+    t, y = _checked(time, "angle", angle)
     r = np.asarray(reference, dtype=np.float64)
     if r.shape not in (y.shape, t.shape):
         raise ParameterError(
             f"reference has the shape {r.shape}; that of angle {y.shape} or of time {t.shape} is "
             "needed"
         )
-    _, r = checked(time, "reference", r)
+    _, r = _checked(time, "reference", r)
     return t, np.asarray(r - y, dtype=np.float64)
 
 
@@ -431,12 +426,54 @@ def _rate(
 ) -> tuple[Array, Array]:
     """Checked time and rate in the unit per second."""
     factor = _factor(unit)
-    t, y = checked(time, "angle", angle)
+    t, y = _checked(time, "angle", angle)
     if t.size < 3:
         raise ParameterError(f"time has {t.size} samples; a curvature needs three at least")
     if rate is None:
         return t, factor * np.gradient(y, t, axis=-1)
-    _, v = checked(time, "rate", rate)
+    _, v = _checked(time, "rate", rate)
     if v.shape != y.shape:
         raise ParameterError(f"rate has the shape {v.shape}; that of angle {y.shape} is needed")
     return t, factor * v
+
+
+def _checked(time: ArrayLike, name: str, values: ArrayLike) -> tuple[Array, Array]:
+    """Rising times and values of shape (samples,) or (n, samples) as arrays; anything else is a
+    ParameterError.
+
+    Values that are not finite are an error too. In a batch they are those of a run that failed: its
+    whole row is NaN, and so is all that is found for it.
+    """
+    t, y = np.asarray(time, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    if t.ndim != 1 or t.size < 2 or not np.isfinite(t).all() or not (np.diff(t) > 0.0).all():
+        raise ParameterError(
+            f"time with the shape {t.shape} is not allowed: two or more finite, rising times [s] "
+            "are needed"
+        )
+    if y.ndim not in (1, 2) or y.shape[-1] != t.size:
+        raise ParameterError(
+            f"{name} has the shape {y.shape}; ({t.size},) or (n, {t.size}) is needed"
+        )
+    finite = np.isfinite(y)
+    if finite.all():
+        return t, y
+    if y.ndim == 1:
+        raise ParameterError(
+            f"{name} is not finite at {t[np.flatnonzero(~finite)[0]]:g} s, which is not allowed"
+        )
+    return t, np.where(finite.all(axis=-1, keepdims=True), y, np.nan)
+
+
+def _plain(values: ArrayLike) -> float | Array:
+    """A float for one run."""
+    found = np.asarray(values, dtype=np.float64)
+    return float(found) if found.ndim == 0 else found
+
+
+def _integral(time: Array, values: Array) -> Array:
+    """Integral over time along the last axis by the trapezoidal rule (numpy 1 and 2 name theirs
+    differently).
+    """
+    return np.asarray(
+        (0.5 * (values[..., 1:] + values[..., :-1]) * np.diff(time)).sum(axis=-1), dtype=np.float64
+    )

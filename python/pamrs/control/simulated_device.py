@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from pamrs._checks import checked_number, positive
 from pamrs.channels import channel_of, dotted
 from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import commands_of, keywords_of
@@ -46,15 +47,10 @@ class VirtualClock:
     def __init__(
         self, jitter: float = 0.0, *, stalls: Mapping[float, float] | None = None, seed: int = 0
     ) -> None:
-        for name, value in (
-            ("jitter", jitter),
-            *(("stalls", v) for pair in (stalls or {}).items() for v in pair),
-        ):
-            if not (math.isfinite(value) and value >= 0.0):
-                raise ParameterError(
-                    f"{name} has {value} s, which is not allowed: zero or more is needed"
-                )
-        self._jitter, self._time = jitter, 0.0
+        for pair in (stalls or {}).items():
+            for value in pair:
+                positive("stalls", value, zero=True)
+        self._jitter, self._time = positive("jitter", jitter, zero=True), 0.0
         self._stalls = sorted((stalls or {}).items())
         self._random = np.random.default_rng(seed)
 
@@ -117,10 +113,7 @@ class SimulatedDevice:
         seed: int = 0,
         initial: Mapping[str, float] | None = None,
     ) -> None:
-        if not 0.0 <= dropouts <= 1.0:
-            raise ParameterError(
-                f"dropouts = {dropouts} is not allowed: a probability from 0 to 1 is needed"
-            )
+        checked_number("dropouts", dropouts, 0.0, 1.0)
         if not faults or any(fault not in FAULTS for fault in faults):
             raise ParameterError(f"faults = {faults} is not allowed: some of {', '.join(FAULTS)}")
         self._held = _at_first(rig)

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import positive
 from pamrs.control._protocol import Controller
 from pamrs.control.linear import (
     SIDES,
@@ -418,8 +419,7 @@ def _delayed(model: LinearModel, period: float, delay: float) -> tuple[Array, Ar
     """The sampled plant with the commands on their way as states: state, input and output
     matrix.
     """
-    if not (math.isfinite(delay) and delay >= 0.0):
-        raise ParameterError(f"delay = {delay} s is not allowed: zero or more is needed")
+    positive("delay", delay, zero=True)
     phi, gamma = model.sampled(period)
     count = math.ceil(delay / period - 1e-9)
     if count == 0:

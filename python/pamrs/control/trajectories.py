@@ -21,7 +21,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs.control._protocol import Reference, Value
+from pamrs._checks import finite, positive, whole
+from pamrs.control._protocol import Reference
 from pamrs.errors import ParameterError
 
 __all__ = [
@@ -103,10 +104,7 @@ class Trajectory:
                     "time is not finite: every entry has to be a finite number of seconds"
                 )
             return Reference(*self._shape.over(time))
-        if not math.isfinite(time):
-            raise ParameterError(
-                f"time = {time} is not allowed: a finite number of seconds is needed"
-            )
+        finite("time", time)
         return Reference(*self._shape.at(time))
 
     def sampled(self, sample_time: float, duration: float | None = None) -> tuple[Array, Reference]:
@@ -130,8 +128,8 @@ class Trajectory:
         ParameterError
             If a time is not allowed.
         """
-        sample_time = _positive("sample_time", sample_time)
-        length = self.duration if duration is None else _least_zero("duration", duration)
+        sample_time = positive("sample_time", sample_time)
+        length = self.duration if duration is None else positive("duration", duration, zero=True)
         time = np.asarray(
             np.arange(math.floor(length / sample_time + 1e-9) + 1) * sample_time, dtype=np.float64
         )
@@ -384,14 +382,11 @@ def lift_hold_return(
     ParameterError
         If a number is not finite, or a time is outside its range.
     """
-    low, high = _finite("low", low), _finite("high", high)
-    ramp, hold, delay = (
-        _positive("ramp", ramp),
-        _positive("hold", hold),
-        _least_zero("delay", delay),
-    )
+    low, high = finite("low", low), finite("high", high)
+    ramp, hold = positive("ramp", ramp), positive("hold", hold)
+    delay = positive("delay", delay, zero=True)
     ends = [delay, delay + ramp, delay + ramp + hold, delay + 2.0 * ramp + hold]
-    length = _positive("duration", duration)
+    length = positive("duration", duration)
     if length < ends[-1]:
         raise ParameterError(
             f"duration = {duration} s is not allowed: the return ends at {ends[-1]:g} s"
@@ -433,8 +428,12 @@ def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0)
     ParameterError
         If a number is not finite, or a time is outside its range.
     """
-    before, after, at = _finite("before", before), _finite("after", after), _least_zero("at", at)
-    length = _positive("duration", duration)
+    before, after, at = (
+        finite("before", before),
+        finite("after", after),
+        positive("at", at, zero=True),
+    )
+    length = positive("duration", duration)
     if at > length:
         raise ParameterError(f"at = {at} s is not allowed: the record ends at {length:g} s")
     rest, moved = (before, 0.0, 0.0, 0.0), (after, 0.0, 0.0, 0.0)
@@ -484,16 +483,16 @@ def compound(
     """
     given = [(math.radians(a), w) for a, w in TABLE_5_1] if cosines is None else cosines
     waves = tuple(
-        (_finite("cosines amplitude", a), _finite("cosines frequency", w)) for a, w in given
+        (finite("cosines amplitude", a), finite("cosines frequency", w)) for a, w in given
     )
-    mean = _finite("bias", bias) + _finite("triangle_bias", triangle_bias)
+    mean = finite("bias", bias) + finite("triangle_bias", triangle_bias)
     shape = _Waves(
         waves,
         mean,
-        _finite("triangle", triangle),
-        _least_zero("triangle_frequency", triangle_frequency),
+        finite("triangle", triangle),
+        positive("triangle_frequency", triangle_frequency, zero=True),
     )
-    return Trajectory("compound", _positive("duration", duration), shape)
+    return Trajectory("compound", positive("duration", duration), shape)
 
 
 def cosine_cycles(
@@ -522,14 +521,10 @@ def cosine_cycles(
     ParameterError
         If a number is not finite or outside its range.
     """
-    low, high = _finite("low", low), _finite("high", high)
-    rise, hold = _positive("rise", rise), _least_zero("hold", hold)
-    if isinstance(cycles, bool) or not isinstance(cycles, (int, np.integer)) or cycles < 1:
-        raise ParameterError(
-            f"cycles = {cycles!r} is not allowed: a whole number from 1 on is needed"
-        )
-    shape = _Cycles(low, high, rise, hold, int(cycles))
-    return Trajectory("cosine cycles", 2.0 * (rise + hold) * int(cycles), shape)
+    low, high = finite("low", low), finite("high", high)
+    rise, hold = positive("rise", rise), positive("hold", hold, zero=True)
+    shape = _Cycles(low, high, rise, hold, whole("cycles", cycles, 1))
+    return Trajectory("cosine cycles", 2.0 * (rise + hold) * shape.count, shape)
 
 
 def from_samples(
@@ -575,7 +570,7 @@ def from_samples(
             f"time[{k + 1}] = {t[k + 1]:g} s is not allowed: times have to rise, and time[{k}] is "
             f"{t[k]:g} s"
         )
-    weight = None if smoothing is None else _least_zero("smoothing", smoothing)
+    weight = None if smoothing is None else positive("smoothing", smoothing, zero=True)
     from scipy.interpolate import CubicSpline, PPoly, make_smoothing_spline
 
     t = t - t[0]
@@ -589,27 +584,3 @@ def from_samples(
     end = float(spline(t[-1]))
     starts = (*(float(x) for x in spline.x[inside]), float(t[-1]))
     return Trajectory(name, float(t[-1]), _Pieces(starts, (*cubics, (end, 0.0, 0.0, 0.0))))
-
-
-def _finite(name: str, value: Value) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise ParameterError(f"{name} = {value!r} is not allowed: a finite number is needed")
-    return number
-
-
-def _positive(name: str, value: float) -> float:
-    number = _finite(name, value)
-    if number <= 0.0:
-        raise ParameterError(f"{name} = {value!r} is not allowed: a number above zero is needed")
-    return number
-
-
-def _least_zero(name: str, value: float) -> float:
-    number = _finite(name, value)
-    if number < 0.0:
-        raise ParameterError(f"{name} = {value!r} is not allowed: zero or more is needed")
-    return number

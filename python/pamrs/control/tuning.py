@@ -8,7 +8,6 @@ call of it, a generation of a search is another.
 from __future__ import annotations
 
 import math
-import numbers
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,6 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import checked_number, one_of, positive, whole
 from pamrs.control._groups import payload_of
 from pamrs.control._protocol import Controller
 from pamrs.control._sweeping import sweep
@@ -84,8 +84,7 @@ class GainMap:
             If there is no such metric.
         """
         metrics = ("j", "squared_error", "curvature", "rms")
-        if by not in metrics:
-            raise ParameterError(f"by = {by!r} is not allowed: one of {', '.join(metrics)}")
+        one_of("by", by, metrics)
         found = []
         for p, mass in enumerate(self.payloads):
             values = getattr(self, by)[p]
@@ -324,24 +323,16 @@ def _check_search(
     ParameterError
         Which argument, its value and what is allowed.
     """
-    if method not in METHODS:
-        raise ParameterError(f"method = {method!r} is not allowed: one of {', '.join(METHODS)}")
-    if not 4 <= population <= evaluations:
-        raise ParameterError(
-            f"population = {population} is not allowed: from 4 to evaluations = {evaluations} is "
-            "needed"
-        )
+    one_of("method", method, METHODS)
+    whole("population", population, 4, evaluations)
     if scale is None and evaluations < 2 * population:
         raise ParameterError(
             f"evaluations = {evaluations} is not allowed: without a scale two populations = "
             f"{2 * population} are needed, as the first finds it"
         )
-    if isinstance(seed, bool) or not isinstance(seed, int) or not 0 <= seed < 2**32:
-        raise ParameterError(
-            f"seed = {seed!r} is not allowed: a whole number from 0 to 2**32 - 1 is needed"
-        )
-    if scale is not None and not all(math.isfinite(s) and s > 0.0 for s in scale):
-        raise ParameterError(f"scale = {scale} is not allowed: two numbers above zero are needed")
+    whole("seed", seed, 0, 2**32 - 1)
+    for size in scale or ():
+        positive("scale", size)
 
 
 @dataclass
@@ -445,23 +436,16 @@ def perturbed(
     >>> round(plant.parameter("arm.viscous").value, 6)
     3.3
     """
-    if not (math.isfinite(spread) and 0.0 <= spread <= 0.5):
-        raise ParameterError(f"spread = {spread} is not allowed: a number from 0 to 0.5 is needed")
+    checked_number("spread", spread, 0.0, 0.5)
     chosen = [1.0, 1.0, 1.0]
     if seed is not None:
-        if isinstance(seed, bool) or not isinstance(seed, int) or seed < 0:
-            raise ParameterError(
-                f"seed = {seed!r} is not allowed: a whole number from 0 on is needed"
-            )
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(whole("seed", seed))
         chosen = (1.0 + spread * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.5, 1.0, 3)).tolist()
-    factors = {}
-    for (name, given), drawn in zip(
-        (("force", force), ("friction", friction), ("inertia", inertia)), chosen, strict=True
-    ):
-        factors[name] = drawn if given is None else float(given)
-        if not (math.isfinite(factors[name]) and factors[name] > 0.0):
-            raise ParameterError(f"{name} = {given} is not allowed: a factor above zero is needed")
+    given = {"force": force, "friction": friction, "inertia": inertia}
+    factors = {
+        name: positive(name, drawn if own is None else own)
+        for (name, own), drawn in zip(given.items(), chosen, strict=True)
+    }
     names = {"muscle.rest_diameter": math.sqrt(factors["force"]), "arm.inertia": factors["inertia"]}
     names |= {"arm.viscous": factors["friction"], "arm.coulomb": factors["friction"]}
     return rig.with_parameters(
@@ -495,16 +479,7 @@ def _within(start: Mapping[str, float], bounds: Mapping[str, tuple[float, float]
             "in bounds"
         )
     for name, (low, high) in bounds.items():
-        value = start[name]
-        if (
-            not isinstance(value, numbers.Real)
-            or isinstance(value, bool)
-            or not low <= value <= high
-        ):
-            raise ParameterError(
-                f"start of {name} = {value!r} is not allowed: a number within its bounds, {low} to "
-                f"{high}, is needed"
-            )
+        checked_number(f"start of {name}", start[name], low, high)
     return np.array([start[name] for name in bounds], dtype=np.float64)
 
 

@@ -2,8 +2,7 @@
 
 A joint (dissertation 3.5): four lengths of a tendon joint that give a wanted torque at the least
 pressure. :mod:`pamrs.design.sizing` counts the muscles that a force over a stroke needs;
-:func:`lift` says what an arm lifts and holds; :mod:`pamrs.design.elbow_muscles` is the
-dissertation's own choice of muscles (3.2.3); :mod:`pamrs.design.figures` draws.
+:func:`lift` says what an arm lifts and holds; :mod:`pamrs.design.figures` draws.
 
 >>> import math, pamrs
 >>> from pamrs.design import JointProblem, optimise

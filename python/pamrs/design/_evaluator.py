@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import checked_number, positive, whole
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -56,17 +57,11 @@ class Genetic:
                 f"population = {self.population}, elites = {self.elites} are not allowed: "
                 "at least two elites, and more designs than those, are needed"
             )
-        if not 1 <= self.bits <= 52:
-            raise ParameterError(f"bits = {self.bits} is not allowed: 1 to 52 are needed")
-        if not 0.0 <= self.mutation <= 1.0:
-            raise ParameterError(
-                f"mutation = {self.mutation} is not allowed: a probability from 0 to 1 is needed"
-            )
-        if self.stall < 1 or (self.tolerance is not None and not self.tolerance >= 0.0):
-            raise ParameterError(
-                f"tolerance = {self.tolerance}, stall = {self.stall} are not allowed: from 0 and "
-                "from 1 on are needed"
-            )
+        whole("bits", self.bits, 1, 52)
+        checked_number("mutation", self.mutation, 0.0, 1.0)
+        whole("stall", self.stall, 1)
+        if self.tolerance is not None:
+            positive("tolerance", self.tolerance, zero=True)
 
 
 @dataclass(frozen=True)

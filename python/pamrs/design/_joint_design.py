@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import positive
 from pamrs.design._evaluator import Genetic, Progress, Search
 from pamrs.design._problem import LENGTHS, JointProblem, Scores
 from pamrs.design._search import METHODS, PUBLISHED_EVALUATIONS, search
@@ -23,6 +24,7 @@ Array = NDArray[np.float64]
 #: [1].
 AREA_TOLERANCE: Final = 1e-3
 
+_QUARTILES: Final = ("best", "quartile_low", "median", "quartile_high", "worst")
 _ROUNDING: Final = 1e-9  # a smaller shortfall of torque is none
 
 
@@ -53,11 +55,7 @@ class JointDesign:
     area_tolerance: float = AREA_TOLERANCE
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.area_tolerance) and self.area_tolerance >= 0.0):
-            raise ParameterError(
-                f"area_tolerance = {self.area_tolerance} is not allowed: a finite number from 0 on "
-                "is needed"
-            )
+        positive("area_tolerance", self.area_tolerance, zero=True)
 
     @classmethod
     def of(cls, problem: JointProblem, lengths: ArrayLike) -> JointDesign:
@@ -259,15 +257,15 @@ def optimise(
     ParameterError
         If an argument is not possible.
     """
-    options: dict[str, Any] = {
-        "method": method,
-        "evaluations": evaluations,
-        "seed": seed,
-        "genetic": genetic,
-        "progress": progress,
-    }
     found = search(
-        lambda points: problem.evaluate(points).fitness, problem.lower, problem.upper, **options
+        lambda points: problem.evaluate(points).fitness,
+        problem.lower,
+        problem.upper,
+        method=method,
+        evaluations=evaluations,
+        seed=seed,
+        genetic=genetic,
+        progress=progress,
     )
     return JointDesign(problem, found.point, found, area_tolerance)
 
@@ -299,31 +297,18 @@ class MethodComparison:
         """
         result = []
         for name, values, used in zip(self.methods, self.fitness, self.evaluations, strict=True):
-            names = ("best", "quartile_low", "median", "quartile_high", "worst")
-            numbers = dict(
-                zip(
-                    names,
-                    np.percentile(values, [0.0, 25.0, 50.0, 75.0, 100.0]).tolist(),
-                    strict=True,
-                )
-            )
-            result.append(
-                {"method": name, "evaluations": int(used.max()), "runs": len(values), **numbers}
-            )
+            quartiles = np.percentile(values, [0.0, 25.0, 50.0, 75.0, 100.0]).tolist()
+            row = {"method": name, "evaluations": int(used.max()), "runs": len(values)}
+            result.append(row | dict(zip(_QUARTILES, quartiles, strict=True)))
         return result
 
     def table(self) -> str:
         """:meth:`rows` as text, J in joule."""
-        keys = ("best", "quartile_low", "median", "quartile_high", "worst")
-        lines = [
-            f"{'method':<8}{'evaluations':>12}{'runs':>6}"
-            + "".join(f"{key.replace('_', ' '):>15}" for key in keys)
-        ]
+        head = "".join(f"{name.replace('_', ' '):>15}" for name in _QUARTILES)
+        lines = [f"{'method':<8}{'evaluations':>12}{'runs':>6}{head}"]
         for row in self.rows():
-            lines.append(
-                f"{row['method']:<8}{row['evaluations']:>12}{row['runs']:>6}"
-                + "".join(f"{row[key]:>15.6g}" for key in keys)
-            )
+            numbers = "".join(f"{row[name]:>15.6g}" for name in _QUARTILES)
+            lines.append(f"{row['method']:<8}{row['evaluations']:>12}{row['runs']:>6}{numbers}")
         return "\n".join(lines)
 
 
@@ -365,10 +350,8 @@ def compare_methods(
     if not methods or not seeds:
         raise ParameterError("methods and seeds must not be empty")
     settings = genetic or Genetic(tolerance=None)
-    fitness, used = (
-        np.zeros((len(methods), len(seeds))),
-        np.zeros((len(methods), len(seeds)), dtype=np.int64),
-    )
+    fitness = np.zeros((len(methods), len(seeds)))
+    used = np.zeros(fitness.shape, dtype=np.int64)
     for row, method in enumerate(methods):
         for column, seed in enumerate(seeds):
             found = optimise(

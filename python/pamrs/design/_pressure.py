@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import positive, whole
 from pamrs.design._evaluator import Genetic, Progress
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, optimise
 from pamrs.design._problem import JointProblem
@@ -147,17 +148,10 @@ def minimum_pressure(
         If an argument is not possible.
     """
     limit = 4.0 * problem.pressure if highest is None else highest
-    for name, value in (
-        ("tolerance", tolerance),
-        ("area_tolerance", area_tolerance),
-        ("highest", limit),
-    ):
-        if not (math.isfinite(value) and value > 0.0):
-            raise ParameterError(
-                f"{name} = {value} is not allowed: a finite number above 0 is needed"
-            )
-    if tries < 1:
-        raise ParameterError(f"tries = {tries} is not allowed: a whole number from 1 on is needed")
+    positive("tolerance", tolerance)
+    positive("area_tolerance", area_tolerance)
+    positive("highest", limit)
+    whole("tries", tries, 1)
     trials: list[Trial] = []
     options: dict[str, Any] = {
         "evaluations": evaluations,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import one_of, positive, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -126,28 +127,18 @@ class JointProblem:
     points: int = 106
 
     def __post_init__(self) -> None:
-        for name in ("count", "points"):
-            least = 1 if name == "count" else 3
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-                raise ParameterError(
-                    f"{name} = {value!r} is not allowed: a whole number from {least} on is needed"
-                )
+        whole("count", self.count, 1)
+        whole("points", self.points, 3)
         for name in ("torque", "pressure", "max_contraction"):
-            _above_zero(name, getattr(self, name))
+            positive(name, getattr(self, name))
         for name in ("penalty", "weight_above"):
-            if not (math.isfinite(getattr(self, name)) and getattr(self, name) >= 0.0):
-                raise ParameterError(
-                    f"{name} = {getattr(self, name)} is not allowed: a finite number from 0 on is "
-                    "needed"
-                )
+            positive(name, getattr(self, name), zero=True)
         if not (-math.pi <= self.min_angle < self.max_angle <= math.pi):
             raise ParameterError(
                 f"min_angle = {self.min_angle}, max_angle = {self.max_angle} are not allowed: "
                 "angles from -pi to pi rad, the first below the second, are needed"
             )
-        if self.kind not in ("tendon", "published"):
-            raise ParameterError(f"kind = {self.kind!r} is not allowed: 'tendon' or 'published'")
+        one_of("kind", self.kind, ("tendon", "published"))
         object.__setattr__(self, "bounds", _checked_bounds(self.bounds))
 
     # ---------------------------------------------------------------- what follows
@@ -353,11 +344,6 @@ class JointProblem:
             return np.asarray(
                 held & (arm > 0.0) & (contraction <= self.max_contraction * (1.0 + 1e-12))
             )
-
-
-def _above_zero(name: str, value: float) -> None:
-    if not (math.isfinite(value) and value > 0.0):
-        raise ParameterError(f"{name} = {value} is not allowed: a finite number above 0 is needed")
 
 
 def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:

@@ -12,6 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pamrs._checks import one_of, whole
 from pamrs.design._evaluator import Array, Evaluator, Genetic, Objective, Progress, Search
 from pamrs.errors import ParameterError, missing_package
 
@@ -67,15 +68,13 @@ def search(
         If DEAP or cma is not installed; also an ``ImportError``.
     """
     settings = genetic or Genetic()
-    if method not in METHODS:
-        raise ParameterError(f"method = {method!r} is not allowed: {', '.join(METHODS)}")
+    one_of("method", method, METHODS)
     if evaluations < settings.population:
         raise ParameterError(
             f"evaluations = {evaluations} is not allowed: at least one population of "
             f"{settings.population} is needed"
         )
-    if seed < 0:
-        raise ParameterError(f"seed = {seed} is not allowed: a whole number from 0 on is needed")
+    whole("seed", seed)
     low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     evaluator = Evaluator(objective, low, high, evaluations, progress)
     if method == "ga":

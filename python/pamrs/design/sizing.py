@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive
+from pamrs._checks import one_of, positive, whole
 from pamrs.design._filling import Filling
 from pamrs.errors import ParameterError
 from pamrs.library import Entry, entry
@@ -41,11 +41,6 @@ _RULES: Final[dict[str, tuple[str, bool]]] = {  # criterion: (key, larger is bet
     "specific force": ("specific_force", True),
     "redundancy": ("share_left", True),
 }
-
-
-def _whole(name: str, value: int) -> None:
-    if not isinstance(value, (int, np.integer)) or value < 1:
-        raise ParameterError(f"{name} = {value} is not allowed: a whole number from 1 on is needed")
 
 
 @dataclass(frozen=True)
@@ -83,7 +78,7 @@ class Candidate:
         if self.mass is not None:
             positive("mass", self.mass)
         if self.count is not None:
-            _whole("count", self.count)
+            whole("count", self.count, 1)
 
     @classmethod
     def from_library(
@@ -134,10 +129,7 @@ class Requirement:
     position: str = "stroke"
 
     def __post_init__(self) -> None:
-        if self.position not in ("stroke", "contraction"):
-            raise ParameterError(
-                f"position = {self.position!r} is not allowed: 'stroke' or 'contraction'"
-            )
+        one_of("position", self.position, ("stroke", "contraction"))
         values = np.asarray(self.points, dtype=np.float64)
         if values.ndim != 2 or values.shape[1:] != (2,) or values.shape[0] == 0:
             raise ParameterError(
@@ -182,7 +174,7 @@ def packed_diameter(count: int, diameter: float, core: float = 0.0) -> float:
     ParameterError
         If the count is no whole number from 1 on or a length is not allowed.
     """
-    _whole("count", count)
+    whole("count", count, 1)
     positive("diameter", diameter)
     positive("core", core, zero=True)
     touching = diameter / math.sin(math.pi / count) if count > 1 else 0.0
@@ -257,13 +249,8 @@ class SizingResult:
             line = label.ljust(30)
             for row in self.rows:
                 value = row[key]
-                text = (
-                    "-"
-                    if value is None
-                    else f"{from_si(value, *unit):.4g}"
-                    if unit
-                    else f"{value:.4g}"
-                )
+                shown = from_si(value, *unit) if unit and value is not None else value
+                text = "-" if shown is None else f"{shown:.4g}"
                 line += (text + (" *" if winners.get(key) == row["name"] else "  ")).rjust(width)
             lines.append(line.rstrip())
         lines += [f"{name}: not feasible: {reason}" for name, reason in self.infeasible.items()]
@@ -333,7 +320,7 @@ def size(
     >>> [(row["name"], row["count"]) for row in result.rows]
     [('elbow_0625in', 6), ('large_2in_effective', 1)]
     """
-    _whole("max_count", max_count)
+    whole("max_count", max_count, 1)
     positive("core", core, zero=True)
     chosen = [
         item if isinstance(item, Candidate) else Candidate.from_library(item) for item in candidates
@@ -372,32 +359,20 @@ def _count(
     """Smallest count that is enough, or the reason why none is."""
     muscle = candidate.muscle
     if candidate.pressure >= filling.supply_pressure:
-        return (
-            0,
-            (
-                f"its pressure of {candidate.pressure:g} Pa is not below the supply's "
-                f"{filling.supply_pressure:g} Pa"
-            ),
-        )
+        supply = f"the supply's {filling.supply_pressure:g} Pa"
+        return 0, f"its pressure of {candidate.pressure:g} Pa is not below {supply}"
     contraction = requirement.contraction(muscle.parameters["rest_length"])
     limit = muscle.contraction_limits[1]
     if contraction[-1] > limit:
-        return (
-            0,
-            f"it would contract by {contraction[-1]:.3f}, beyond the braid's limit {limit:.3f}",
-        )
+        beyond = f"beyond the braid's limit {limit:.3f}"
+        return 0, f"it would contract by {contraction[-1]:.3f}, {beyond}"
     wanted = requirement.array[:, 1]
     one = muscle.force(candidate.pressure, contraction)
     weak = np.flatnonzero((one <= 0.0) & (wanted > 0.0))
     if weak.size:
         at = int(weak[0])
-        return (
-            0,
-            (
-                f"at a contraction of {contraction[at]:.3f} one muscle gives {one[at]:.1f} N: no "
-                "number is enough"
-            ),
-        )
+        weakest = f"at a contraction of {contraction[at]:.3f} one muscle gives {one[at]:.1f} N"
+        return 0, f"{weakest}: no number is enough"
     asked = wanted > 0.0
     needed = max(1, math.ceil(float(np.max(wanted[asked] / one[asked])) * (1.0 - 1e-12)))
     if candidate.count is not None and needed > candidate.count:

@@ -15,7 +15,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Final
 
 from pamrs.errors import ParameterError
-from pamrs.library._entry import Entry, Fact, read_entry
+from pamrs.library._entry import Entry, Fact, quantity, read_entry
 
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
@@ -31,6 +31,8 @@ __all__ = [
     "names",
     "pam_a_1in",
     "pam_b_075in",
+    "quantity",
+    "read_entry",
 ]
 
 _NAMES: Final = (

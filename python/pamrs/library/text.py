@@ -1,21 +1,17 @@
-"""The library as text: the list of its muscles, one muscle with the origin of each number, and
-every published fact.
-"""
+"""The library as text: the list of its muscles, and one muscle with the origin of each number."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, verdicts
+from pamrs.comparison import verdicts
 from pamrs.library import entry, names
-from pamrs.library._identify import derive
-from pamrs.library.published import compare, compare_all, table
+from pamrs.library.published import compare, table
 from pamrs.units import parse_unit, with_unit
 
-__all__ = ["description", "facts", "overview"]
+__all__ = ["description", "overview"]
 
 _UNITS: Final = {
     "rest_length": "mm",
@@ -72,42 +68,6 @@ def description(name: str) -> str:
     ]
     rows = compare(name)
     return "\n".join([*lines, "", table(rows, titles=False), "", verdicts(rows)])
-
-
-def facts(others: Sequence[Comparison] = (), below: str = "") -> str:
-    """The identified numbers derived again, and every published fact beside ours.
-
-    Parameters
-    ----------
-    others : sequence of Comparison
-        More statements, in the same table and count.
-    below : str
-        What stands between the table and the count.
-
-    Returns
-    -------
-    str
-    """
-    lines = ["Identified numbers, derived again from prior and facts", ""]
-    for name in names():
-        item, again = entry(name), derive(entry(name))
-        slope, offset = (again.parameters[f"modulus_{key}"] for key in ("slope", "offset"))
-        lines.append(
-            f"{name}: m = {_shown('modulus_slope', slope)}; b = {_shown('modulus_offset', offset)}"
-        )
-        if "braid_angle" in again.parameters:
-            lines.append(f"    braid angle {np.degrees(again.parameters['braid_angle']):.4f} deg")
-        lines += [
-            (
-                f"    facts: {', '.join(again.conditions) or 'none'}; they determine {again.rank} "
-                f"of {again.unknowns} combinations"
-            ),
-            f"    prior: {item.identification['prior']['origin']}",
-            f"    moved by {np.round(again.change, 3)} prior standard deviations",
-        ]
-    rows = [*compare_all(), *others]
-    lines += ["", "Published facts", "", table(rows), "", *([below, ""] if below else [])]
-    return "\n".join([*lines, verdicts(rows)])
 
 
 def _shown(name: str, value: Any) -> str:

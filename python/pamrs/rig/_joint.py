@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs.errors import ParameterError
+from pamrs._checks import finite
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
 
@@ -76,15 +76,9 @@ class Joint:
             "coefficients": [float(value) for value in coefficients],
         }
         for name, value in self._spec.items():
-            if isinstance(value, float) and not math.isfinite(value):
-                raise ParameterError(
-                    f"joint.{name} = {value} is not allowed: a finite number is needed"
-                )
-        if not all(math.isfinite(value) for value in self._spec["coefficients"]):
-            raise ParameterError(
-                f"joint.coefficients = {self._spec['coefficients']} is not allowed: finite numbers "
-                "are needed"
-            )
+            for number in value if isinstance(value, list) else [value]:
+                if name != "kind":
+                    finite(f"joint.{name}", number)
         self._core = _core.Joint(json.dumps(self._spec))
 
     @classmethod

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import finite
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
@@ -158,12 +159,9 @@ class Muscle:
             "neck_floor": neck_floor,
         }
         for name, value in self._model.items():
-            entries = value if isinstance(value, list) else [value]
-            for entry in entries:
-                if isinstance(entry, (float, np.floating)) and not np.isfinite(entry):
-                    raise ParameterError(
-                        f"muscle.{name} = {entry} is not allowed: a finite number is needed"
-                    )
+            for entry in value if isinstance(value, list) else [value]:
+                if isinstance(entry, (float, np.floating)):
+                    finite(f"muscle.{name}", entry)
         if len(self._model["extension_factors"]) != 3:
             raise ParameterError(
                 f"muscle.extension_factors = {list(extension_factors)} is not allowed: three "

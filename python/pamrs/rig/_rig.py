@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pamrs._checks import checked_number, checked_table
+from pamrs._checks import checked_number, checked_table, one_of
 from pamrs._files import read_toml
 from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._cautions import cautions_of
@@ -119,8 +119,7 @@ class Rig:
         ParameterError
             If there is no such kind of block.
         """
-        if block not in BLOCKS:
-            raise ParameterError(f"block = {block!r} is not allowed: one of {', '.join(BLOCKS)}")
+        one_of("block", block, BLOCKS)
         return copy.deepcopy(tables_of(self._model, block))
 
     def ports(self, block: str) -> dict[str, dict[str, str]]:

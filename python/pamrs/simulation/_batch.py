@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers
+from pamrs._checks import as_numbers, as_said, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import initial_values, inputs_of, keywords
@@ -23,7 +23,7 @@ from pamrs.simulation._simulation import (
     check_run,
     chosen_step,
     core_rig,
-    whole_samples,
+    loop_samples,
 )
 
 Array = NDArray[np.float64]
@@ -244,13 +244,9 @@ class Batch:
         """
         needed = {"samples", "rows", "status"}
         if not isinstance(state, Mapping) or set(state) != needed:
-            what = (
-                f"has {', '.join(map(str, state)) or 'nothing'}"
-                if isinstance(state, Mapping)
-                else f"is a {type(state).__name__}"
-            )
             raise ParameterError(
-                f"state {what}; samples, rows and status are needed, as of Batch.state"
+                f"state has {as_said(list(state) if isinstance(state, Mapping) else state)}; "
+                "samples, rows and status are needed, as of Batch.state"
             )
         try:
             samples = int(state["samples"])
@@ -338,14 +334,13 @@ class Batch:
             If a command is missing, not finite (the index is the plant's) or of another length; the
             batch stays as it is.
         """
-        signals = self._inputs.rows(
-            len(self),
-            valve_command=valve_command,
-            supply_command=supply_command,
-            length=length,
-            pressure=pressure,
-        )
-        return self._named(self._core.advance(1, signals, True))
+        asked = {
+            "valve_command": valve_command,
+            "supply_command": supply_command,
+            "length": length,
+            "pressure": pressure,
+        }
+        return self._named(self._core.advance(1, self._inputs.rows(len(self), asked), True))
 
     def control(
         self,
@@ -392,24 +387,15 @@ class Batch:
             known, more than 2 GB would be recorded, or the controller answers what no plant can
             take.
         """
-        if not callable(update):
-            raise ParameterError(
-                f"update is a {type(update).__name__}; something that can be called with a sample "
-                "is needed"
-            )
-        every = whole_samples(
-            "period", self.sample_time if period is None else period, self.sample_time, least=1
-        )
-        total = whole_samples("duration", duration, self.sample_time, least=0)
+        every, total = loop_samples(update, self.sample_time, period, duration)
         book = self._book(total, channels, record_every)
         # what is recorded is what was, whatever the controller does with its sample
         began, sample, k = self.time, self._named(self._core.observe(), writeable=False), 0
         signals: dict[str, Array] = {}
         while True:
             if k % every == 0 and k < total:
-                signals = self._inputs.rows(
-                    len(self), **keywords(update({"time": self.time, **sample}))
-                )
+                answer = update({"time": self.time, **sample})
+                signals = self._inputs.rows(len(self), keywords(answer))
             if k % book.every == 0:
                 book.write(k // book.every, sample, signals)
             if k == total:
@@ -424,11 +410,7 @@ class Batch:
         return BatchRun(time, {name: rows.T for name, rows in book.rows.items()}, self.status)
 
     def _book(self, total: int, channels: Sequence[str] | None, every: int) -> _Book:
-        if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
-            raise ParameterError(
-                f"record_every = {every!r} is not allowed: a whole number of samples, 1 at least, "
-                "is needed"
-            )
+        every = whole("record_every", every, 1)
         known = (*self._channels, *self._commands)
         names = list(
             dict.fromkeys(
@@ -441,14 +423,14 @@ class Batch:
                     f"channels has {name!r}, which these plants do not have; there are: "
                     f"{', '.join(known)}"
                 )
-        rows = total // int(every) + 1
+        rows = total // every + 1
         if rows * len(self) * len(names) > MOST_NUMBERS:
             most = MOST_NUMBERS // (len(self) * len(names))
             raise ParameterError(
                 f"{rows} rows of {len(names)} channels of {len(self)} plants are not allowed: at "
                 f"most {most} rows (2 GB); choose fewer channels or a larger record_every"
             )
-        return _Book({name: np.full((rows, len(self)), np.nan) for name in names}, int(every))
+        return _Book({name: np.full((rows, len(self)), np.nan) for name in names}, every)
 
     def _named(self, sample: Array, *, writeable: bool = True) -> dict[str, Array]:
         sample.flags.writeable = writeable

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import one_of
 from pamrs.channels import channel_of, dotted
 from pamrs.errors import ParameterError, meant
 from pamrs.simulation._plants import rowwise
@@ -22,6 +23,8 @@ Array = NDArray[np.float64]
 #: One array for a block without a name or the only one of its kind, else one for each name.
 Signals = ArrayLike | Mapping[str, ArrayLike]
 
+#: What a rig can be driven by, in the order in which it is recorded.
+SIGNALS = ("valve_command", "supply_command", "length", "pressure")
 #: State that an initial value can be given for, and the block whose name stands behind it.
 _INITIAL = {
     "muscle_pressure": "chamber",
@@ -42,13 +45,7 @@ _MOST_PRESSURE = 1e8  # Pa, gauge
 
 
 def signals_of(
-    rig: Rig,
-    *,
-    valve_command: Signals | None = None,
-    supply_command: Signals | None = None,
-    length: ArrayLike | None = None,
-    pressure: Signals | None = None,
-    rows: int | None = None,
+    rig: Rig, asked: Mapping[str, Signals | None], rows: int | None = None
 ) -> tuple[dict[str, Array], int | None]:
     """Every signal that a rig takes, by the core's names, and how many values each has.
 
@@ -56,14 +53,10 @@ def signals_of(
     ----------
     rig : Rig
         The model.
-    valve_command : array_like, shape (n,), or mapping of str to array_like, optional
-        Commands [V] of each valve by its name.
-    supply_command : array_like, shape (n,), or mapping of str to array_like, optional
-        Set pressures [Pa, gauge] of regulators.
-    length : array_like, shape (n,), optional
-        What a load frame prescribes [m].
-    pressure : array_like, shape (n,), or mapping of str to array_like, optional
-        Pressures [Pa, gauge] that are held in chambers without a valve.
+    asked : mapping of str to array_like, shape (n,), or to a mapping of str to array_like
+        A user's arguments by :data:`SIGNALS`, None for those that are left out: commands [V] of
+        valves, set pressures [Pa, gauge] of regulators, the length [m] that a load frame
+        prescribes, and pressures [Pa, gauge] that are held in chambers without a valve.
     rows : int, optional
         How many values there must be; numbers are taken as signals that stay.
 
@@ -80,9 +73,7 @@ def signals_of(
         message names it.
     """
     inputs = inputs_of(rig)
-    given = inputs.named(
-        valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
-    )
+    given = inputs.named(asked)
     sizes = {name: np.size(values) for name, values in given.items() if np.ndim(values) > 0}
     count = rows if rows is not None else (next(iter(sizes.values())) if sizes else None)
     signals = {}
@@ -128,28 +119,19 @@ class Inputs:
         chambers = [name for name in self._names["pressure"][0] if name not in self._fed]
         return found + [dotted("pressure", name) for name in chambers]
 
-    def named(
-        self,
-        *,
-        valve_command: Signals | None = None,
-        supply_command: Signals | None = None,
-        length: ArrayLike | None = None,
-        pressure: Signals | None = None,
-    ) -> dict[str, ArrayLike]:
+    def named(self, asked: Mapping[str, Any]) -> dict[str, ArrayLike]:
         """A user's arguments by the core's names, as they were given; arguments and errors as of
         :func:`signals_of`.
         """
+        for name in asked:
+            one_of("the name of a signal", name, SIGNALS)
         given: dict[str, ArrayLike] = {}
-        for channel, signal in (
-            ("valve_command", valve_command),
-            ("supply_command", supply_command),
-        ):
-            if signal is not None:
+        for channel in SIGNALS:
+            signal = asked.get(channel)
+            if channel == "length" and signal is not None:
+                given["length"] = signal
+            elif signal is not None:
                 given |= _named(channel, signal, *self._names[channel])
-        if length is not None:
-            given["length"] = length
-        if pressure is not None:
-            given |= _named("pressure", pressure, *self._names["pressure"])
         for name in self._valves:
             if name not in given:
                 raise ParameterError(
@@ -158,31 +140,16 @@ class Inputs:
         self._check_prescribed(given)
         return given
 
-    def numbers(
-        self,
-        valve_command: float | Mapping[str, float] | None = None,
-        supply_command: float | Mapping[str, float] | None = None,
-        length: float | None = None,
-        pressure: float | Mapping[str, float] | None = None,
-    ) -> dict[str, float]:
+    def numbers(self, asked: Mapping[str, Any]) -> dict[str, float]:
         """Commands of one sample, checked, by the core's names; arguments and errors as of
         :func:`signals_of`.
         """
-        if (
-            self._only is not None
-            and isinstance(valve_command, float)
-            and math.isfinite(valve_command)
-            and supply_command is length is pressure is None
-        ):
-            return {self._only: valve_command}
-        given = self.named(
-            valve_command=valve_command,
-            supply_command=supply_command,
-            length=length,
-            pressure=pressure,
-        )
+        if self._only is not None and len(asked) == 1:
+            volts = asked.get("valve_command")
+            if isinstance(volts, float) and math.isfinite(volts):
+                return {self._only: volts}
         numbers: dict[str, float] = {}
-        for name, value in given.items():
+        for name, value in self.named(asked).items():
             low, high, allowed = self.range(name)
             if isinstance(value, float) and low <= value <= high and math.isfinite(value):
                 numbers[name] = value
@@ -190,11 +157,11 @@ class Inputs:
                 numbers[name] = float(_signal(name, value, 1, (low, high, allowed))[0])
         return numbers
 
-    def rows(self, rows: int, **signals: Any) -> dict[str, Array]:
+    def rows(self, rows: int, asked: Mapping[str, Any]) -> dict[str, Array]:
         """Commands of one sample of several plants, one number for each; whether the numbers are
         possible is not looked at.
         """
-        given = self.named(**signals).items()
+        given = self.named(asked).items()
         return {name: rowwise(name, values, rows, finite=False) for name, values in given}
 
     def range(self, name: str) -> tuple[float, float, str]:
@@ -294,14 +261,35 @@ def _having(rig: Rig, state: str) -> list[str]:
 
 def keywords(answer: Any) -> dict[str, Any]:
     """What a controller answers as keywords of :meth:`pamrs.Simulator.step`."""
-    known = ("valve_command", "supply_command", "length", "pressure")
-    if (
-        not isinstance(answer, (float, np.ndarray))
-        and isinstance(answer, Mapping)
-        and any(name in known for name in answer)
-    ):
+    if isinstance(answer, Mapping) and any(name in SIGNALS for name in answer):
         return dict(answer)
     return {"valve_command": answer}
+
+
+def prescribed(
+    signals: Mapping[str, Array], start: dict[str, Any], plants: int | None = None
+) -> dict[str, Array]:
+    """Signals as the core takes them: what is prescribed is for the end of each sample, and its
+    first value (of each of several plants) goes into the initial values.
+    """
+    driven: dict[str, Array] = {}
+    for name, signal in signals.items():
+        if channel_of(name) in ("valve_command", "supply_command"):
+            driven[name] = signal
+            continue
+        channel = name.replace("pressure", "muscle_pressure", 1)
+        first: Any = float(signal[0]) if plants is None else signal[..., 0]
+        if plants is not None:
+            first = np.ascontiguousarray(np.broadcast_to(first, (plants,)))
+        if not np.array_equal(start.setdefault(channel, first), first):
+            raise ParameterError(
+                f"initial {channel} does not go with the first value of {name}: leave one out"
+            )
+        # the last one is not run
+        driven[name] = np.ascontiguousarray(
+            np.concatenate([signal[..., 1:], signal[..., -1:]], axis=-1)
+        )
+    return driven
 
 
 def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, float]:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import as_numbers, as_said
+from pamrs._checks import as_numbers, as_said, whole
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -20,11 +20,7 @@ def plants_of(n: int | None, rigs: int | None, given: Mapping[str, ArrayLike]) -
     """Number of plants from what says it: a number, a sequence of rigs, arrays by their name."""
     sizes = {name: int(np.size(values)) for name, values in given.items() if np.ndim(values)}
     if n is not None:
-        if isinstance(n, bool) or not isinstance(n, (int, np.integer)) or n < 1:
-            raise ParameterError(
-                f"n = {as_said(n)} is not allowed: a whole number of plants, 1 at least, is needed"
-            )
-        sizes = {"n": int(n), **sizes}
+        sizes = {"n": whole("n", n, 1), **sizes}
     if rigs is not None:
         sizes = {"rig": rigs, **sizes}
     if not sizes:
@@ -65,19 +61,6 @@ def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Arr
 def thread_count(threads: int | None) -> int:
     """How many threads may work."""
     if threads is None:
-        has = (
-            os.sched_getaffinity(0)
-            if hasattr(os, "sched_getaffinity")
-            else range(os.cpu_count() or 1)
-        )
-        return min(len(has), _MOST_THREADS)
-    if (
-        isinstance(threads, bool)
-        or not isinstance(threads, (int, np.integer))
-        or not 1 <= threads <= _MOST_THREADS
-    ):
-        raise ParameterError(
-            f"threads = {threads!r} is not allowed: a whole number from 1 to {_MOST_THREADS} is "
-            "needed"
-        )
-    return int(threads)
+        allowed = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+        return min(len(allowed), _MOST_THREADS)
+    return whole("threads", threads, 1, _MOST_THREADS)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, check_column
+from pamrs._checks import as_numbers, check_column, one_of, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
-from pamrs.simulation._driving import initial_values, inputs_of
+from pamrs.simulation._driving import initial_values, inputs_of, prescribed
 from pamrs.simulation._plants import plants_of, rowwise, thread_count
 from pamrs.simulation._simulation import (
     MOST_NUMBERS,
@@ -119,9 +119,13 @@ def simulate_batch(
     ((500,), True)
     """
     check_run(rig, sample_time)
-    given = inputs_of(rig).named(
-        valve_command=valve_command, supply_command=supply_command, length=length, pressure=pressure
-    )
+    asked = {
+        "valve_command": valve_command,
+        "supply_command": supply_command,
+        "length": length,
+        "pressure": pressure,
+    }
+    given = inputs_of(rig).named(asked)
     signals = {name: _numbers(name, values) for name, values in given.items()}
     rows = _row_count(signals, duration, sample_time)
     starts = initial_values(dict.fromkeys(initial or {}, 0.0), rig)
@@ -132,7 +136,7 @@ def simulate_batch(
     }
     count = plants_of(n, None, per_plant)
     reduced = dict(reduce or {})
-    kept = -(-rows // _checked_every(every))
+    kept = -(-rows // whole("every", every, 1))
     wanted = names_of("record", record)
     _check_size(count, kept, wanted, reduced)
     begin = {name: rowwise(f"initial {name}", (initial or {})[name], count) for name in starts}
@@ -141,7 +145,7 @@ def simulate_batch(
         core,
         count,
         rows,
-        _driven(signals, begin, count, rows),
+        prescribed(_repeated(signals, rows), begin, count),
         sample_time,
         chosen_step(sample_time, step),
         _parameters(rig, parameters or {}, count),
@@ -184,16 +188,7 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
     """Rows of time, from the signals or the duration."""
     sizes = {name: values.shape[-1] for name, values in signals.items() if values.ndim}
     if duration is not None:
-        if sizes:
-            raise ParameterError(
-                f"duration = {duration} is not allowed together with a signal that sets it "
-                f"({next(iter(sizes))})"
-            )
-        if not (isinstance(duration, (int, float, np.number)) and 0 <= duration < np.inf):
-            raise ParameterError(
-                f"duration = {duration} is not allowed: a finite time >= 0 s is needed"
-            )
-        return rows_of(duration, sample_time)
+        return rows_of(duration, sample_time, sizes)
     if not sizes:
         raise ParameterError(
             "duration is missing: a finite time >= 0 s is needed (or give valve_command an array)"
@@ -208,36 +203,9 @@ def _row_count(signals: Mapping[str, Array], duration: float | None, sample_time
     return int(rows)
 
 
-def _driven(
-    signals: Mapping[str, Array], begin: dict[str, Array], plants: int, rows: int
-) -> dict[str, Array]:
-    """Signals as the core takes them: what is prescribed is for the end of each sample, and its
-    first value is where the plants begin (written to ``begin``).
-    """
-    driven: dict[str, Array] = {}
-    for name, values in signals.items():
-        signal = np.full(rows, float(values)) if values.ndim == 0 else values
-        if name.startswith(("valve_command", "supply_command")):
-            driven[name] = signal
-            continue
-        first = name.replace("pressure", "muscle_pressure", 1)
-        starts = np.ascontiguousarray(np.broadcast_to(signal[..., 0], (plants,)))
-        if not np.array_equal(begin.setdefault(first, starts), starts):
-            raise ParameterError(
-                f"initial {first} does not go with the first value of {name}: leave one out"
-            )
-        driven[name] = np.ascontiguousarray(
-            np.concatenate([signal[..., 1:], signal[..., -1:]], axis=-1)
-        )
-    return driven
-
-
-def _checked_every(every: int) -> int:
-    if isinstance(every, bool) or not isinstance(every, (int, np.integer)) or every < 1:
-        raise ParameterError(
-            f"every = {every!r} is not allowed: a whole number from 1 on is needed"
-        )
-    return int(every)
+def _repeated(signals: Mapping[str, Array], rows: int) -> dict[str, Array]:
+    """Signals over time; a number stays the same in every row."""
+    return {n: np.full(rows, float(v)) if v.ndim == 0 else v for n, v in signals.items()}
 
 
 def _check_size(
@@ -261,11 +229,7 @@ def _reduction(name: str, asked: Reduction, rows: int) -> tuple[str, str, list[f
             '("squared_error", channel, reference) is needed'
         )
     kind, channel, *more = asked
-    if kind not in REDUCTIONS:
-        raise ParameterError(
-            f"reduce[{name!r}] asks for {kind!r}, which is not allowed: one of "
-            f"{', '.join(REDUCTIONS)} is needed"
-        )
+    one_of(f"reduce[{name!r}]", kind, REDUCTIONS)
     if not more:
         return str(channel), str(kind), []
     if kind != "squared_error":

@@ -16,10 +16,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
+from pamrs._checks import positive
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
-from pamrs.simulation._driving import Signals, initial_values, sensor_zero, signals_of
+from pamrs.simulation._driving import (
+    Signals,
+    initial_values,
+    prescribed,
+    sensor_zero,
+    signals_of,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -156,75 +163,26 @@ class Balance:
         )
 
 
-class _Clipped(NamedTuple):
-    """A command that is beyond the range of its valve.
-
-    Attributes
-    ----------
-    block : str
-        The valve.
-    times : list of float
-        When it leaves the range and when it is back [s], in turn.
-    worst : float
-        The command that is farthest beyond [V].
-    range : (float, float)
-        What the valve follows [V].
-    """
+class _Told(NamedTuple):
+    """Something that a block does at some times, as the recorded channels show."""
 
     block: str
+    kinds: tuple[str, str]
+    """Of the events at which it begins and ends."""
     times: list[float]
-    worst: float
-    range: tuple[float, float]
+    """At which it begins and ends, in turn [s]."""
+    what: str
+    more: str
 
     def events(self) -> list[Event]:
         """When it begins and ends."""
-        kinds = ("command_clipped", "command_in_range")
-        return [Event(time, kinds[k % 2], self.block) for k, time in enumerate(self.times)]
+        return [Event(time, self.kinds[k % 2], self.block) for k, time in enumerate(self.times)]
 
     def words(self) -> str:
         """The same as one line."""
         end = f"to {self.times[1]:.4g} s" if len(self.times) > 1 else "to the end"
-        low, high = self.range
-        return (
-            f"{self.block}: command clipped to its range of {low:.4g} to {high:.4g} V from "
-            f"{self.times[0]:.4g} s {end}{_again(-(-len(self.times) // 2))}; "
-            f"{self.worst:.4g} V was asked for"
-        )
-
-
-class _Pushed(NamedTuple):
-    """A muscle that pushes.
-
-    Attributes
-    ----------
-    block : str
-        The muscle, or group of muscles.
-    times : list of float
-        When it begins and ends [s], in turn.
-    most : float
-        The largest push of one muscle [N].
-    load : float
-        What one muscle is said to push at the most [N].
-    """
-
-    block: str
-    times: list[float]
-    most: float
-    load: float
-
-    def events(self) -> list[Event]:
-        """When it begins and ends."""
-        kinds = ("muscle_pushes", "push_ends")
-        return [Event(time, kinds[k % 2], self.block) for k, time in enumerate(self.times)]
-
-    def words(self) -> str:
-        """The same as one line."""
-        end = f"to {self.times[1]:.4g} s" if len(self.times) > 1 else "to the end"
-        return (
-            f"{self.block}: pushes, each muscle with up to {self.most:.4g} N, from "
-            f"{self.times[0]:.4g} s {end}{_again(-(-len(self.times) // 2))}; its buckling_load is "
-            f"{self.load:.4g} N"
-        )
+        again = _again(-(-len(self.times) // 2))
+        return f"{self.block}: {self.what} from {self.times[0]:.4g} s {end}{again}; {self.more}"
 
 
 def _edges(of: NDArray[np.bool_]) -> NDArray[np.intp]:
@@ -259,7 +217,7 @@ class Simulation(Mapping[str, Array]):
         seen = [event for own in self._told() for event in own.events()]
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
-    def _clipped(self) -> list[_Clipped]:
+    def _clipped(self) -> list[_Told]:
         """Commands that are beyond the range of their valve at some time."""
         found = []
         for name, command in self.under("valve_command").items():
@@ -270,15 +228,18 @@ class Simulation(Mapping[str, Array]):
             if beyond.any():
                 times = [float(t) for t in self.time[_edges(beyond)]]
                 worst = float(held[np.argmax(np.abs(held - null))])
-                block = dotted("valve", name)
-                found.append(_Clipped(block, times, worst, (null - half, null + half)))
+                limits = f"{null - half:.4g} to {null + half:.4g} V"
+                what = f"command clipped to its range of {limits}"
+                kinds = ("command_clipped", "command_in_range")
+                more = f"{worst:.4g} V was asked for"
+                found.append(_Told(dotted("valve", name), kinds, times, what, more))
         return found
 
-    def _told(self) -> list[_Clipped | _Pushed]:
+    def _told(self) -> list[_Told]:
         """What the recorded channels show to have happened."""
         return [*self._clipped(), *self._pushed()]
 
-    def _pushed(self) -> list[_Pushed]:
+    def _pushed(self) -> list[_Told]:
         """Muscles that push at some time, of those that can."""
         found = []
         for name, muscle in self.rig.tables("muscle").items():
@@ -289,7 +250,10 @@ class Simulation(Mapping[str, Array]):
             pushing = each < -min(_TELLING_PUSH, 0.5 * load)
             if pushing.any():
                 times = [float(t) for t in self.time[_edges(pushing)]]
-                found.append(_Pushed(dotted("muscle", name), times, -float(each.min()), load))
+                what = f"pushes, each muscle with up to {-float(each.min()):.4g} N,"
+                more = f"its buckling_load is {load:.4g} N"
+                kinds = ("muscle_pushes", "push_ends")
+                found.append(_Told(dotted("muscle", name), kinds, times, what, more))
         return found
 
     @property
@@ -668,16 +632,16 @@ def simulate(
     wanted = None if record is None else names_of("record", record)
     core = core_rig(rig)
     kept = 1 + len(core.inputs) + len(core.channels if wanted is None else wanted)
-    rows = _rows(sample_time, duration, valve_command, supply_command, length, pressure)
+    asked = {
+        "valve_command": valve_command,
+        "supply_command": supply_command,
+        "length": length,
+        "pressure": pressure,
+    }
+    long = [name for name, signal in asked.items() if _is_long(signal)]
+    rows = None if duration is None else rows_of(duration, sample_time, long)
     check_rows(kept, rows or 0)
-    signals, count = signals_of(
-        rig,
-        valve_command=valve_command,
-        supply_command=supply_command,
-        length=length,
-        pressure=pressure,
-        rows=rows,
-    )
+    signals, count = signals_of(rig, asked, rows)
     if count is None:
         raise ParameterError(
             "duration is missing: a finite time >= 0 s is needed (or give valve_command)"
@@ -690,20 +654,7 @@ def simulate(
         for name, signal in signals.items()
         if channel_of(name) in ("valve_command", "supply_command")
     }
-    driven = {}
-    for name, signal in signals.items():
-        if name in held:
-            driven[name] = signal
-            continue
-        first = name.replace("pressure", "muscle_pressure", 1)
-        if start.setdefault(first, float(signal[0])) != float(signal[0]):
-            raise ParameterError(
-                f"initial {first} = {start[first]:g} does not go with {name}[0] = {signal[0]:g}: "
-                "leave one out"
-            )
-        driven[name] = np.ascontiguousarray(
-            np.append(signal[1:], signal[-1])
-        )  # for the end of each sample; the last is not run
+    driven = prescribed(signals, start)
     channels, events = core.simulate(
         count, driven, sample_time, chosen_step(sample_time, step), start, wanted
     )
@@ -727,14 +678,7 @@ def check_run(rig: Rig, sample_time: float) -> None:
             f"rig is a {type(rig).__name__}; a Rig is needed: pamrs.rigs.shoulder(), "
             "pamrs.load_rig(path)"
         )
-    if not (
-        isinstance(sample_time, (int, float, np.number))
-        and np.isfinite(sample_time)
-        and sample_time > 0
-    ):
-        raise ParameterError(
-            f"sample_time = {sample_time} is not allowed: a finite time > 0 s is needed"
-        )
+    positive("sample_time", sample_time)
 
 
 def check_rows(channels: int, rows: int) -> None:
@@ -762,30 +706,34 @@ def whole_samples(name: str, value: float, sample_time: float, least: int) -> in
     return count
 
 
-def _rows(sample_time: float, duration: float | None, *given: Signals | None) -> int | None:
-    """Number of rows from the duration; None where a signal says it."""
-    if duration is None:
-        return None
-    signals = [
-        v for g in given if g is not None for v in (g.values() if isinstance(g, Mapping) else [g])
-    ]
-    if any(np.ndim(signal) > 0 for signal in signals):
+def loop_samples(
+    update: Any, sample_time: float, period: float | None, duration: float
+) -> tuple[int, int]:
+    """Samples of a period [s] and of a whole loop that is closed by calling ``update``."""
+    if not callable(update):
         raise ParameterError(
-            f"duration = {duration} is not allowed together with a signal that sets it "
-            "(valve_command, length, pressure)"
+            f"update is a {type(update).__name__}; something that can be called with a sample is "
+            "needed"
         )
-    if not (
-        isinstance(duration, (int, float, np.number)) and np.isfinite(duration) and duration >= 0
-    ):
-        raise ParameterError(
-            f"duration = {duration} is not allowed: a finite time >= 0 s (or give valve_command)"
-        )
-    return rows_of(duration, sample_time)
+    every = whole_samples("period", sample_time if period is None else period, sample_time, least=1)
+    return every, whole_samples("duration", duration, sample_time, least=0)
 
 
-def rows_of(duration: float, sample_time: float) -> int:
-    """Rows of a finite duration [s], as many as a run may keep at most."""
-    rows = float(duration) / float(sample_time)
+def _is_long(signal: Signals | None) -> bool:
+    """Whether a signal, or one of several, says how many rows there are."""
+    each = signal.values() if isinstance(signal, Mapping) else [signal]
+    return any(np.ndim(one) > 0 for one in each if one is not None)
+
+
+def rows_of(duration: float, sample_time: float, setting: Iterable[str]) -> int:
+    """Rows of a duration [s], as many as a run may keep at most; signals that set it are refused
+    beside it.
+    """
+    for name in setting:
+        raise ParameterError(
+            f"duration = {duration} is not allowed together with a signal that sets it ({name})"
+        )
+    rows = positive("duration", duration, zero=True) / float(sample_time)
     if rows > MOST_NUMBERS:
         raise ParameterError(
             f"duration = {duration:g} s is not allowed: {rows:.3g} rows of sample_time = "

@@ -21,7 +21,7 @@ from pamrs.simulation._simulation import (
     check_run,
     chosen_step,
     core_rig,
-    whole_samples,
+    loop_samples,
 )
 
 Array = NDArray[np.float64]
@@ -175,9 +175,13 @@ class Simulator:
         if supply_command is length is pressure is None:
             done = self._core.step(valve_command)
         if done is None:
-            done = self._core.hold(
-                1, self._inputs.numbers(valve_command, supply_command, length, pressure)
-            )
+            asked = {
+                "valve_command": valve_command,
+                "supply_command": supply_command,
+                "length": length,
+                "pressure": pressure,
+            }
+            done = self._core.hold(1, self._inputs.numbers(asked))
         sample, events = done
         if events:
             self.events += [Event(*event) for event in events]
@@ -216,14 +220,13 @@ class Simulator:
             As :meth:`step`.
         """
         self._check_rows(samples or 0)
-        signals, count = signals_of(
-            self.rig,
-            valve_command=valve_command,
-            supply_command=supply_command,
-            length=length,
-            pressure=pressure,
-            rows=samples,
-        )
+        asked = {
+            "valve_command": valve_command,
+            "supply_command": supply_command,
+            "length": length,
+            "pressure": pressure,
+        }
+        signals, count = signals_of(self.rig, asked, samples)
         if count is None:
             raise ParameterError("samples is missing: no signal says how many there are")
         self._check_rows(count)
@@ -271,15 +274,7 @@ class Simulator:
         SimulationError
             As :meth:`step`.
         """
-        if not callable(update):
-            raise ParameterError(
-                f"update is a {type(update).__name__}; something that can be called with a sample "
-                "is needed"
-            )
-        every = whole_samples(
-            "period", self.sample_time if period is None else period, self.sample_time, least=1
-        )
-        total = whole_samples("duration", duration, self.sample_time, least=0)
+        every, total = loop_samples(update, self.sample_time, period, duration)
         self._check_rows(total + 1)
         sample, began, happened = self.observe(), self.time, len(self.events)
         rows = np.empty((len(sample), total + 1))
@@ -288,7 +283,7 @@ class Simulator:
         held: dict[str, Array] = {}
         for k in range(0, total, every):
             count = min(every, total - k)
-            numbers = self._inputs.numbers(**keywords(update({"time": self.time, **sample})))
+            numbers = self._inputs.numbers(keywords(update({"time": self.time, **sample})))
             sample, events = self._core.hold(count, numbers, rows, k + 1)
             if events:
                 self.events += [Event(*event) for event in events]

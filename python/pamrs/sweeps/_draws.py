@@ -10,6 +10,7 @@ from typing import Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Axes, Quantity, chosen, quantity
@@ -125,17 +126,6 @@ def _tolerated(known: Quantity) -> Range:
     low = max(known.lower, known.value - _TAIL * known.tol)
     high = min(known.upper, known.value + _TAIL * known.tol)
     return Range(known.name, known.unit, low, high, known.value, known.tol)
-
-
-def whole_number(name: str, value: Any, least: int, most: int | None = None) -> int:
-    """A whole number from ``least`` on; an error names it."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not (whole and value >= least and (most is None or value <= most)):
-        upper = "" if most is None else f" to {most}"
-        raise ParameterError(
-            f"{name} = {value!r} is not allowed: a whole number from {least}{upper} is needed"
-        )
-    return int(value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -261,8 +251,7 @@ def samples(
     >>> len(drawn), drawn.names
     (64, ('arm.payload', 'arm.viscous'))
     """
-    whole_number("n", n, 1, 2**_BITS)
-    whole_number("seed", seed, 0)
-    if sequence not in ("sobol", "halton"):
-        raise ParameterError(f"sequence = {sequence!r} is not allowed: 'sobol' or 'halton'")
+    whole("n", n, 1, 2**_BITS)
+    whole("seed", seed)
+    one_of("sequence", sequence, ("sobol", "halton"))
     return DrawnSamples(ranges(rig, parameters, within), int(n), int(seed), sequence)

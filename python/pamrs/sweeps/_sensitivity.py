@@ -11,10 +11,11 @@ from typing import TYPE_CHECKING, Any, Final, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of, whole
 from pamrs.errors import ParameterError, missing_package
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import Samples
-from pamrs.sweeps._draws import Range, ranges, whole_number
+from pamrs.sweeps._draws import Range, ranges
 from pamrs.sweeps._sweep import sweep
 
 if TYPE_CHECKING:
@@ -93,10 +94,9 @@ def sensitivity(
     MissingPackageError
         If SALib, zarr or xarray is not installed.
     """
-    if method not in METHODS:
-        raise ParameterError(f"method = {method!r} is not allowed: 'sobol' or 'morris'")
-    whole_number("n", n, 2)
-    whole_number("seed", seed, 0)
+    one_of("method", method, METHODS)
+    whole("n", n, 2)
+    whole("seed", seed)
     if method == "sobol" and n & (n - 1):
         raise ParameterError(f"n = {n} is not allowed: a power of two is needed for 'sobol'")
     known = ranges(rig, parameters, within)

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pamrs._checks import whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import INITIAL, Axes, Grid
-from pamrs.sweeps._draws import whole_number
 from pamrs.sweeps._drives import Drive, OpenLoop, metric_of, run_chunk
 from pamrs.sweeps._plan import Plan
 from pamrs.sweeps._progress import Progress
@@ -186,11 +186,11 @@ def run_plan(
     axes.check(lambda name: drive.quantity(rig, name))
     _check_names(axes, drive)
     if chunk is not None:
-        whole_number("chunk", chunk, 1)
+        whole("chunk", chunk, 1)
     if threads is not None:
-        whole_number("threads", threads, 1, 256)
+        whole("threads", threads, 1, 256)
     workers = executor_of(executor)
-    most = in_flight_of(workers) if in_flight is None else whole_number("in_flight", in_flight, 1)
+    most = in_flight_of(workers) if in_flight is None else whole("in_flight", in_flight, 1)
     if workers is not None and threads is None:
         threads = 1
     plan = Plan.of(rig, axes, drive, chunk)

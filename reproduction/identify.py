@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.errors import ParameterError
-from pamrs.library._entry import Entry, quantity
+from pamrs.library import Entry, quantity
 from pamrs.library.evaluate import KINDS
 
 Array = NDArray[np.float64]
