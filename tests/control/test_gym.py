@@ -23,13 +23,13 @@ SHORT = lift_hold_return(0.3, 0.9, ramp=0.2, hold=0.2, duration=0.8)
 
 
 def test_the_checker_finds_nothing():
-    check_env(gym_module.ShoulderEnv(trajectory=SHORT), skip_render_check=True)
+    check_env(gym_module.RigEnv(trajectory=SHORT), skip_render_check=True)
     made = gymnasium.make("pamrs.control.gym:pamrs/Shoulder-v0")
     check_env(made.unwrapped, skip_render_check=True)
 
 
 def test_the_space_has_physical_bounds():
-    env = gym_module.ShoulderEnv()
+    env = gym_module.RigEnv()
     low, high = env.observation_space.low, env.observation_space.high
     assert np.isfinite(low).all()
     assert np.isfinite(high).all()
@@ -39,14 +39,14 @@ def test_the_space_has_physical_bounds():
 
 
 def test_it_is_truncated_at_the_end_and_not_before():
-    env = gym_module.ShoulderEnv(trajectory=SHORT)
+    env = gym_module.RigEnv(trajectory=SHORT)
     env.reset()
     ends = [env.step(np.zeros(1, dtype=np.float32))[2:4] for _ in range(40)]
     assert ends == [(False, False)] * 39 + [(False, True)]
 
 
 def test_a_plant_that_leaves_its_model_is_terminated():
-    env = gym_module.ShoulderEnv(trajectory=SHORT)
+    env = gym_module.RigEnv(trajectory=SHORT)
     env.reset()
     env._simulator.restore(
         pamrs.Simulator(pamrs.rigs.shoulder(), sample_time=0.02, initial=BREAKING).state
@@ -59,7 +59,7 @@ def test_a_plant_that_leaves_its_model_is_terminated():
 
 
 def test_seeds_choose_the_target_within_its_range():
-    env = gym_module.ShoulderEnv(targets=(0.5, 1.0))
+    env = gym_module.RigEnv(targets=(0.5, 1.0))
     targets = [env.reset(seed=s)[1]["target"] for s in (1, 2, 1)]
     assert targets[0] == targets[2] != targets[1]
     more = [env.reset()[1]["target"] for _ in range(30)]
@@ -68,9 +68,9 @@ def test_seeds_choose_the_target_within_its_range():
 
 
 def test_many_arms_are_the_single_ones():
-    many = gym_module.ShoulderVectorEnv(3, sample_time=0.05, targets=(0.5, 1.0))
+    many = gym_module.RigVectorEnv(3, sample_time=0.05, targets=(0.5, 1.0))
     assert many._batch.side_by_side.all()  # the single ones are not: the last digits differ
-    ones = [gym_module.ShoulderEnv(sample_time=0.05, targets=(0.5, 1.0)) for _ in range(3)]
+    ones = [gym_module.RigEnv(sample_time=0.05, targets=(0.5, 1.0)) for _ in range(3)]
     seen, info = many.reset(seed=7)
     first = [env.reset(seed=7 + i) for i, env in enumerate(ones)]
     assert (seen == np.stack([f[0] for f in first])).all()
@@ -93,7 +93,7 @@ def test_many_arms_are_the_single_ones():
 
 
 def test_one_plant_that_ends_truncates_the_others():
-    many = gym_module.ShoulderVectorEnv(3, trajectory=SHORT)
+    many = gym_module.RigVectorEnv(3, trajectory=SHORT)
     many.reset(seed=1)
     other = pamrs.Batch(
         pamrs.rigs.shoulder(),
@@ -109,7 +109,7 @@ def test_one_plant_that_ends_truncates_the_others():
 
 
 def test_a_seed_may_be_any_whole_number():
-    many, env = gym_module.ShoulderVectorEnv(2), gym_module.ShoulderEnv()
+    many, env = gym_module.RigVectorEnv(2), gym_module.RigEnv()
     assert (many.reset(seed=np.int64(3))[0] == many.reset(seed=3)[0]).all()
     assert (env.reset(seed=np.int64(3))[1]["target"]) == env.reset(seed=3)[1]["target"]
 
@@ -118,7 +118,7 @@ def test_the_vector_is_made_by_its_name():
     made = gymnasium.make_vec(
         "pamrs/Shoulder-v0", num_envs=2, vectorization_mode="vector_entry_point"
     )
-    assert isinstance(made.unwrapped, gym_module.ShoulderVectorEnv)
+    assert isinstance(made.unwrapped, gym_module.RigVectorEnv)
     made.reset(seed=[1, 2])
 
 
@@ -276,21 +276,21 @@ def test_many_rigs_are_the_single_ones(rig):
         (lambda: gym_module.RigEnv(ARM, {"elbow": SHORT}), "a mapping of 'elbow', 'wrist'"),
         (lambda: gym_module.RigEnv(ARM, targets={"elbow": (0.5, 1.0)}), "joints are 'elbow', 'w"),
         (lambda: gym_module.RigEnv(MASS, targets=(0.5, 1.0)), "from 0.18 to 0.28 m"),
-        (lambda: gym_module.ShoulderEnv(targets=(1.0, 0.5)), "targets"),
-        (lambda: gym_module.ShoulderEnv(effort=-1.0), "effort"),
-        (lambda: gym_module.ShoulderEnv(sample_time=0.0), "sample_time"),
-        (lambda: gym_module.ShoulderEnv(sample_time=math.nan), "sample_time"),
-        (lambda: gym_module.ShoulderEnv(sample_time="a"), "sample_time"),
-        (lambda: gym_module.ShoulderEnv(trajectory=SHORT, sample_time=1.0), "sample_time"),
-        (lambda: gym_module.ShoulderEnv(render_mode="human"), "render_mode"),
-        (lambda: gym_module.ShoulderVectorEnv(2, render_mode="human"), "render_mode"),
-        (lambda: gym_module.ShoulderEnv().step(np.zeros(1)), "before reset"),
+        (lambda: gym_module.RigEnv(targets=(1.0, 0.5)), "targets"),
+        (lambda: gym_module.RigEnv(effort=-1.0), "effort"),
+        (lambda: gym_module.RigEnv(sample_time=0.0), "sample_time"),
+        (lambda: gym_module.RigEnv(sample_time=math.nan), "sample_time"),
+        (lambda: gym_module.RigEnv(sample_time="a"), "sample_time"),
+        (lambda: gym_module.RigEnv(trajectory=SHORT, sample_time=1.0), "sample_time"),
+        (lambda: gym_module.RigEnv(render_mode="human"), "render_mode"),
+        (lambda: gym_module.RigVectorEnv(2, render_mode="human"), "render_mode"),
+        (lambda: gym_module.RigEnv().step(np.zeros(1)), "before reset"),
     ],
 )
 def test_bad_input_is_named(call, word):
     with pytest.raises(ParameterError, match=word):
         call()
-    env = gym_module.ShoulderEnv()
+    env = gym_module.RigEnv()
     env.reset()
     with pytest.raises(ParameterError, match="action"):
         env.step(np.array([math.nan]))

@@ -532,11 +532,8 @@ class RigController(SampledController):
         return [name for name in (named("line_pressure", n) for n in lines) if name in known]
 
     def _opened(self, group: Group) -> float:
-        """The command that opens a group that is not used to the ambient."""
-        if group.feed.input != "valve_command":
-            return 0.0
-        valve = self.model.rig.tables("valve")[group.feed.name]
-        return float(valve["null_voltage"]) - float(valve["half_range"])
+        """The command that opens a group to the ambient: the lowest one."""
+        return self.command_ranges[named(group.feed.input, group.feed.name)][1]
 
     @staticmethod
     def _answer(answers: dict[str, Any], group: Group, command: Value) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import one_of
 from pamrs.control._adaptive import AdaptiveSliding
 from pamrs.control._air import AirModel
 from pamrs.control._cascade import PressureLoop
@@ -31,6 +32,14 @@ _RESET: Final = 1.0  # 1/s, ki/kp of the same
 #: I [kg m2] and I/C1 of the shoulder with its payload, at mid-range.
 _SHOULDER: Final = (7.9807, 8626.7)
 _SHOULDER_RANGE: Final = 1.8326  # rad, between its stops
+
+
+_LAWS: Final[dict[str, Callable[..., Controller]]] = {
+    "feedforward": FeedforwardPressure,
+    "sliding": Sliding,
+    "adaptive": AdaptiveSliding,
+    "neural": Neural,
+}
 
 
 class RigModel:
@@ -167,58 +176,28 @@ class RigModel:
         inertia, c1 = self.mobility()
         ease: Any = (inertia / c1) / _SHOULDER[1]
         light = float(inertia.min()) / _SHOULDER[0]
-        if isinstance(self.arm, LoadModel):
-            return self._law_of_load(kind, period, float(ease[0]), light, changes)
         if len(self.joints) == 1:
             ease = float(ease[0])
-        laws: dict[str, Callable[[], Controller]] = {
-            "feedforward": lambda: FeedforwardPressure(self.arm, period=period, **changes),
-            "sliding": lambda: Sliding(
-                self.arm, period=period, **{"switching": 2e4 * ease, **changes}
-            ),
-            "adaptive": lambda: AdaptiveSliding(
-                self.arm,
-                changes.pop("gains", (1.0 * light, 5.0 * light, 300.0 * light)),
-                period=period,
-                **{"switching": 2e4 * ease, **changes},
-            ),
-            "neural": lambda: Neural(
-                self.arm,
-                period=period,
-                **{
-                    "switching": 4e5 * ease,
-                    "gains": (300.0 * ease, 2e4 * ease, 3e5 * ease),
-                    **changes,
-                },
-            ),
+        usual: dict[str, dict[str, Any]] = {
+            "feedforward": {},
+            "sliding": {"switching": 2e4 * ease},
+            "adaptive": {
+                "switching": 2e4 * ease,
+                "gains": (1.0 * light, 5.0 * light, 300.0 * light),
+            },
+            "neural": {
+                "switching": 4e5 * ease,
+                "gains": (300.0 * ease, 2e4 * ease, 3e5 * ease),
+            },
         }
-        if kind not in laws:
-            raise ParameterError(f"kind = {kind!r} is not allowed: one of {', '.join(laws)}")
-        return laws[kind]()
-
-    def _law_of_load(
-        self, kind: str, period: float, ease: float, light: float, changes: dict[str, Any]
-    ) -> Controller:
-        """The law of a hanging mass: its stroke is to it what the joint's range is to the shoulder,
-        and it switches three times as hard, since a muscle that pulls straight is stiffer beside
-        what it moves.
-        """
-        arm = self.arm
-        reach = (arm.angle_range[1] - arm.angle_range[0]) / _SHOULDER_RANGE
-        surface = {"switching": 6e4 * ease * reach, "boundary_layer": 0.2 * reach}
-        gains = (light / reach**2, 5.0 * light / reach**2, 300.0 * light)
-        laws: dict[str, Callable[[], Controller]] = {
-            "feedforward": lambda: FeedforwardPressure(arm, period=period, **changes),
-            "sliding": lambda: Sliding(arm, period=period, **{**surface, **changes}),
-            "adaptive": lambda: AdaptiveSliding(
-                arm, changes.pop("gains", gains), period=period, **{**surface, **changes}
-            ),
-        }
-        if kind not in laws:
-            raise ParameterError(
-                f"kind = {kind!r} is not allowed for a hanging mass: one of {', '.join(laws)}"
-            )
-        return laws[kind]()
+        if isinstance(self.arm, LoadModel):
+            # its stroke is to a mass what the joint's range is to the shoulder
+            reach = (self.arm.angle_range[1] - self.arm.angle_range[0]) / _SHOULDER_RANGE
+            surface = {"switching": 6e4 * ease * reach, "boundary_layer": 0.2 * reach}
+            gains = (light / reach**2, 5.0 * light / reach**2, 300.0 * light)
+            usual = {"feedforward": {}, "sliding": surface, "adaptive": {**surface, "gains": gains}}
+        one_of("kind", kind, usual)
+        return _LAWS[kind](self.arm, period=period, **{**usual[kind], **changes})
 
 
 def _arm(

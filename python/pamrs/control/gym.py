@@ -51,7 +51,7 @@ try:
 except ImportError as error:
     raise missing_package(error, "control") from error
 
-__all__ = ["ID", "RigEnv", "RigVectorEnv", "ShoulderEnv", "ShoulderVectorEnv"]
+__all__ = ["ID", "RigEnv", "RigVectorEnv"]
 
 ID = "pamrs/Shoulder-v0"
 
@@ -581,10 +581,6 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         return task.seen(sample, angle, rate, held), reward, failed, truncated, info
 
 
-#: The environments of the shoulder, by the names that they had first.
-ShoulderEnv, ShoulderVectorEnv = RigEnv, RigVectorEnv
-
-
 def _check_render_mode(render_mode: str | None) -> None:
     """Refuse what ``gymnasium.make`` passes on, where it is not None."""
     if render_mode is not None:
@@ -622,6 +618,6 @@ def _actions(action: Any, shape: tuple[int, ...]) -> Array:
 if ID not in gymnasium.registry:
     gymnasium.register(
         ID,
-        entry_point="pamrs.control.gym:ShoulderEnv",
-        vector_entry_point="pamrs.control.gym:ShoulderVectorEnv",
+        entry_point="pamrs.control.gym:RigEnv",
+        vector_entry_point="pamrs.control.gym:RigVectorEnv",
     )

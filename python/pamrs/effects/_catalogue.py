@@ -18,41 +18,11 @@ def _words(effect: str) -> dict[str, Any]:
     return tomllib.loads(file.read_text(encoding="utf-8"))
 
 
-#: Fields of a parameter that are the core's as they stand.
-_AS_TOLD: Final = (
-    "channel",
-    "repeats",
-    "tried",
-    "same_everywhere",
-    "time_constant",
-    "own",
-    "restricts",
-    "like",
-)
-
-
-def _pair(value: list[float] | None) -> tuple[float, float] | None:
-    return None if value is None else (float(value[0]), float(value[1]))
-
-
 def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParameter:
-    return EffectParameter(
-        name=told["name"],
-        unit=told["unit"],
-        default=told["default"],
-        lower=told["lower"],
-        upper=told["upper"],
-        starts=tuple(told["starts"]),
-        meaning=meanings[told["name"]],
-        neutral=told["neutral"],
-        expected=_pair(told["expected"]),
-        prior=_pair(told["prior"]),
-        role=told["role"] or "",
-        role_sealed=told["role_sealed"] or "",
-        scan=None if told["scan"] is None else tuple(told["scan"]),
-        needed_in=tuple(told["needed_in"]),
-        **{name: told[name] for name in _AS_TOLD},
-    )
+    """A parameter, as the core tells it, with its words."""
+    own = {key: tuple(value) if isinstance(value, list) else value for key, value in told.items()}
+    roles = {key: told[key] or "" for key in ("role", "role_sealed")}
+    return EffectParameter(**{**own, **roles}, meaning=meanings[told["name"]])
 
 
 def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:
@@ -70,6 +40,10 @@ def _same_data(told: dict[str, Any], words: dict[str, Any]) -> SameData:
     return SameData(**{**told, "held": held, "told_by": words["told_by"]})
 
 
+#: Of an effect, as the core tells it.
+_TOLD: Final = ("block", "at", "last_only", "on_loads", "frees_mass", "dry_friction")
+
+
 def _info(told: dict[str, Any]) -> EffectInfo:
     """One effect, as the core tells it, with its words."""
     words = _words(told["id"])
@@ -85,39 +59,26 @@ def _info(told: dict[str, Any]) -> EffectInfo:
     equations = {usual["name"]: words["equation"]}
     equations |= {form["name"]: words["forms"][form["name"]] for form in others}
     kink = told["kink"]
+    excitation = words.get("excitation", {}).items()
     return EffectInfo(
         id=told["id"],
-        name=words["name"],
-        block=told["block"],
-        at=told["at"],
-        equation=words["equation"],
-        fingerprint=words["fingerprint"],
-        separates=words["separates"],
         forms=tuple(_form(form, meanings, equations[form["name"]]) for form in told["forms"]),
         reference=told["source"],
-        rivals=tuple(words.get("rivals", ())),
         catalogue=told["named"],
         same_data=tuple(_same_data(same, words) for same in told["same_data"]),
         terms=terms,
-        label=words.get("label", ""),
-        stated_by=tuple(words.get("stated_by", ())),
+        excitation=tuple((k, tuple(v) if isinstance(v, list) else v) for k, v in excitation),
         acts_in=tuple(told["acts_in"]),
-        experiment=words.get("experiment", ""),
-        excitation=tuple(
-            (k, tuple(v) if isinstance(v, list) else v)
-            for k, v in words.get("excitation", {}).items()
-        ),
-        last_only=told["last_only"],
-        on_loads=told["on_loads"],
         supplies=tuple(told["supplies"]),
-        frees_mass=told["frees_mass"],
-        dry_friction=told["dry_friction"],
         kink=None
         if kink is None
         else (tuple(kink["where_not_zero"]), kink["why"], kink["of_supplies"]),
-        at_rest=tuple(
-            (act, *change) for told_change in told["at_rest"] for act, change in told_change.items()
-        ),
+        at_rest=tuple((act, *change) for one in told["at_rest"] for act, change in one.items()),
+        rivals=tuple(words.get("rivals", ())),
+        stated_by=tuple(words.get("stated_by", ())),
+        **{key: told[key] for key in _TOLD},
+        **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},
+        **{key: words.get(key, "") for key in ("label", "experiment")},
     )
 
 

@@ -214,8 +214,19 @@ def _columns(given: Any, what: str) -> dict[str, Array]:
     return {str(name): _column(str(name), values) for name, values in given.items()}
 
 
-def _check_column(known: Quantity, values: Array) -> None:
-    check_column(known.name, values, known.lower, known.upper, known.unit)
+class _Listed(Axes):
+    """Axes whose values are all given."""
+
+    _values: dict[str, Array]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(self._values)
+
+    def check(self, known: Callable[[str], Quantity]) -> None:
+        for name, column in self._values.items():
+            own = known(name)
+            check_column(name, column, own.lower, own.upper, own.unit)
 
 
 def _digest(values: Array) -> str:
@@ -223,7 +234,7 @@ def _digest(values: Array) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class Grid(Axes):
+class Grid(_Listed):
     """Every combination of the values of each axis; the last one goes fastest.
 
     Parameters
@@ -246,10 +257,6 @@ class Grid(Axes):
             if np.unique(column).size != column.size:
                 raise ParameterError(f"the values of {name} are not allowed: one is given twice")
         object.__setattr__(self, "_values", values)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self._values)
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -276,13 +283,9 @@ class Grid(Axes):
             f"values of {k}": f"{v.size}, {_digest(v)}" for k, v in self._values.items()
         }
 
-    def check(self, known: Callable[[str], Quantity]) -> None:
-        for name, column in self._values.items():
-            _check_column(known(name), column)
-
 
 @dataclass(frozen=True, eq=False)
-class Samples(Axes):
+class Samples(_Listed):
     """A table of runs: run k has entry k of every column.
 
     Parameters
@@ -316,10 +319,6 @@ class Samples(Axes):
         object.__setattr__(self, "_values", values)
 
     @property
-    def names(self) -> tuple[str, ...]:
-        return tuple(self._values)
-
-    @property
     def shape(self) -> tuple[int, ...]:
         return (next(iter(self._values.values())).size,)
 
@@ -332,10 +331,6 @@ class Samples(Axes):
 
     def describe(self) -> dict[str, str]:
         return {f"samples of {k}": f"{v.size}, {_digest(v)}" for k, v in self._values.items()}
-
-    def check(self, known: Callable[[str], Quantity]) -> None:
-        for name, column in self._values.items():
-            _check_column(known(name), column)
 
 
 def chosen(names: Sequence[str] | str | None, default: Sequence[str]) -> list[str]:

@@ -131,11 +131,7 @@ def gain_map(
     step: float | None = None,
     initial: Mapping[str, float] | None = None,
     store: str | os.PathLike[str] = "gains.zarr",
-    executor: Any = None,
-    chunk: int | None = None,
-    threads: int | None = None,
-    in_flight: int | None = None,
-    progress: bool = True,
+    **runs: Any,
 ) -> xr.Dataset:
     """A controller closed around a rig over gains, parameters and geometry, in a store.
 
@@ -156,8 +152,8 @@ def gain_map(
         As for :func:`pamrs.control.sweep`.
     initial : mapping of str to float, optional
         Initial values of all runs.
-    store, executor, chunk, threads, in_flight, progress
-        As for :func:`sweep`.
+    store, **runs
+        As for :func:`sweep`: ``executor``, ``chunk``, ``threads``, ``in_flight``, ``progress``.
 
     Returns
     -------
@@ -180,14 +176,5 @@ def gain_map(
     loop: dict[str, Any] = {k: float(v) for k, v in given.items() if v is not None}
     loop |= {"initial": {k: float(v) for k, v in initial.items()}} if initial else {}
     hangs = any(load.get("kind", "mass") == "mass" for load in rig.tables("load").values())
-    return run_plan(
-        rig,
-        over,
-        ClosedLoop(controller, trajectory, loop, by_length=hangs),
-        store=store,
-        executor=executor,
-        chunk=chunk,
-        threads=threads,
-        in_flight=in_flight,
-        progress=progress,
-    )
+    drive = ClosedLoop(controller, trajectory, loop, by_length=hangs)
+    return run_plan(rig, over, drive, store=store, **runs)
