@@ -308,5 +308,5 @@ def test_a_trajectory_that_nothing_follows_is_refused():
 
 @pytest.mark.parametrize("num_envs", [pamrs.rigs.shoulder(), 0, 2.5, True])
 def test_a_vector_asks_how_many_first(num_envs):
-    with pytest.raises(ParameterError, match=r"num_envs = .* RigVectorEnv\(64, rig\)"):
+    with pytest.raises(ParameterError, match="num_envs = .* a whole number from 1 on"):
         gym_module.RigVectorEnv(num_envs)

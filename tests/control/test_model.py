@@ -99,7 +99,9 @@ def test_air_of_the_feedforward_is_that_of_the_motion_it_is_told():
         assert command("commanded", degrees) == pytest.approx(told, rel=1e-12)
         there = air.command(0.0, wanted, supply, math.radians(degrees), 0.1)
         assert command("measured", degrees) == pytest.approx(there, rel=1e-9)
-    with pytest.raises(ParameterError, match=r"motion = 'guessed' is not allowed: 'commanded' or"):
+    with pytest.raises(
+        ParameterError, match=r"motion = 'guessed' is not allowed: one of 'commanded'"
+    ):
         Feedforward(arm, air, 1.0, motion="guessed")
 
 
@@ -143,14 +145,14 @@ def test_orifice_inverse_against_the_core():
     )
     flow = core.mass_flow(area, upstream, upstream * ratios)
     found = [
-        inverse.area(float(m), upstream, float(upstream * r))
+        inverse.size(float(m), upstream, float(upstream * r))
         for m, r in zip(flow, ratios, strict=True)
     ]
     assert found == pytest.approx([area] * ratios.size, rel=1e-9)
-    assert inverse.area(flow, upstream, upstream * ratios).tolist() == found
+    assert inverse.size(flow, upstream, upstream * ratios).tolist() == found
     assert inverse.flow(1e5, 2e5) == 0.0
-    assert math.isfinite(inverse.area(1e-3, 2e5, 2e5))
-    assert inverse.area(0.0, 2e5, 2e5) == 0.0
+    assert math.isfinite(inverse.size(1e-3, 2e5, 2e5))
+    assert inverse.size(0.0, 2e5, 2e5) == 0.0
 
 
 def test_area_table_backwards():
@@ -175,13 +177,13 @@ def test_conductance_inverse_against_the_core_and_iso_6358():
         ]
         assert flow == pytest.approx(reference, rel=1e-12)
         found = [
-            inverse.conductance(float(m), upstream, float(upstream * r))
+            inverse.size(float(m), upstream, float(upstream * r))
             for m, r in zip(flow, ratios, strict=True)
         ]
         assert found == pytest.approx([conductance] * ratios.size, rel=1e-9)
-        assert inverse.conductance(flow, upstream, upstream * ratios).tolist() == found
+        assert inverse.size(flow, upstream, upstream * ratios).tolist() == found
         assert inverse.flow(1e5, 2e5) == 0.0
-        assert math.isfinite(inverse.conductance(1e-3, 2e5, 2e5))
+        assert math.isfinite(inverse.size(1e-3, 2e5, 2e5))
 
 
 ISO = with_iso_valve(SHOULDER, (CONDUCTANCE, 0.3), (1.3 * CONDUCTANCE, 0.45))

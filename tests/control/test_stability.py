@@ -242,7 +242,6 @@ def test_region_of_stable_gains_over_payload(rig):
         (lambda rig: linearise(rig, ANGLE, side="left"), "side"),
         (lambda rig: linearise(rig.with_parameters({"arm.payload": 500.0}), 1.5), "no pressure"),
         (lambda rig: linearise(pamrs.rigs.named("antagonistic_joint"), 0.1), "chamber"),
-        (lambda rig: linearise(rig, ANGLE).driven_by("pressure"), "state"),
         (lambda rig: linearise(rig, ANGLE).sampled(0.0), "period"),
         (lambda rig: loop_matrix(integrator(1.0), proportional(1.0, 0.1), delay=-1.0), "delay"),
         (lambda rig: stable_region(rig, SmallPid, {"kp": []}, payloads=[1.0], angle=ANGLE), "kp"),

@@ -245,7 +245,7 @@ def test_perturbed_is_off_by_what_it_says(rig):
         (lambda r: search_gains(r, pid, {"kp": (1.0, math.nan)}, LIFT), "kp"),
         (
             lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": 2.5}),
-            "start of kp = 2.5 .* 1.0 to 2.0",
+            "start of kp = 2.5 .* 1 to 2",
         ),
         (
             lambda r: search_gains(r, pid, {"kp": (1.0, 2.0)}, LIFT, start={"kp": math.nan}),

@@ -247,12 +247,3 @@ def test_import_is_light():
         f"sorted({heavy} & set(sys.modules))"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_module_prints_identification_and_facts():
-    done = subprocess.run(
-        [sys.executable, "-m", "pamrs.library"], check=True, capture_output=True, text=True
-    )
-    assert "they determine 3 of 4 combinations" in done.stdout
-    assert "cannot tell" in done.stdout
-    assert "Six against two" in done.stdout

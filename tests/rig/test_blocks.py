@@ -166,7 +166,7 @@ def test_tables_of_blocks_with_and_without_names() -> None:
     rig.tables("valve")["flexor"]["half_range"] = 0.0
     assert rig.tables("valve")["flexor"]["half_range"] == 5.0
     with pytest.raises(
-        ParameterError, match="block = 'valves' is not allowed: one of gas, supply, valve"
+        ParameterError, match="block = 'valves' is not allowed: one of 'gas', 'supply', 'valve'"
     ):
         rig.tables("valves")
     with pytest.raises(ParameterError, match="block = 'tank'"):

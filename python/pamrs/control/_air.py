@@ -28,6 +28,7 @@ Array = NDArray[np.float64]
 _LAMINAR: Final = (
     0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
 )
+_WAYS: Final = ("fill", "vent")
 _LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
 
 
@@ -111,12 +112,6 @@ class OrificeInverse(_PassageInverse):
             (2.0 / (gamma + 1.0)) ** (gamma / (gamma - 1.0)),
         )
 
-    def area(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
-        """Effective area [m2] for a mass flow [kg/s] >= 0; zero for no flow, very large where
-        nothing can flow.
-        """
-        return self.size(mass_flow, upstream, downstream)
-
 
 class ConductanceInverse(_PassageInverse):
     """Sonic conductance ``C`` that lets a mass flow through at a critical ratio ``b`` (ISO
@@ -146,11 +141,10 @@ class ConductanceInverse(_PassageInverse):
             critical_ratio,
         )
 
-    def conductance(self, mass_flow: Value, upstream: Value, downstream: Value) -> Value:
-        """Sonic conductance [m3/(s Pa)] for a mass flow [kg/s] >= 0; zero for no flow, very large
-        where nothing can flow.
-        """
-        return self.size(mass_flow, upstream, downstream)
+
+#: The same for every chamber of a gas: a bundle has hundreds.
+_orifice = functools.lru_cache(maxsize=16)(OrificeInverse)
+_conductance = functools.lru_cache(maxsize=16)(ConductanceInverse)
 
 
 class AirModel:
@@ -310,25 +304,9 @@ def _paths(
             f"rig {rig!r}: {block}.fill_conductance = {valve['fill_conductance']:g} m3/(s Pa), so "
             "that the valve fills nothing: a controller's model needs one that does"
         )
-    fill, vent = (
-        (
-            _conductance(float(valve[f"{way}_critical_ratio"]), *air),
-            float(valve[f"{way}_conductance"]),
-        )
-        for way in ("fill", "vent")
-    )
-    return fill, vent
-
-
-@functools.lru_cache(maxsize=16)
-def _orifice(*gas: float) -> OrificeInverse:
-    """The same for every chamber of a gas: a bundle has hundreds."""
-    return OrificeInverse(*gas)
-
-
-@functools.lru_cache(maxsize=16)
-def _conductance(*ratio_and_gas: float) -> ConductanceInverse:
-    return ConductanceInverse(*ratio_and_gas)
+    inverses = [_conductance(float(valve[f"{way}_critical_ratio"]), *air) for way in _WAYS]
+    fill, vent = (float(valve[f"{way}_conductance"]) for way in _WAYS)
+    return (inverses[0], fill), (inverses[1], vent)
 
 
 def _group(rig: Rig, chamber: str | None) -> Group:

@@ -35,14 +35,14 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive, whole
+from pamrs._checks import one_of, positive, whole
 from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.control._groups import direct_regulators
 from pamrs.control._protocol import keywords_of
 from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach, lift_hold_return
 from pamrs.errors import ParameterError, SimulationError, missing_package
 from pamrs.rig import Rig
-from pamrs.simulation import Simulator, core_rig
+from pamrs.simulation import Batch, Simulator, core_rig
 
 try:
     import gymnasium
@@ -104,12 +104,16 @@ class _Task:
         self,
         rig: Rig | None,
         trajectory: Any,
-        targets: Any,
-        sample_time: float,
-        effort: float,
-        penalty: float,
-        pressure_limit: float | None,
+        *,
+        targets: Any = None,
+        sample_time: float = 0.02,
+        effort: float = 0.01,
+        penalty: float = 100.0,
+        pressure_limit: float | None = None,
+        render_mode: str | None = None,
     ) -> None:
+        # what gymnasium.make passes on: Simulation.animate draws an arm
+        one_of("render_mode", render_mode, [None])
         from pamrs import rigs
 
         self.rig = rigs.shoulder() if rig is None else rig
@@ -311,13 +315,15 @@ class RigEnv(gymnasium.Env[Array32, Array32]):
     trajectory : Trajectory, JointTrajectories, or mapping of str to Trajectory, optional
         What to follow, of several joints one for each; by default lifts of 15 s to an angle that is
         drawn from ``targets``.
+    **task
+        The following ones, by name.
     targets : (float, float), or mapping of str to that, optional
         Range of that angle [rad], one for all joints or one for each; a fifth to three fifths of
         the way between the stops by default.
     sample_time : float
-        Time that an action is held [s].
+        Time that an action is held [s]; 0.02 by default.
     effort, penalty : float
-        Of the reward.
+        Of the reward; 0.01 and 100 by default.
     pressure_limit : float, optional
         Largest set pressure of a regulator [Pa]; by default ``max_pressure`` of ``[limits]``.
 
@@ -332,23 +338,11 @@ class RigEnv(gymnasium.Env[Array32, Array32]):
 
     metadata = {"render_modes": []}
 
-    def __init__(
-        self,
-        rig: Rig | None = None,
-        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
-        *,
-        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
-        sample_time: float = 0.02,
-        effort: float = 0.01,
-        penalty: float = 100.0,
-        pressure_limit: float | None = None,
-        render_mode: str | None = None,
-    ) -> None:
-        _check_render_mode(render_mode)
+    def __init__(self, rig: Rig | None = None, trajectory: Any = None, **task: Any) -> None:
+        self._task = _Task(rig, trajectory, **task)
         self.render_mode = None
-        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
         self.observation_space, self.action_space = self._task.observed, self._task.acted
-        self._simulator = Simulator(self._task.rig, sample_time=sample_time)
+        self._simulator = Simulator(self._task.rig, sample_time=self._task.sample_time)
         self._trajectory: Trajectory | JointTrajectories | None = None
 
     @property
@@ -446,7 +440,7 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     ----------
     num_envs : int
         How many rigs.
-    rig, trajectory, targets, sample_time, effort, penalty, pressure_limit
+    rig, trajectory, **task
         As for :class:`RigEnv`.
 
     Raises
@@ -461,27 +455,15 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self,
         num_envs: int = 1,
         rig: Rig | None = None,
-        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
-        *,
-        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
-        sample_time: float = 0.02,
-        effort: float = 0.01,
-        penalty: float = 100.0,
-        pressure_limit: float | None = None,
-        render_mode: str | None = None,
+        trajectory: Any = None,
+        **task: Any,
     ) -> None:
-        from pamrs.simulation import Batch
-
-        _check_render_mode(render_mode)
+        self.num_envs = whole("num_envs", num_envs, 1)
+        self._task = _Task(rig, trajectory, **task)
         self.render_mode = None
-        whole("num_envs", num_envs, 1)  # the rig comes behind it
-        self._task = _Task(rig, trajectory, targets, sample_time, effort, penalty, pressure_limit)
-        self._batch = Batch(self._task.rig, n=num_envs, sample_time=sample_time)
-        self.num_envs = num_envs
-        self.single_observation_space, self.single_action_space = (
-            self._task.observed,
-            self._task.acted,
-        )
+        self._batch = Batch(self._task.rig, n=num_envs, sample_time=self._task.sample_time)
+        self.single_observation_space = self._task.observed
+        self.single_action_space = self._task.acted
         self.observation_space = batch_space(self._task.observed, num_envs)
         self.action_space = batch_space(self._task.acted, num_envs)
         self._randoms = [np.random.default_rng() for _ in range(num_envs)]
@@ -579,15 +561,6 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         told = task.info(error, commands)
         info = {**told, **{f"_{name}": there for name in told}}
         return task.seen(sample, angle, rate, held), reward, failed, truncated, info
-
-
-def _check_render_mode(render_mode: str | None) -> None:
-    """Refuse what ``gymnasium.make`` passes on, where it is not None."""
-    if render_mode is not None:
-        raise ParameterError(
-            f"render_mode = {render_mode!r} is not allowed: there is none; Simulation.animate "
-            "draws an arm"
-        )
 
 
 def _wanted(trajectory: Trajectory | JointTrajectories, time: float) -> tuple[Array, Array]:

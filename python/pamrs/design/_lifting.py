@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import checked_number, whole
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
@@ -285,8 +286,7 @@ def lift(
         raise ParameterError(
             f"to = {end:g} rad ({math.degrees(end):.4g} deg) is not allowed: {allowed}"
         )
-    if points < 3:
-        raise ParameterError(f"points = {points} is not allowed: at least 3")
+    whole("points", points, 3)
     balance = _Balance(rig, pressure)
     angle = np.linspace(low, end, points)
     torque = balance.torque(angle, _LIFTING)
@@ -434,11 +434,7 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
                 "be taken"
             )
         return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
-    if not (math.isfinite(pressure) and 0.0 <= pressure <= 1e8):
-        raise ParameterError(
-            f"pressure = {pressure} Pa is not allowed: a gauge pressure from 0 to 1e8 Pa"
-        )
-    return float(pressure)
+    return checked_number("pressure", pressure, 0.0, 1e8, "Pa")
 
 
 def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:

@@ -4,9 +4,7 @@ take.
 
 from __future__ import annotations
 
-import io
 import math
-import textwrap
 from typing import TYPE_CHECKING, Final
 
 import matplotlib as mpl
@@ -14,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pamrs.design.figures import headed, png
 from pamrs.report.figures import COLOURS, STYLE
 
 if TYPE_CHECKING:
@@ -38,15 +37,7 @@ def lift_png(result: Lift) -> bytes:
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=(10.0, 4.0), dpi=150, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.08)  # type: ignore[union-attr, call-arg]
-        title = f"{result.rig} {result.text}"
-        figure.suptitle(
-            "\n".join(textwrap.wrap(title, 118)),
-            x=0.012,
-            ha="left",
-            fontsize=9.5,
-            fontweight="bold",
-            color="#111827",
-        )
+        headed(figure, f"{result.rig} {result.text}", 118, 9.5)
         left, right = figure.subplots(1, 2)
         _torques(left, result)
         _capacity(right, result)
@@ -55,9 +46,7 @@ def lift_png(result: Lift) -> bytes:
                 axes.axvline(math.degrees(result.reached), color=_INK, lw=0.9, ls=(0, (2, 2)))
             axes.set_xlim(math.degrees(result.angle[0]), math.degrees(result.angle[-1]))
             axes.set_xlabel("joint angle [deg]")
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png")
-    return stream.getvalue()
+        return png(figure)
 
 
 def _torques(axes: Axes, result: Lift) -> None:

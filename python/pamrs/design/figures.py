@@ -70,34 +70,35 @@ def summary_png(
         (f"The joint at its limits: {_sizes(design)} mm", lambda axes: _joint(axes, design)),
     ]
     if comparison is not None:
-        panels.append(
-            (
-                "Best objective of each run, equal evaluations",
-                lambda axes: _methods(axes, comparison),
-            )
-        )
+        name = "Best objective of each run, equal evaluations"
+        panels.append((name, lambda axes: _methods(axes, comparison)))
     if front is not None:
         panels.append(("Pressure needed against size", lambda axes: _front(axes, front, design)))
     rows = -(-len(panels) // 2)
     with mpl.rc_context({**STYLE, "font.size": 8.5, "legend.fontsize": 8.0}):
         figure = Figure(figsize=(10.0, 0.5 + 3.3 * rows), dpi=160, layout="constrained")
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.1, wspace=0.04, hspace=0.04)  # type: ignore[union-attr, call-arg]
-        figure.suptitle(
-            "\n".join(textwrap.wrap(title, 92)),
-            x=0.012,
-            ha="left",
-            fontsize=13,
-            fontweight="bold",
-            color="#111827",
-        )
+        headed(figure, title, 92, 13)
         grid = figure.subplots(rows, 2, squeeze=False).ravel()
         for axes, (name, draw) in zip(grid, panels, strict=False):
             axes.set_title(name)
             draw(axes)
         for axes in grid[len(panels) :]:
             axes.set_visible(False)
-        stream = io.BytesIO()
-        figure.savefig(stream, format="png", dpi=160)
+        return png(figure)
+
+
+def headed(figure: Figure, title: str, width: int, size: float) -> None:
+    """Put a title over a picture, in lines of so many characters."""
+    text = "\n".join(textwrap.wrap(title, width))
+    style = {"fontsize": size, "fontweight": "bold", "color": "#111827"}
+    figure.suptitle(text, x=0.012, ha="left", **style)
+
+
+def png(figure: Figure) -> bytes:
+    """A picture as PNG."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png")
     return stream.getvalue()
 
 
@@ -218,9 +219,9 @@ def _torque(axes: Axes, design: JointDesign) -> None:
             "limit of the stroke or the tendon",
             (math.degrees(scores.max_angle[0]), 0.03),
             (-4, 0),
-            xycoords=(("data"), ("axes fraction")),
-            textcoords=("offset points"),
-            ha=("right"),
+            xycoords=("data", "axes fraction"),
+            textcoords="offset points",
+            ha="right",
             color=COLOURS["before"],
         )
     axes.set(xlabel="joint angle [deg]", ylabel="torque [N m]")
