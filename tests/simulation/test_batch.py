@@ -356,7 +356,7 @@ def test_bad_input_is_named_and_leaves_the_batch_alone() -> None:
         ({**before, "status": (None,)}, "state is of 3 rows and 1 status; 3 are"),
         ({**before, "status": (1, 2, 3)}, "state is not one of a batch"),
         ({"rows": 1}, "state has rows; samples, rows and status"),
-        (3, "state is a int"),
+        (3, "state has 3"),
     ):
         with pytest.raises(pamrs.ParameterError, match=message):
             batch.restore(state)  # type: ignore[arg-type]

@@ -244,9 +244,9 @@ class Batch:
         """
         needed = {"samples", "rows", "status"}
         if not isinstance(state, Mapping) or set(state) != needed:
+            has = ", ".join(map(str, state)) if isinstance(state, Mapping) else as_said(state)
             raise ParameterError(
-                f"state has {as_said(list(state) if isinstance(state, Mapping) else state)}; "
-                "samples, rows and status are needed, as of Batch.state"
+                f"state has {has}; samples, rows and status are needed, as of Batch.state"
             )
         try:
             samples = int(state["samples"])

@@ -282,8 +282,9 @@ def prescribed(
         if plants is not None:
             first = np.ascontiguousarray(np.broadcast_to(first, (plants,)))
         if not np.array_equal(start.setdefault(channel, first), first):
+            told = f" = {start[channel]:g}" if plants is None else ""
             raise ParameterError(
-                f"initial {channel} does not go with the first value of {name}: leave one out"
+                f"initial {channel}{told} does not go with the first value of {name}: leave one out"
             )
         # the last one is not run
         driven[name] = np.ascontiguousarray(
