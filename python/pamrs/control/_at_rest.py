@@ -6,10 +6,25 @@ What each effect asks for stands in the catalogue (:class:`pamrs.effects.EffectI
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Final
+
+import numpy as np
+
+from pamrs.channels import dotted
+from pamrs.control._groups import lengths_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
+from pamrs.simulation import Simulator
+
+#: How long it is looked at [s].
+SAMPLE: Final = 2.5e-4
+#: Rate after that time, of the range between the stops [1/s], below which something rests: in a
+#: tenth of a second, the time of a loop, it moves a ten-thousandth of its range by such an
+#: acceleration. Of a joint of 115 deg 1e-5 rad/s, of a stroke of 0.1 m 5e-7 m/s.
+_REST: Final = 5e-6
 
 
 def check_smooth(rig: Rig, *, supplies: bool) -> None:
@@ -118,3 +133,53 @@ def without_dry_friction(rig: Rig) -> Rig:
     return rig.with_parameters(
         {name: 0.0 for name in rig.parameters if name.rpartition(".")[2] == "coulomb"}
     )
+
+
+def after(simulator: Simulator, inputs: Mapping[str, float]) -> dict[str, float]:
+    """Channels one sample later; the simulator is left as it was.
+
+    Parameters
+    ----------
+    simulator : Simulator
+        With the sample time :data:`SAMPLE`.
+    inputs : mapping of str to float
+        Commands by name.
+
+    Returns
+    -------
+    dict of str to float
+    """
+    state = simulator.state
+    block = simulator._advance(1, {name: np.array([value]) for name, value in inputs.items()})
+    simulator.restore(state)
+    return {name: float(values[0]) for name, values in block.items()}
+
+
+def closed(rig: Rig) -> dict[str, float]:
+    """Every valve at its null."""
+    return {
+        dotted("valve_command", name): float(table["null_voltage"])
+        for name, table in rig.tables("valve").items()
+    }
+
+
+def kept(rig: Rig, sample: Mapping[str, float]) -> dict[str, float]:
+    """Every regulator set to the pressure that it has."""
+    return {
+        dotted("supply_command", name): sample[dotted("supply_pressure", name)]
+        for name, table in rig.tables("supply").items()
+        if table.get("kind") == "regulator"
+    }
+
+
+def slowest(rig: Rig) -> dict[str, float]:
+    """Rate of every joint [rad/s] and load [m/s] by its channel, below which it rests if it has no
+    more after a short sample.
+    """
+    ends = {
+        dotted("joint_rate", name): (table["min_angle"], table["max_angle"])
+        for name, table in rig.tables("joint").items()
+    }
+    if (lengths := lengths_of(rig)) is not None:
+        ends["length_rate"] = lengths
+    return {name: _REST * float(high - low) for name, (low, high) in ends.items()}

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 
 from pamrs.channels import unit_of
 from pamrs.control._air import AirModel
-from pamrs.control._at_rest import resting
+from pamrs.control._at_rest import SAMPLE, after, closed, kept, resting, slowest
 from pamrs.control._groups import Group, lengths_of, named
 from pamrs.control._load import shortened
 from pamrs.control._protocol import (
@@ -30,7 +30,6 @@ from pamrs.control._protocol import (
     Value,
     check_answers_pressure,
 )
-from pamrs.control._rest import SAMPLE, after, closed, kept, slowest
 from pamrs.control._rig_model import RigModel
 from pamrs.control._sampled import Restorer, SampledController, Stateful
 from pamrs.control._sharing import CoContraction, Demand, Share, Together

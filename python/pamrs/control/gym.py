@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from pamrs._checks import one_of, positive, whole
 from pamrs.channels import channel_of, dotted, unit_of
-from pamrs.control._groups import direct_regulators
+from pamrs.control._groups import direct_regulators, lengths_of
 from pamrs.control._protocol import keywords_of
 from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach, lift_hold_return
 from pamrs.errors import ParameterError, SimulationError, missing_package
@@ -85,10 +85,8 @@ def _moved(rig: Rig) -> list[_Moved]:
         )
         for name, table in rig.tables("joint").items()
     ]
-    for table in rig.tables("load").values():
-        if table.get("kind", "mass") == "mass":
-            ends = float(table["min_length"]), float(table["max_length"])
-            found.append(_Moved("", "length", "length_rate", *ends, 0.05, 5.0))
+    if (lengths := lengths_of(rig)) is not None:
+        found.append(_Moved("", "length", "length_rate", *lengths, 0.05, 5.0))
     if not found or not core_rig(rig).inputs:
         raise ParameterError(
             f"rig {rig.name!r} is not allowed: joints or a mass that hangs, and a valve or "

@@ -13,10 +13,18 @@ from numpy.typing import NDArray
 
 from pamrs._checks import one_of, positive
 from pamrs.channels import channel_of, dotted, unit_of
-from pamrs.control._at_rest import check_smooth, resting, without_dry_friction
+from pamrs.control._at_rest import (
+    SAMPLE,
+    after,
+    check_smooth,
+    closed,
+    kept,
+    resting,
+    slowest,
+    without_dry_friction,
+)
 from pamrs.control._controller_model import LinearController, heard, linear_controller
 from pamrs.control._groups import direct_regulators
-from pamrs.control._rest import SAMPLE, after, closed, kept, slowest
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Simulator, core_rig, initial_names

@@ -12,7 +12,6 @@ from pamrs.rig._ports import bare, effect_problem, hanging_problem, near_name
 from pamrs.rig.schema import qualified
 
 if TYPE_CHECKING:
-    from pamrs.effects import Form
     from pamrs.rig._rig import Rig
 
 Entry = dict[str, Any]
@@ -40,15 +39,18 @@ def new_entry(
     place = block_name(info.at, at)
     given = {} if parameters is None else checked_table("parameters", parameters)
     spread = {} if std is None else checked_table("std", std)
-    known = [parameter.name for parameter in info.form(form).parameters]
+    known = {parameter.name: parameter for parameter in info.form(form).parameters}
     problems = [
         f"unknown parameter {name!r}; {meant(name, known)}"
         for name in dict.fromkeys([*given, *spread])
         if name not in known
     ]
     problems += [text] if (text := effect_problem(model, effect, place)) else []
-    chosen, wrong = _numbers(info.form(form), given)
-    deviations, wrong_too = _deviations(info.form(form), spread)
+    usual = {name: p.default for name, p in known.items()}
+    ranges = {name: (name, p.lower, p.upper, p.unit) for name, p in known.items()}
+    spreads = {name: (f"std of {name}", 0.0, math.inf, p.unit) for name, p in known.items()}
+    chosen, wrong = _checked(usual | given, ranges)
+    deviations, wrong_too = _checked(spread, spreads)
     if problems := [*problems, *wrong, *wrong_too]:
         raise ParameterError(joined(f"effect {effect!r}", problems))
     where = {"at": place} if place else {}
@@ -56,28 +58,19 @@ def new_entry(
     return {"id": effect, **where, **own, "parameters": chosen}, deviations
 
 
-def _numbers(form: Form, given: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """The parameters of a form, the usual ones where none is given, and what is wrong."""
+def _checked(
+    given: Mapping[str, Any], ranges: Mapping[str, tuple[str, float, float, str]]
+) -> tuple[dict[str, float], list[str]]:
+    """Numbers that are given, and what is wrong with them; of each its name in messages, its bounds
+    and its unit.
+    """
     chosen, problems = {}, []
-    for p in form.parameters:
-        value = given.get(p.name, p.default)
+    for name, (label, *limits) in ranges.items():
         try:
-            chosen[p.name] = checked_number(p.name, value, p.lower, p.upper, p.unit)
+            if name in given:
+                chosen[name] = checked_number(label, given[name], *limits)
         except ParameterError as error:
             problems.append(str(error))
-    return chosen, problems
-
-
-def _deviations(form: Form, given: Mapping[str, Any]) -> tuple[dict[str, float], list[str]]:
-    """The standard deviations that are given, and what is wrong."""
-    chosen, problems = {}, []
-    for p in form.parameters:
-        if p.name in given:
-            name = f"std of {p.name}"
-            try:
-                chosen[p.name] = checked_number(name, given[p.name], 0.0, math.inf, p.unit)
-            except ParameterError as error:
-                problems.append(str(error))
     return chosen, problems
 
 
