@@ -23,6 +23,7 @@ __all__ = [
     "finite",
     "one_of",
     "positive",
+    "rising",
     "whole",
 ]
 
@@ -147,6 +148,25 @@ def whole(name: str, value: Any, least: int = 0, most: int | None = None) -> int
             "needed"
         )
     return int(value)
+
+
+def rising(name: str, given: Any) -> tuple[float, float]:
+    """Two rising finite numbers.
+
+    Raises
+    ------
+    ParameterError
+        If they are not.
+    """
+    try:
+        low, high = (float(value) for value in given)
+    except (TypeError, ValueError):
+        low = high = math.nan
+    if not (math.isfinite(low) and math.isfinite(high) and low < high):
+        raise ParameterError(
+            f"{name} = {given} is not allowed: two rising finite numbers are needed"
+        )
+    return low, high
 
 
 def one_of(name: str, value: Any, allowed: Iterable[Any]) -> None:

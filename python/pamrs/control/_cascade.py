@@ -53,12 +53,8 @@ class PressureLoop(SampledController):
 
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "desired_filter", "pressure_filter")
 
-    kp, ki, limits, null = (
-        Fixed("law.kp"),
-        Fixed("law.ki"),
-        Fixed("law.limits"),
-        Fixed("law.offset"),
-    )
+    kp, ki = Fixed("law.kp"), Fixed("law.ki")
+    limits, null = Fixed("law.limits"), Fixed("law.offset")
 
     def __init__(
         self,
@@ -82,10 +78,8 @@ class PressureLoop(SampledController):
             anti_windup=anti_windup,
             tracking_time=tracking_time,
         )
-        self.desired_filter, self.pressure_filter = (
-            LowPass(pressure_filter, period),
-            LowPass(pressure_filter, period),
-        )
+        self.desired_filter = LowPass(pressure_filter, period)
+        self.pressure_filter = LowPass(pressure_filter, period)
         super().__init__(period, (*self.law.gains, self.pressure_filter.time_constant))
         self.reset()
 

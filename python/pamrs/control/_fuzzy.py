@@ -205,11 +205,8 @@ class Fuzzy(OutputFeedback):
         angle_filter: Value = 0.0,
         measured_rate: bool = False,
     ) -> None:
-        self._g1, self._g2, self._h = (
-            positive_gain("g1", g1),
-            positive_gain("g2", g2),
-            as_value("h", h, lower=0.0),
-        )
+        self._g1, self._g2 = positive_gain("g1", g1), positive_gain("g2", g2)
+        self._h = as_value("h", h, lower=0.0)
         self.rules = fuzzy_rules(table)
         self._rows: list[list[float]] = self.rules.tolist()
         self.low_pass = LowPass(output_filter, period, initial=0.0)
@@ -236,10 +233,8 @@ class Fuzzy(OutputFeedback):
         angle, rate = self.sensor.read(self, measurement)
         self._tick(time)
         angle, rate = self.sensor.update(angle, rate)
-        error, error_rate = (
-            (aim.angle - angle) * self._error_scale,
-            (aim.rate - rate) * self._rate_scale,
-        )
+        error = (aim.angle - angle) * self._error_scale
+        error_rate = (aim.rate - rate) * self._rate_scale
         output = self.low_pass.update(
             self._h * fuzzy_surface(error, error_rate, self._rows, self.rules)
         )

@@ -62,14 +62,10 @@ class SlipMemory(Stateful):
     def moved(self, change: Value) -> None:
         """Take note of a change of the muscle's length [m]."""
         d = self._distance
-        self._a, self._b = (
-            clip(self._a + change / d[0], -1.0, 1.0),
-            clip(self._b + change / d[1], -1.0, 1.0),
-        )
-        self._c, self._d = (
-            clip(self._c + change / d[2], -1.0, 1.0),
-            clip(self._d + change / d[3], -1.0, 1.0),
-        )
+        self._a = clip(self._a + change / d[0], -1.0, 1.0)
+        self._b = clip(self._b + change / d[1], -1.0, 1.0)
+        self._c = clip(self._c + change / d[2], -1.0, 1.0)
+        self._d = clip(self._d + change / d[3], -1.0, 1.0)
 
     @property
     def mean(self) -> Value:
@@ -116,10 +112,8 @@ class HystereticTorque(Stateful):
         self._threshold = float(found.get("activation_pressure", {"threshold": 0.0})["threshold"])
         low, high = float(table["min_angle"]), float(table["max_angle"])
         angle = np.linspace(low, high, 1025)
-        self._travel, self._arm = (
-            Spline(low, high, joint.shortening(angle)),
-            Spline(low, high, joint.torque_arm(angle)),
-        )
+        self._travel = Spline(low, high, joint.shortening(angle))
+        self._arm = Spline(low, high, joint.torque_arm(angle))
         self.memory = SlipMemory(float(friction["presliding"]))
         self.reset()
 
@@ -129,10 +123,8 @@ class HystereticTorque(Stateful):
         """Move the memory to an angle [rad]."""
         # the arm sinks a little into its stops, and the muscle moves with it
         inside = clip(angle, self._travel.low, self._travel.high)
-        last, self._shortening = (
-            self._shortening,
-            self._travel(inside) + self._travel.slope(inside) * (angle - inside),
-        )
+        last = self._shortening
+        self._shortening = self._travel(inside) + self._travel.slope(inside) * (angle - inside)
         if last is not None:
             self.memory.moved(last - self._shortening)
 

@@ -9,6 +9,7 @@ import numbers
 from collections.abc import Mapping
 from typing import Any, Final, TypeAlias
 
+from pamrs._checks import rising
 from pamrs.channels import channel_of
 from pamrs.control._protocol import Controller, check_drives_valve, commands_of
 from pamrs.errors import ParameterError
@@ -57,7 +58,7 @@ class LiveCommands:
         self.safe = {name: value for name, (value, _, _) in ranges.items()}
         self._limits = {name: (low, high) for name, (_, low, high) in ranges.items()}
         for name, value in self._given("limits", limits).items():
-            self._limits[name] = pair(self._label("limits", name), value)
+            self._limits[name] = rising(self._label("limits", name), value)
         for name, value in self._given("safe", safe).items():
             self.safe[name] = self._number(self._label("safe", name), value)
         for name, value in self.safe.items():
@@ -146,22 +147,3 @@ def _ranges_of_safe(controller: Controller, safe: Any) -> dict[str, tuple[float,
             "value is needed"
         )
     return {str(name): (0.0, -math.inf, math.inf) for name in safe}
-
-
-def pair(name: str, given: Any) -> tuple[float, float]:
-    """Two rising finite numbers.
-
-    Raises
-    ------
-    ParameterError
-        If they are not.
-    """
-    try:
-        low, high = (float(value) for value in given)
-    except (TypeError, ValueError):
-        low = high = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError(
-            f"{name} = {given} is not allowed: two rising finite numbers are needed"
-        )
-    return low, high

@@ -10,7 +10,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
-from pamrs._checks import finite
+from pamrs._checks import finite, rising
 from pamrs.control._groups import highest_pressure, joints_of
 from pamrs.control._protocol import Value
 from pamrs.control._torque import TorqueModel, active_groups, joint_torque
@@ -171,12 +171,7 @@ class ArmModel(JointModel):
         object.__setattr__(
             self, "pressure_limit", float(positive_gain("pressure_limit", self.pressure_limit))
         )
-        low, high = (float(value) for value in self.angle_range)
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(
-                f"angle_range = {self.angle_range} is not allowed: two finite numbers, the first "
-                "below the second"
-            )
+        rising("angle_range", self.angle_range)
         stiffness, rest = (float(value) for value in self.spring)
         if not (math.isfinite(stiffness) and math.isfinite(rest) and stiffness >= 0.0):
             raise ParameterError(

@@ -163,12 +163,8 @@ class PID(OutputFeedback):
     _PARTS: ClassVar[tuple[str, ...]] = ("law", "sensor")
     _PUBLISHED = _PRINTED
 
-    kp, ki, kd, output_filter = (
-        Fixed("law.kp"),
-        Fixed("law.ki"),
-        Fixed("law.kd"),
-        Fixed("law.output_filter"),
-    )
+    kp, ki, kd = Fixed("law.kp"), Fixed("law.ki"), Fixed("law.kd")
+    output_filter = Fixed("law.output_filter")
 
     def __init__(
         self,

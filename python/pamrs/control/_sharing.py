@@ -144,10 +144,8 @@ class CoContraction(Share):
             wanted = stiffness_of(wanted(demand.time))
         high, angle = self.pressure_limit, demand.angle
         up, down = self._least(self._up, angle), self._least(self._down, angle)
-        (a, a0, ka, ka0), (b, b0, kb, kb0) = (
-            self._side(self._up, angle),
-            self._side(self._down, angle),
-        )
+        a, a0, ka, ka0 = self._side(self._up, angle)
+        b, b0, kb, kb0 = self._side(self._down, angle)
         # tau = a p + b q + a0 + b0 with b < 0: a line of pairs, of which the limits cut a piece
         left = demand.torque - a0 - b0
         first = greater(down, (a * up - left) / -b)

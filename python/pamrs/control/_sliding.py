@@ -85,10 +85,8 @@ class SlidingController(SampledController):
         gains: tuple[Any, ...] = (),
     ) -> None:
         self.arm = arm
-        self._slope, self._switching = (
-            positive_gain("slope", slope),
-            as_value("switching", switching, lower=0.0),
-        )
+        self._slope = positive_gain("slope", slope)
+        self._switching = as_value("switching", switching, lower=0.0)
         self._boundary_layer = as_value("boundary_layer", boundary_layer, lower=0.0)
         # a layer of a billionth of a rad/s is the signum, and needs no case of its own in a batch
         self._layer = clip(self._boundary_layer, 1e-12, 1e300)

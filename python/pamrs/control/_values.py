@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs._checks import one_of
+from pamrs._checks import checked_number, one_of, rising
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
@@ -90,17 +90,8 @@ def limits_around(limits: Any, null: Any) -> tuple[float, float, float]:
     """Limits of an output and what is put out for no error, checked: two finite numbers, the first
     below the second, null within.
     """
-    try:
-        low, high = (float(limit) for limit in limits)
-        middle = float(null)
-    except (TypeError, ValueError):
-        low = high = middle = math.nan
-    if not (math.isfinite(low) and math.isfinite(high) and low <= middle <= high and low < high):
-        raise ParameterError(
-            f"limits = {limits!r} are not allowed: two finite numbers are needed, rising, with "
-            f"{null!r} between them"
-        )
-    return low, high, middle
+    low, high = rising("limits", limits)
+    return low, high, checked_number("the null of limits", null, low, high)
 
 
 def angle_factor(unit: str) -> float:

@@ -21,9 +21,9 @@ from typing import Any, Final, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import whole
+from pamrs._checks import rising, whole
 from pamrs._termination import Termination
-from pamrs.control._live_commands import Command, LiveCommands, pair
+from pamrs.control._live_commands import Command, LiveCommands
 from pamrs.control._loop import trajectories_of
 from pamrs.control._protocol import Controller, Reference, check_controller
 from pamrs.control.trajectories import JointTrajectories, Trajectory, check_reach
@@ -280,7 +280,7 @@ class _Loop:
         self.trajectory = trajectories_of(trajectory, controller)
         self.most_missed, self.stamp = most_missed, stamp
         self.plausible = {
-            name: pair(f"plausible[{name}]", values) for name, values in (plausible or {}).items()
+            name: rising(f"plausible[{name}]", values) for name, values in (plausible or {}).items()
         }
         self.period = controller.period
         self.total = whole_samples(

@@ -428,11 +428,8 @@ def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0)
     ParameterError
         If a number is not finite, or a time is outside its range.
     """
-    before, after, at = (
-        finite("before", before),
-        finite("after", after),
-        positive("at", at, zero=True),
-    )
+    before, after = finite("before", before), finite("after", after)
+    at = positive("at", at, zero=True)
     length = positive("duration", duration)
     if at > length:
         raise ParameterError(f"at = {at} s is not allowed: the record ends at {length:g} s")

@@ -16,7 +16,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, one_of, positive, whole
+from pamrs._checks import checked_number, one_of, positive, rising, whole
 from pamrs.control._groups import payload_of
 from pamrs.control._protocol import Controller
 from pamrs.control._sweeping import sweep
@@ -460,15 +460,9 @@ def perturbed(
 def _box(bounds: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
     if not bounds:
         raise ParameterError("bounds is empty: one gain at least is needed")
-    for name, (low, high) in bounds.items():
-        if not (math.isfinite(low) and math.isfinite(high) and low < high):
-            raise ParameterError(
-                f"bounds of {name} = ({low}, {high}) are not allowed: two rising finite numbers "
-                "are needed"
-            )
-    return np.array([b[0] for b in bounds.values()], dtype=np.float64), np.array(
-        [b[1] for b in bounds.values()], dtype=np.float64
-    )
+    pairs = [rising(f"bounds of {name}", ends) for name, ends in bounds.items()]
+    low, high = np.array(pairs, dtype=np.float64).T.copy()
+    return low, high
 
 
 def _within(start: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> Array:

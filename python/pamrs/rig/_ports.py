@@ -171,22 +171,14 @@ class _Connector:
         """The other end of a port: as given, else the first default that is not empty, else None
         after noting a problem.
         """
-        label, info = (
-            qualified(block, name),
-            next(entry for entry in PORTS[block] if entry.name == port),
-        )
+        label = qualified(block, name)
+        info = next(entry for entry in PORTS[block] if entry.name == port)
         text = self.given.get(label, {}).get(port)
-        end = (
-            self.find(f"{label}.{port}", info, text)
-            if text is not None
-            else next(filter(None, defaults), None)
-        )
-        if text is None and end is None:
-            self.missing(
-                label,
-                port,
-                list(wanted) or [*info.kinds, *(word for word in info.words if word in BLOCKS)],
-            )
+        if text is not None:
+            end = self.find(f"{label}.{port}", info, text)
+        elif (end := next(filter(None, defaults), None)) is None:
+            kinds = [*info.kinds, *(word for word in info.words if word in BLOCKS)]
+            self.missing(label, port, list(wanted) or kinds)
         if end is not None:
             self.ports[block][name][port] = end
         return end
@@ -214,14 +206,8 @@ class _Connector:
 
     def missing(self, label: str, port: str, kinds: list[str]) -> None:
         """Note a port that no default settles."""
-        there = [
-            (
-                f"the {_PLURAL.get(kind, kind + 's')} "
-                f"{', '.join(name or kind for name in self.tables[kind])}"
-            )
-            for kind in kinds
-            if self.tables[kind]
-        ]
+        named = {kind: ", ".join(name or kind for name in self.tables[kind]) for kind in kinds}
+        there = [f"the {_PLURAL.get(k, k + 's')} {names}" for k, names in named.items() if names]
         if there:
             unfed = label.partition(".")[0] == "line" and port == "from" and self.tables["valve"]
             other = ", or lead a valve to it" if unfed else ""
@@ -364,12 +350,8 @@ class _Connector:
         transmissions, load = self.tables["transmission"], "load" if self.tables["load"] else ""
         for name in self.tables["muscle"]:
             label = qualified("muscle", name)
-            self.settle(
-                "muscle",
-                name,
-                "chamber",
-                (self.same("chamber", name), self.only("chamber", of=name)),
-            )
+            chambers = self.same("chamber", name), self.only("chamber", of=name)
+            self.settle("muscle", name, "chamber", chambers)
             if self.tables["arm"] and not self.tables["joint"]:
                 continue  # the joint that is missing has been noted
             joint = self.settle(
@@ -391,12 +373,10 @@ class _Connector:
                 )
         for name in transmissions:
             if name not in self.tables["muscle"]:
-                hint = near_name(name, filter(None, self.tables["muscle"])) if name else ""
-                whose = (
-                    f"named after no muscle{hint}"
-                    if name
-                    else "without a name, as no muscle is: name it as its muscle"
-                )
+                whose = "without a name, as no muscle is: name it as its muscle"
+                if name:
+                    hint = near_name(name, filter(None, self.tables["muscle"]))
+                    whose = f"named after no muscle{hint}"
                 self.problems.append(f"the block [{qualified('transmission', name)}] is {whose}")
 
     # ------------------------------------------------------------------------- arm
@@ -445,10 +425,8 @@ class _Connector:
         """Give every link its joint, and note joints that have none or several."""
         moved: dict[str, str] = {}
         for name in self.tables["link"]:
-            label, joint = (
-                qualified("link", name),
-                self.settle("link", name, "joint", (self.same("joint", name),)),
-            )
+            label = qualified("link", name)
+            joint = self.settle("link", name, "joint", (self.same("joint", name),))
             if joint in moved:
                 self.problems.append(
                     f"{label}.joint = {joint!r} is not allowed: {joint} moves {moved[joint]} "
