@@ -77,7 +77,7 @@ class Entry:
     facts : tuple of Fact
         What is published about it.
     identification : dict
-        Prior and conditions from which :func:`pamrs.library._identify.derive` derives the
+        Prior and conditions from which `reproduction.identify.derive` derives the
         identified numbers.
     """
 
