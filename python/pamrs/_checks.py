@@ -169,14 +169,15 @@ def rising(name: str, given: Any) -> tuple[float, float]:
     return low, high
 
 
-def one_of(name: str, value: Any, allowed: Iterable[Any]) -> None:
-    """Refuse a value that is none of those that are allowed, with an error that names them."""
+def one_of(name: str, value: Any, allowed: Iterable[Any]) -> Any:
+    """The value, if it is one of those that are allowed; an error names them otherwise."""
     known = list(allowed)
     if value not in known:
         raise ParameterError(
             f"{name} = {as_said(value)} is not allowed: one of {', '.join(map(repr, known))} is "
             "needed"
         )
+    return value
 
 
 def checked_number(

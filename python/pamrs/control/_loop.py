@@ -105,10 +105,10 @@ class ClosedLoop:
         wanted, trajectory, channel = self.reference.angle, self.trajectory, self.joint
         if isinstance(trajectory, JointTrajectories):
             names = list(trajectory.of_joint)
-            one_of("joint", joint, names)
-            k = names.index(joint)
+            name: str = one_of("joint", joint, names)
+            k = names.index(name)
             channel, wanted = self.joints[k], np.asarray(wanted)[k]
-            trajectory = trajectory.of_joint[joint]
+            trajectory = trajectory.of_joint[name]
         own = unit_of(channel)
         allowed = ("rad", "deg") if own == "rad" else (own,)
         one_of("unit", unit or own, allowed)

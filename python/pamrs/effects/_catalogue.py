@@ -20,9 +20,9 @@ def _words(effect: str) -> dict[str, Any]:
 
 def _parameter(told: dict[str, Any], meanings: dict[str, str]) -> EffectParameter:
     """A parameter, as the core tells it, with its words."""
-    own = {key: tuple(value) if isinstance(value, list) else value for key, value in told.items()}
-    roles = {key: told[key] or "" for key in ("role", "role_sealed")}
-    return EffectParameter(**{**own, **roles}, meaning=meanings[told["name"]])
+    own: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in told.items()}
+    own |= {key: told[key] or "" for key in ("role", "role_sealed")}
+    return EffectParameter(**own, meaning=meanings[told["name"]])
 
 
 def _form(told: dict[str, Any], meanings: dict[str, str], equation: str) -> Form:

@@ -65,10 +65,10 @@ def _checked(
     and its unit.
     """
     chosen, problems = {}, []
-    for name, (label, *limits) in ranges.items():
+    for name, (label, low, high, unit) in ranges.items():
         try:
             if name in given:
-                chosen[name] = checked_number(label, given[name], *limits)
+                chosen[name] = checked_number(label, given[name], low, high, unit)
         except ParameterError as error:
             problems.append(str(error))
     return chosen, problems
