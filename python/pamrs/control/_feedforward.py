@@ -4,7 +4,7 @@ feedback.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
@@ -101,11 +101,11 @@ class Feedforward(SampledController):
     lengthening : TorqueModel, optional
         Torque of the muscles while they lengthen, taken for ``P_d`` where the commanded rate is
         below zero: (4.7) in the place of (4.4). By default the arm's own torque, both ways.
-    pressure_filter, rate_filter, angle_filter : float or ndarray, shape (n,)
-        Time constants of the low-passes on pressure, rate and angle [s]; the last two with the
-        measured motion only.
-    measured_rate : bool
-        As for :class:`pamrs.control.PID`, with the measured motion only.
+    pressure_filter : float or ndarray, shape (n,)
+        Time constant of the low-pass on the pressure [s].
+    **sensor
+        Of the :class:`pamrs.control.JointSensor`, with the measured motion only: ``rate_filter``,
+        ``angle_filter`` and ``measured_rate``.
 
     Notes
     -----
@@ -136,9 +136,7 @@ class Feedforward(SampledController):
         motion: str = "commanded",
         lengthening: TorqueModel | None = None,
         pressure_filter: Value = 0.0,
-        rate_filter: Value = 0.02,
-        angle_filter: Value = 0.0,
-        measured_rate: bool = False,
+        **sensor: Any,
     ) -> None:
         one_of("motion", motion, ("commanded", "measured"))
         self.arm, self.air, self.motion, self.lengthening = arm, air, motion, lengthening
@@ -149,15 +147,9 @@ class Feedforward(SampledController):
             else (self._km > 0.0).astype(float)
         )
         self._friction = bool(friction)
-        self.sensor = JointSensor(
-            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
-        )
+        self.sensor = JointSensor(period, **sensor)
         self.low_pass = LowPass(pressure_filter, period)
-        filters = (
-            self.low_pass.time_constant,
-            self.sensor.low_pass.time_constant,
-            self.sensor.slope.time_constant,
-        )
+        filters = self.low_pass.time_constant, *self.sensor.gains
         super().__init__(period, (self._km, *arm.gains, *filters))
         self._limits, self._null = (air.null - air.half_range, air.null + air.half_range), air.null
         self.reset()

@@ -5,7 +5,7 @@ Control, 1998).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -168,8 +168,11 @@ class Fuzzy(OutputFeedback):
         Smallest and largest output [V].
     null : float
         Output for no error [V].
-    output_filter, rate_filter, angle_filter, measured_rate
-        As for :class:`pamrs.control.PID`.
+    output_filter : float or ndarray, shape (n,)
+        Time constant of the low-pass on the output [s].
+    **sensor
+        Of the :class:`pamrs.control.JointSensor`: ``rate_filter``, ``angle_filter`` and
+        ``measured_rate``.
 
     Raises
     ------
@@ -201,9 +204,7 @@ class Fuzzy(OutputFeedback):
         limits: tuple[float, float] = (0.0, 10.0),
         null: float = 5.0,
         output_filter: Value = 0.05,
-        rate_filter: Value = 0.02,
-        angle_filter: Value = 0.0,
-        measured_rate: bool = False,
+        **sensor: Any,
     ) -> None:
         self._g1, self._g2 = positive_gain("g1", g1), positive_gain("g2", g2)
         self._h = as_value("h", h, lower=0.0)
@@ -216,9 +217,7 @@ class Fuzzy(OutputFeedback):
             unit=unit,
             limits=limits,
             null=null,
-            rate_filter=rate_filter,
-            angle_filter=angle_filter,
-            measured_rate=measured_rate,
+            **sensor,
         )
         self._error_scale, self._rate_scale = self._scale / self._g1, self._scale / self._g2
         self.reset()

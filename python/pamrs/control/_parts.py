@@ -219,6 +219,11 @@ class JointSensor(Stateful):
         )
         self._through = angle_filter.__class__ is float and angle_filter == 0.0
 
+    @property
+    def gains(self) -> tuple[Value, ...]:
+        """Everything that may be an array: the time constants [s]."""
+        return self.low_pass.time_constant, self.slope.time_constant
+
     def read(
         self, owner: SampledController, measurement: Measurement
     ) -> tuple[Value, Value | None]:

@@ -5,7 +5,7 @@ joint angle.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import ClassVar, Final
+from typing import Any, ClassVar, Final
 
 from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import Integrator, LowPass
@@ -142,10 +142,9 @@ class PID(OutputFeedback):
         Of the back-calculation [s].
     output_filter : float or ndarray, shape (n,)
         Time constant of the low-pass on the output [s].
-    rate_filter, angle_filter : float or ndarray, shape (n,)
-        Time constants on rate and angle [s].
-    measured_rate : bool
-        Whether ``joint_rate`` is measured; else it is the filtered derivative of the angle.
+    **sensor
+        Of the :class:`pamrs.control.JointSensor`: ``rate_filter``, ``angle_filter`` and
+        ``measured_rate``.
 
     Raises
     ------
@@ -179,9 +178,7 @@ class PID(OutputFeedback):
         anti_windup: str = "clamping",
         tracking_time: Value = 0.5,
         output_filter: Value = 0.05,
-        rate_filter: Value = 0.02,
-        angle_filter: Value = 0.0,
-        measured_rate: bool = False,
+        **sensor: Any,
     ) -> None:
         self.law = PIDLaw(
             kp,
@@ -194,16 +191,7 @@ class PID(OutputFeedback):
             tracking_time=tracking_time,
             output_filter=output_filter,
         )
-        super().__init__(
-            period,
-            self.law.gains,
-            unit=unit,
-            limits=limits,
-            null=null,
-            rate_filter=rate_filter,
-            angle_filter=angle_filter,
-            measured_rate=measured_rate,
-        )
+        super().__init__(period, self.law.gains, unit=unit, limits=limits, null=null, **sensor)
         self._simple = not self.law.derives and self.sensor._through
         self.reset()
 

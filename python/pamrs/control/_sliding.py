@@ -62,8 +62,8 @@ class SlidingController(SampledController):
         Width of the boundary layer, in s [rad/s]; 0: the plain signum.
     period : float
         Time between two updates [s].
-    rate_filter, angle_filter, measured_rate
-        As for :class:`pamrs.control.PID`.
+    **sensor
+        As for :class:`pamrs.control.PID`, but ``rate_filter`` is 0.01 s by default.
     """
 
     answers = "pressure"
@@ -79,10 +79,8 @@ class SlidingController(SampledController):
         switching: Value = 2e4,
         boundary_layer: Value = 0.2,
         period: float = 1e-3,
-        rate_filter: Value = 0.01,
-        angle_filter: Value = 0.0,
-        measured_rate: bool = False,
         gains: tuple[Any, ...] = (),
+        **sensor: Any,
     ) -> None:
         self.arm = arm
         self._slope = positive_gain("slope", slope)
@@ -91,17 +89,14 @@ class SlidingController(SampledController):
         # a layer of a billionth of a rad/s is the signum, and needs no case of its own in a batch
         self._layer = clip(self._boundary_layer, 1e-12, 1e300)
         self._sharp = isinstance(self._boundary_layer, float) and self._boundary_layer == 0.0
-        self.sensor = JointSensor(
-            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
-        )
-        filters = (self.sensor.low_pass.time_constant, self.sensor.slope.time_constant)
+        self.sensor = JointSensor(period, **{"rate_filter": 0.01, **sensor})
         self._several = arm.joints > 1
         own = (self._slope, self._switching, self._boundary_layer, *gains)
         super().__init__(
             period,
             # one number for each joint says nothing about how many plants there are
             (*(g for g in own if not (self._several and np.size(g) == arm.joints)), *arm.gains)
-            + filters,
+            + self.sensor.gains,
         )
 
     def _rows(self, gain: Value, like: Value) -> Value:
