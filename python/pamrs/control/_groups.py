@@ -130,30 +130,6 @@ def lengths_of(rig: Rig) -> tuple[float, float] | None:
     return None
 
 
-def payload_of(rig: Rig) -> str:
-    """Dotted name of the mass that a rig lifts: the payload of the arm, or of the last link, or the
-    mass that hangs.
-
-    Parameters
-    ----------
-    rig : Rig
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ParameterError
-        As :func:`joints_of`.
-    """
-    joints_of(rig)
-    if rig.tables("load"):
-        return "load.mass"
-    links = list(rig.ports("link"))
-    return f"{named('link', links[-1])}.payload" if links else "arm.payload"
-
-
 def groups_of(rig: Rig) -> tuple[Group, ...]:
     """The groups of muscles of a rig, in the order of its chambers.
 

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, one_of, positive, rising, whole
-from pamrs.control._groups import payload_of
+from pamrs.control._groups import joints_of
 from pamrs.control._protocol import Controller
 from pamrs.control._sweeping import sweep
 from pamrs.control.metrics import WEIGHTS, combined
 from pamrs.control.trajectories import Trajectory
 from pamrs.errors import ParameterError, missing_package
-from pamrs.rig import Rig
+from pamrs.rig import Rig, payload_of
 
 __all__ = ["METHODS", "GainMap", "GainSearch", "gain_map", "perturbed", "search_gains"]
 
@@ -201,6 +201,7 @@ def gain_map(
                 f"axes {name} with the shape {values.shape} is not allowed: (n,) finite numbers, n "
                 ">= 1, are needed"
             )
+    joints_of(plant)  # a rig that lifts nothing is refused
     payload = payload_of(plant)
     masses = (
         np.array([plant.parameter(payload).value])

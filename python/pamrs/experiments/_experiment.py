@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 from pamrs.channels import unit_of
 from pamrs.experiments._chains import driving
 from pamrs.findings import Protocol
-from pamrs.rig import Rig
-from pamrs.rig.schema import qualified
+from pamrs.rig import Rig, payload_of
 from pamrs.simulation import Simulation, has_frame, simulate
 
 Array = NDArray[np.float64]
@@ -138,12 +137,7 @@ def other_payload(rig: Rig) -> tuple[str, float, str] | None:
     """
     if has_frame(rig):
         return None
-    if rig.tables("load"):
-        name = "load.mass"
-    elif rig.tables("link"):
-        name = f"{qualified('link', list(rig.ports('link'))[-1])}.payload"
-    else:
-        name = "arm.payload"
+    name = payload_of(rig)
     now, least = rig.parameter(name).value, rig.parameter(name).lower
     listed = rig.limits.get("payloads")
     others = [m for m in listed or [] if m >= least and not math.isclose(m, now)]

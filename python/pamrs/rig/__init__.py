@@ -14,7 +14,7 @@ from pamrs.rig._joint import Joint
 from pamrs.rig._law import force_table
 from pamrs.rig._muscle import Muscle
 from pamrs.rig._reader import Reader
-from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig
+from pamrs.rig._rig import Parameter, Rig, load_rig, parse_rig, payload_of
 from pamrs.rig._switching import effect_parameter, full_name, named_entries
 
 __all__ = [
@@ -30,4 +30,5 @@ __all__ = [
     "muscle_problems",
     "named_entries",
     "parse_rig",
+    "payload_of",
 ]

@@ -637,3 +637,13 @@ def parse_rig(text: str, *, source: str = "rig") -> Rig:
     """Read a rig from TOML text; ``source`` names it in messages. See :func:`load_rig`."""
     content = read_model(text, source)
     return Rig(content.name, content.model, content.tolerances, content.effect_std, source, text)
+
+
+def payload_of(rig: Rig) -> str:
+    """Dotted name of the mass that a rig lifts: the payload of the arm, or of its last link, or the
+    mass that hangs.
+    """
+    if rig.tables("load"):
+        return "load.mass"
+    links = list(rig.ports("link"))
+    return f"{qualified('link', links[-1])}.payload" if links else "arm.payload"
