@@ -9,9 +9,10 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from pamrs.comparison import to_csv, verdicts
+from pamrs.comparison import verdicts
 from reproduction import CHAPTERS, every, store
 from reproduction.page import Section, page
+from reproduction.statement_tables import to_csv
 from reproduction.summary import summary
 
 

@@ -17,7 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, Told, judge, verdicts
+from pamrs.comparison import Comparison, judge, verdicts
 from pamrs.library import entry
 from pamrs.library.evaluate import free_contraction
 from pamrs.library.published import compare_entry
@@ -34,6 +34,7 @@ from reproduction.stand_in import (
     fits,
     hysteresis,
 )
+from reproduction.statement_tables import Told
 from reproduction.statements import Statements
 
 __all__ = ["chosen", "ends", "facts", "headings", "in_short", "over", "sample", "say"]

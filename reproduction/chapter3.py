@@ -19,7 +19,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, Told
+from pamrs.comparison import Comparison
 from pamrs.design import lift
 from pamrs.library import entry
 from pamrs.library.published import compare_entry
@@ -28,6 +28,7 @@ from pamrs.simulation import Simulation
 from pamrs.units import parse_unit, to_si
 from reproduction import elbow
 from reproduction.elbow import FOOT_POUND, INCH, POUND, PSI
+from reproduction.statement_tables import Told
 from reproduction.statements import TRIAL, Lines, Statements
 
 __all__ = ["chosen", "facts", "headings", "in_short", "say", "step_by_area"]

@@ -17,12 +17,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs.comparison import Comparison, Told
+from pamrs.comparison import Comparison
 from pamrs.control import metrics
 from reproduction import lift
 from reproduction.chapter4_statements import SERIES, say, statements
 from reproduction.elbow import HYSTERESIS
 from reproduction.lift import Lifts, Map
+from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, OWN, TRIAL, Lines
 
 __all__ = ["DAMPED", "PRINTED", "RUBBING", "SMOOTH", "agreed", "experiments", "facts", "in_short"]

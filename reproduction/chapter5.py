@@ -15,10 +15,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, Told
+from pamrs.comparison import Comparison
 from pamrs.rigs import shoulder
 from reproduction import chapter5_comparison, tracking
 from reproduction.chapter5_statements import listed, say
+from reproduction.statement_tables import Told
 from reproduction.statements import Lines
 from reproduction.tracking import KINDS, PAYLOADS, SETTLED, Track
 from reproduction.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan

@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.comparison import Comparison, Told
+from pamrs.comparison import Comparison
 from pamrs.design import lift
 from pamrs.library import entry
 from pamrs.library.evaluate import free_contraction
@@ -26,6 +26,7 @@ from pamrs.rig import Muscle
 from reproduction import recruiting as rec
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Case, Cycles
 from reproduction.rigs import with_struts
+from reproduction.statement_tables import Told
 from reproduction.statements import Statements
 
 __all__ = ["experiments", "facts", "headings", "in_short", "latest", "say", "tables"]

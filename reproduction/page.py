@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from pamrs.comparison import Comparison, markdown, verdicts
+from pamrs.comparison import Comparison, verdicts
+from reproduction.statement_tables import markdown
 from reproduction.statements import text
 
 __all__ = ["Picture", "Section", "page"]

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pamrs.comparison import VERDICTS, Comparison, shown
+from pamrs.comparison import VERDICTS, Comparison
 from reproduction.page import Section
 from reproduction.statements import text
 
@@ -88,7 +88,7 @@ def _cells(found: Mapping[str, int]) -> str:
 
 
 def _line(name: str, section: Section, row: Comparison) -> str:
-    published, ours = shown(row)
+    published, ours = row.shown
     pictures = [one.name for one in section.pictures if one.group == row.group]
     links = " ".join(
         f"[{number}]({_page(name)}/{one}.png)" for number, one in enumerate(pictures, 1)

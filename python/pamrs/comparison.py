@@ -4,11 +4,9 @@ cannot tell.
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 
 from pamrs.errors import ParameterError
@@ -17,12 +15,8 @@ __all__ = [
     "RELATIONS",
     "VERDICTS",
     "Comparison",
-    "Told",
     "judge",
-    "markdown",
-    "shown",
     "table",
-    "to_csv",
     "verdicts",
 ]
 
@@ -93,35 +87,26 @@ class Comparison:
             return f"{100.0 * self.relative:+.1f} %"
         return _number(self.deviation, sign=True)
 
+    @property
+    def shown(self) -> tuple[str, str]:
+        """The published number, with the sign of its relation, and ours, as tables show them;
+        "none" where there is none.
+        """
+        sign = _SIGN[self.relation] * math.isfinite(self.published)
+        return sign + _number(self.published), _number(self.ours)
+
+    @property
+    def told_verdict(self) -> str:
+        """The verdict as tables show it, with what it rests on."""
+        verdict = self.verdict + (" (used to identify)" if self.used else "")
+        if not self.apart:
+            return verdict
+        told = self.apart if self.verdict == "cannot tell" else f"{self.apart}: {verdict}"
+        return f"({told})"
+
     def to_dict(self) -> dict[str, Any]:
         """The fields as a dictionary."""
         return asdict(self)
-
-
-class Told:
-    """Statements by the short name of their group, for sentences about them.
-
-    Parameters
-    ----------
-    rows : sequence of Comparison
-        The statements.
-    groups : mapping of str to str
-        Short name -> group; a group that is not in it is its own name.
-    digits : int
-        Decimals of a number, unless told.
-    """
-
-    def __init__(self, rows: Sequence[Comparison], groups: Mapping[str, str], digits: int) -> None:
-        self._rows = {(row.group, row.fact): row for row in rows}
-        self._groups, self._digits = groups, digits
-
-    def row(self, group: str, fact: str) -> Comparison:
-        """One statement; KeyError if it is not there."""
-        return self._rows[self._groups.get(group, group), fact]
-
-    def ours(self, group: str, fact: str, digits: int | None = None) -> str:
-        """Our number in words; KeyError if the statement is not there."""
-        return f"{self.row(group, fact).ours:.{self._digits if digits is None else digits}f}"
 
 
 def judge(
@@ -239,92 +224,15 @@ def table(
         if titles and row.group != group:
             group = row.group
             lines += ["", (headings or {}).get(group, group)]
+        published, ours = row.shown
         line = (
-            f"{row.fact:<{width}} {_published(row):>10} {_number(row.ours):>10} {row.unit:<7} "
-            f"{row.gap:>9}  {_verdict(row)}"
+            f"{row.fact:<{width}} {published:>10} {ours:>10} {row.unit:<7} {row.gap:>9}  "
+            f"{row.told_verdict}"
         )
         lines.append(line.rstrip())
         if notes:
             lines.append(f"    {row.where}{': ' + row.note if row.note else ''}")
     return "\n".join(lines)
-
-
-def markdown(
-    rows: Iterable[Comparison],
-    *,
-    headings: Mapping[str, str] | None = None,
-    below: Mapping[str, str] | None = None,
-) -> str:
-    """The comparison as Markdown: a table for each group, its remarks as a list below.
-
-    Parameters
-    ----------
-    rows : iterable of Comparison
-        The statements; a group stands together.
-    headings : mapping of str to str, optional
-        Heading of each group; the group itself by default.
-    below : mapping of str to str, optional
-        What follows a group.
-
-    Returns
-    -------
-    str
-    """
-    groups: dict[str, list[Comparison]] = {}
-    for row in rows:
-        groups.setdefault(row.group, []).append(row)
-    lines: list[str] = []
-    number = 0
-    for group, members in groups.items():
-        lines += [f"### {(headings or {}).get(group, group)}", ""]
-        lines += [
-            "| statement | where | published | ours | unit | deviation | criterion | verdict |",
-            "|---|---|--:|--:|---|--:|---|---|",
-        ]
-        remarks = []
-        for row in members:
-            mark = ""
-            if row.note:
-                number += 1
-                mark = f" [{number}]"
-                remarks.append(f"- [{number}] {row.fact}: {row.note}")
-            counts = row.verdict == "differs" and not row.apart
-            verdict = f"**{_verdict(row)}**" if counts else _verdict(row)
-            cells = (
-                row.fact,
-                row.where,
-                _published(row),
-                _number(row.ours),
-                row.unit,
-                row.gap,
-                row.criterion,
-                verdict + mark,
-            )
-            lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
-        lines += ["", *remarks, *([""] if remarks else [])]
-        if below and group in below:
-            lines += [below[group].rstrip(), ""]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def to_csv(rows: Iterable[Comparison]) -> str:
-    """The comparison as CSV with a heading; what is no number stays empty.
-
-    Parameters
-    ----------
-    rows : iterable of Comparison
-        The statements.
-
-    Returns
-    -------
-    str
-    """
-    stream = io.StringIO()
-    writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Comparison)])
-    for row in rows:
-        writer.writerow([_cell(value) for value in row.to_dict().values()])
-    return stream.getvalue()
 
 
 def verdicts(rows: Sequence[Comparison]) -> str:
@@ -341,40 +249,6 @@ def verdicts(rows: Sequence[Comparison]) -> str:
         f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot "
         f"tell{apart}"
     )
-
-
-def shown(row: Comparison) -> tuple[str, str]:
-    """The published number, with the sign of its relation, and ours, as tables show them.
-
-    Parameters
-    ----------
-    row : Comparison
-
-    Returns
-    -------
-    published, ours : str
-        "none" where there is none.
-    """
-    return _published(row), _number(row.ours)
-
-
-def _published(row: Comparison) -> str:
-    return _SIGN[row.relation] * math.isfinite(row.published) + _number(row.published)
-
-
-def _verdict(row: Comparison) -> str:
-    verdict = row.verdict + (" (used to identify)" if row.used else "")
-    if not row.apart:
-        return verdict
-    return f"({row.apart})" if row.verdict == "cannot tell" else f"({row.apart}: {verdict})"
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, float):
-        return f"{value:.6g}" if math.isfinite(value) else ""
-    return "" if value is None else str(value)
 
 
 def _number(value: float, *, sign: bool = False) -> str:

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from pamrs import rigs
-from pamrs.comparison import judge, markdown, table, to_csv, verdicts
+from pamrs.comparison import judge, table, verdicts
 from pamrs.errors import ParameterError
 from reproduction import CHAPTERS, chapter3, chapter5, elbow
 from reproduction.page import Picture, Section, page
+from reproduction.statement_tables import markdown, to_csv
 from reproduction.statements import symbols
 from tests.tables import rows_of
 

@@ -10,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs.comparison import table, to_csv
+from pamrs.comparison import table
 from pamrs.control import AdaptiveSliding, Neural
 from pamrs.errors import ParameterError
 from reproduction import chapter5
+from reproduction.statement_tables import to_csv
 from reproduction.tracking import (
     KINDS,
     PERIOD,
