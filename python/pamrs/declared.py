@@ -2,7 +2,7 @@
 
 A type (an entry of a result, the settings) is a dataclass whose fields carry :func:`told`; a table
 that people write (``case.toml``, parts of ``rig.toml``) is a mapping of :class:`Rule`; a quantity
-with a unit is :func:`quantity`. What a reader asks (:func:`accepts`, :func:`unknown_key`) and what
+with a unit is :func:`quantity`. What a reader asks (:func:`problems_of`) and what
 an editor is told come from the same declaration.
 """
 
@@ -29,6 +29,7 @@ __all__ = [
     "accepts",
     "document",
     "object_of",
+    "problems_of",
     "quantity",
     "reference",
     "table",
@@ -291,6 +292,8 @@ def accepts(schema: Mapping[str, Any], value: Any) -> bool:
         not isinstance(value, _TYPES[kind]) or (isinstance(value, bool) and kind != "boolean")
     ):
         return False
+    if kind in ("number", "integer"):
+        return bool(abs(value) < math.inf)
     if kind == "string":
         return bool(schema.get("minLength", 0) <= len(value) <= schema.get("maxLength", math.inf))
     if kind == "array":
@@ -306,6 +309,36 @@ def unknown_key(prefix: str, name: str, allowed: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(name), names, n=1)
     hint = f"did you mean {near[0]!r}?" if near else f"allowed: {', '.join(names)}"
     return f"unknown key {prefix + str(name)!r}; {hint}"
+
+
+def problems_of(
+    prefix: str,
+    given: Mapping[str, Any],
+    rules: Mapping[str, Rule],
+    *,
+    needed: Iterable[str] = (),
+    skip: Iterable[str] = (),
+) -> list[str]:
+    """What is wrong with a table: keys that are unknown, missing, or not what their rules say.
+
+    Parameters
+    ----------
+    prefix : str
+        What stands before a key in messages.
+    given : mapping
+        The table.
+    rules : mapping of str to Rule
+        What each key may be.
+    needed, skip : iterable of str
+        Keys that may not be missing, and those whose values are judged elsewhere.
+    """
+    found = [unknown_key(prefix, key, rules) for key in given if key not in rules]
+    for key, rule in rules.items():
+        asked = (key in given or key in needed) and key not in skip
+        if asked and not accepts(rule.schema, given.get(key)):
+            value = f"{prefix}{key} = {given.get(key)!r}"
+            found.append(f"{value} is not allowed: {rule.needed} is needed")
+    return found
 
 
 def table(rules: Mapping[str, Rule], required: Sequence[str] = ()) -> dict[str, Any]:

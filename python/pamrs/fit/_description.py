@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from pamrs._files import is_inside, toml_document
+from pamrs.declared import BOOLEAN, NUMBER, TEXT, Rule, problems_of
 from pamrs.errors import RecordingError, joined
 from pamrs.rig import Muscle, Reader, muscle_problems
 from pamrs.rig.muscle_models import models_with
@@ -15,22 +16,25 @@ from pamrs.rig.muscle_models import models_with
 __all__ = ["NO_MODULI", "SCHEMA", "Description", "read_description", "with_moduli"]
 
 SCHEMA: Final = "pamrs.force_map/1"
-_TOP: Final = (
-    "schema",
-    "name",
-    "description",
-    "source",
-    "file",
-    "delimiter",
-    "decimal",
-    "columns",
-    "where",
-    "clipped_force",
-    "level_tolerance",
-    "noise",
-    "muscle",
-)
-
+_ENTRY: Final = {"anyOf": [TEXT, {"type": "object"}]}
+_CELL: Final = {"anyOf": [TEXT, NUMBER, BOOLEAN]}
+_TOP: Final = {
+    "schema": Rule({"const": SCHEMA}, repr(SCHEMA)),
+    **dict.fromkeys(
+        ("name", "description", "source", "file", "delimiter", "decimal"), Rule(TEXT, "a text")
+    ),
+    "columns": Rule(
+        {
+            "anyOf": [
+                {"type": "object", "additionalProperties": _ENTRY},
+                {"type": "array", "items": _ENTRY},
+            ]
+        },
+        "a table of texts, or a list of one for each column",
+    ),
+    "where": Rule({"type": "object", "additionalProperties": _CELL}, "a table of texts"),
+    **dict.fromkeys(("clipped_force", "level_tolerance", "noise", "muscle"), Rule({}, "")),
+}
 
 #: Moduli of a muscle whose moduli a fit is to find, in the order that it takes unless told
 #: otherwise.
@@ -91,17 +95,9 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
     """
     document = toml_document(file, RecordingError)
     reader = Reader()
-    reader.unknown_keys("", document, _TOP)
-    if document.get("schema") != SCHEMA:
-        reader.problem(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
-    texts = {
-        key: _text(reader, document, key)
-        for key in ("name", "description", "source", "file", "delimiter", "decimal")
-    }
+    reader.problems += problems_of("", document, _TOP, needed=("schema",))
     if "file" not in document:
         reader.problem("file is missing: the table with the measurements")
-    columns = _columns(reader, document)
-    where = _text_table(reader, document, "where")
     clipped = _quantity(reader, document, "clipped_force", "N")
     tolerance = _quantity(reader, document, "level_tolerance", "Pa")
     noise = _quantity(reader, document, "noise", "N")
@@ -117,6 +113,8 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         )
     if reader.problems:
         raise RecordingError(joined(str(file), reader.problems))
+    texts = {key: document.get(key, "") for key, rule in _TOP.items() if rule.schema == TEXT}
+    where = {key: str(value) for key, value in document.get("where", {}).items()}
     table = Path(os.path.normpath(file.parent / texts["file"]))
     if not (allow_outside or "\0" in texts["file"] or is_inside(file.parent, table)):
         raise RecordingError(
@@ -131,7 +129,7 @@ def read_description(file: Path, *, allow_outside: bool = False) -> Description:
         )
     options = {
         "rest_length": model["rest_length"],
-        "columns": columns,
+        "columns": document.get("columns", {}),
         "where": where or None,
         "clipped": clipped,
         "level_tolerance": tolerance,
@@ -155,39 +153,6 @@ def with_moduli(block: Mapping[str, Any]) -> dict[str, Any]:
         },
         **block,
     }
-
-
-def _text(reader: Reader, document: Mapping[str, Any], key: str) -> str:
-    value = document.get(key, "")
-    if isinstance(value, str):
-        return value
-    reader.problem(f"{key} = {value!r} is not allowed: a text is needed")
-    return ""
-
-
-def _columns(reader: Reader, document: Mapping[str, Any]) -> Any:
-    """A table from headings, or a list, of headings or of tables with a calibration."""
-    given = document.get("columns", {})
-    entries = given.values() if isinstance(given, Mapping) else given
-    if isinstance(given, (Mapping, list)) and all(
-        isinstance(entry, (str, Mapping)) for entry in entries
-    ):
-        return given
-    reader.problem(
-        f"columns = {given!r} is not allowed: a table of texts is needed, or a list of one for "
-        "each column"
-    )
-    return None
-
-
-def _text_table(reader: Reader, document: Mapping[str, Any], key: str) -> dict[str, str]:
-    table = document.get(key, {})
-    if isinstance(table, Mapping) and all(
-        isinstance(value, (str, int, float)) for value in table.values()
-    ):
-        return {str(name): str(value) for name, value in table.items()}
-    reader.problem(f"{key} = {table!r} is not allowed: a table of texts is needed")
-    return {}
 
 
 def _quantity(reader: Reader, document: Mapping[str, Any], key: str, unit: str) -> float | None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of
-from pamrs.declared import accepts, unknown_key
+from pamrs.declared import problems_of
 from pamrs.effects import find_parameter
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
 from pamrs.recordings._case_keys import (
@@ -23,7 +23,6 @@ from pamrs.recordings._case_keys import (
     FORMAT,
     LOG,
     OF_A_LOG,
-    ROLES,
     SCHEMA,
     TOP,
 )
@@ -38,8 +37,6 @@ from pamrs.units import to_si
 __all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
-#: Keys with messages of their own.
-_ELSEWHERE: Final = ("file", "role", "parameters")
 _RIG: Final = "rig.toml"
 _TURN: Final = 2.0 * np.pi
 _GIVE_BOTH: Final = (
@@ -146,21 +143,17 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     if file != given and not allow_outside and found_outside(home, file) is not None:
         raise CaseError(f"{file}: {_LIES_OUTSIDE}")
     document = _document(file, given)
-    problems: list[str] = []
-    problems += [unknown_key("", key, TOP) for key in document if key not in TOP]
-    if document.get("schema") != SCHEMA:
-        problems.append(f"schema = {document.get('schema')!r} is not allowed: {SCHEMA!r} is needed")
-    name = _text(problems, document, "name", resolved(home).name)
-    description = _text(problems, document, "description", "")
-    source = _text(problems, document, "source", "")
+    problems = problems_of("", document, TOP, needed=("schema",), skip=("recording",))
+    texts = {"name": resolved(home).name, "description": "", "source": "", "rig": _RIG}
+    texts |= {key: value for key in texts if isinstance(value := document.get(key), str)}
     outside = [] if allow_outside else _outside(home, document)
     if outside:  # nothing there is opened
         raise CaseError(joined(str(file), [*problems, *outside]))
-    rig = _rig(problems, home, _text(problems, document, "rig", _RIG))
-    recordings = _recordings(problems, home, document.get("recording"), source, rig)
+    rig = _rig(problems, home, texts["rig"])
+    recordings = _recordings(problems, home, document.get("recording"), texts["source"], rig)
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
-    return Case(name, rig, recordings, home, description)
+    return Case(texts["name"], rig, recordings, home, texts["description"])
 
 
 def model_and_case(file: Path) -> tuple[Rig, Path]:
@@ -199,14 +192,6 @@ def _document(file: Path, given: Path) -> dict[str, Any]:
         hint = "" if below is None else f"; did you mean {str(below.parent)!r}?"
         raise CaseError(f"{given}: not a case folder, it has no case.toml{hint}")
     return toml_document(file, CaseError)
-
-
-def _text(problems: list[str], document: Mapping[str, Any], key: str, default: str) -> str:
-    value = document.get(key, default)
-    if isinstance(value, str):
-        return value
-    problems.append(f"{key} = {value!r} is not allowed: a text is needed")
-    return default
 
 
 def _outside(home: Path, document: Mapping[str, Any]) -> list[str]:
@@ -253,14 +238,13 @@ def _recordings(
     for index, entry in enumerate(entries):
         label = f"recording[{index}]."
         before = len(problems)
-        problems += [unknown_key(label, key, ENTRY) for key in entry if key not in ENTRY]
-        name = entry.get("file")
-        if not isinstance(name, str) or not name:
-            problems.append(f"{label}file = {name!r} is not allowed: a file name is needed")
-        role = entry.get("role", "fit")
-        if role not in ROLES:
-            problems.append(f"{label}role = {role!r} is not allowed: 'fit' or 'held_out'")
-        _formats(problems, label, entry)
+        rules = ENTRY | OF_A_LOG if "channels" in entry else ENTRY
+        problems += problems_of(label, entry, rules, needed=("file",), skip=("parameters",))
+        if "channels" not in entry:
+            problems += [
+                f"{label}{key} goes with channels, which is missing" for key in LOG if key in entry
+            ]
+        name, role = entry.get("file"), entry.get("role", "fit")
         own = _own_values(problems, label, entry.get("parameters", {}), rig)
         if len(problems) > before:
             continue
@@ -423,16 +407,3 @@ def _from_log(
         logs[key] = read_log(file, form)
     options = {name: entry[name] for name in _OPTIONS if name in entry}
     return load_recordings(file, role=role, log=logs[key], ambient_pressure=ambient, **options)
-
-
-def _formats(problems: list[str], label: str, entry: Mapping[str, Any]) -> None:
-    """Values of a kind that their keys do not have."""
-    rules = ENTRY | OF_A_LOG if "channels" in entry else ENTRY
-    if "channels" not in entry:
-        problems += [
-            f"{label}{key} goes with channels, which is missing" for key in LOG if key in entry
-        ]
-    for key, rule in rules.items():
-        if key in entry and key not in _ELSEWHERE and not accepts(rule.schema, entry[key]):
-            needed = f"{rule.needed} is needed"
-            problems.append(f"{label}{key} = {entry[key]!r} is not allowed: {needed}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs.channels import CHANNELS, channel_of
-from pamrs.declared import NAME, Rule, accepts, unknown_key
+from pamrs.declared import NAME, Rule, problems_of
 from pamrs.errors import ParameterError, RecordingError, joined
 from pamrs.recordings._case_keys import CHANNEL, CLOCK, CONSTANT
 from pamrs.recordings._doubts import unit_trouble
-from pamrs.recordings.calibration import Calibration, is_finite, read_calibration
+from pamrs.recordings.calibration import Calibration, read_calibration
 from pamrs.units import measured_from, parse_unit, to_si
 
 __all__ = ["Clock", "Source", "read_clock", "read_sources"]
@@ -147,9 +147,10 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
         return None
     constant = "value" in entry
     rules = CONSTANT if constant else CHANNEL
-    wrong = len(problems)
-    _check(problems, label, entry, rules, ("unit",) if constant else ("column", "unit"))
-    if len(problems) > wrong:
+    needed = ("unit",) if constant else ("column", "unit")
+    wrong = problems_of(f"{label}.", entry, rules, needed=needed, skip=("time",))
+    problems += wrong
+    if wrong:
         return None
     unit, kind = measured_from(entry["unit"])
     if trouble := unit_trouble(channel, unit):
@@ -161,23 +162,6 @@ def _source(problems: list[str], name: str, entry: Any) -> Source | None:
     clock = _clock(problems, f"{label}.time", entry["time"]) if "time" in entry else None
     hold = entry.get("hold", False)
     return Source(name, entry["column"], unit, line=line, clock=clock, hold=hold, **shared)
-
-
-def _check(
-    problems: list[str],
-    label: str,
-    entry: Mapping[str, Any],
-    rules: Mapping[str, Rule],
-    needed: Sequence[str] = (),
-) -> None:
-    """Note keys that are unknown, missing or of another type than their rules say."""
-    problems += [unknown_key(f"{label}.", key, rules) for key in entry if key not in rules]
-    for key, rule in rules.items():
-        value = entry.get(key)
-        number = rule.schema.get("type") == "number"
-        fine = is_finite(value) if number else key == "time" or accepts(rule.schema, value)
-        if (key in entry or key in needed) and not fine:
-            problems.append(f"{label}.{key} = {value!r} is not allowed: {rule.needed} is needed")
 
 
 def read_clock(time: Any, source: str) -> Clock:
@@ -215,9 +199,9 @@ def _clock(problems: list[str], label: str, entry: Any) -> Clock:
             "unit and offset"
         )
         return Clock()
-    wrong = len(problems)
-    _check(problems, label, entry, CLOCK | {"unit": Rule(NAME, "a text")})
-    if len(problems) > wrong:
+    wrong = problems_of(f"{label}.", entry, CLOCK | {"unit": Rule(NAME, "a text")})
+    problems += wrong
+    if wrong:
         return Clock()
     column, unit, offset = entry.get("column"), entry.get("unit"), entry.get("offset", 0.0)
     if unit is not None:
