@@ -7,12 +7,14 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from html import escape
+from pathlib import Path
+from typing import Any
 
 from pamrs.channels import dotted
 from pamrs.effects import EFFECTS
 from pamrs.findings import BlockMismatch, Findings
 from pamrs.report.figures import COLOURS
+from pamrs.report.page import render_page
 from pamrs.report.text import format_number, label
 from pamrs.rig import Rig
 
@@ -234,19 +236,27 @@ class _Drawing:
             )
             for p in parts
         }
-        body = [self._frame(m, place, height) for m in self._judged()]
-        body += [self._arrow(a, p.full, place) for p in parts for a in p.after]
-        body += [self._box(p, lines[p.full], *place[p.full], height[p.full]) for p in parts]
-        width = max(x for x, _ in place.values()) + BOX + PAD + 5.0
+        judged = self._judged()
         tall = max(y + height[full] for full, (_, y) in place.items()) + PAD + 6.0
-        tall += 20.0 if any(n.partition(".")[0] in UNDER for n, *_ in self._judged()) else 0.0
-        return (
-            f'<svg class="chain" viewBox="0 0 {width:.0f} {tall:.0f}" role="img" '
-            f'style="min-width:{0.75 * width:.0f}px;max-width:{1.15 * width:.0f}px" '
-            f'font-size="12" aria-label="{escape(self._spoken())}">'
-            '<defs><marker id="chain-tip" viewBox="0 0 8 8" refX="7" refY="4" markerWidth="7" '
-            'markerHeight="7" orient="auto"><path d="M0 0L8 4L0 8z" fill="#6b7280"/></marker>'
-            f"</defs>{''.join(body)}</svg>"
+        tall += 20.0 if any(n.partition(".")[0] in UNDER for n, *_ in judged) else 0.0
+        return render_page(
+            Path(__file__).with_name("chain.svg.j2"),
+            width=max(x for x, _ in place.values()) + BOX + PAD + 5.0,
+            tall=tall,
+            spoken=self._spoken(),
+            frames=[self._frame(m, place, height) for m in judged],
+            arrows=[self._arrow(place[a], place[p.full]) for p in parts for a in p.after],
+            boxes=[
+                dict(part=self.parts[full], x=x, y=y, height=height[full], lines=lines[full])
+                for full, (x, y) in place.items()
+            ],
+            box=BOX,
+            line=LINE,
+            symbols=SYMBOLS,
+            found=COLOURS["before"],
+            dot=COLOURS["after"],
+            px="{:.1f}".format,
+            wrap=textwrap.wrap,
         )
 
     def _spoken(self) -> str:
@@ -304,7 +314,7 @@ class _Drawing:
         judged: tuple[str, list[str], BlockMismatch | None],
         place: dict[str, tuple[float, float]],
         height: dict[str, float],
-    ) -> str:
+    ) -> dict[str, Any]:
         """Frame around what is judged together, with its residual."""
         name, inside, mismatch = judged
         under = name.partition(".")[0] in UNDER
@@ -324,64 +334,16 @@ class _Drawing:
         if exceeds and residual is not None:
             size = f"misses {format_number(residual.excess, 2)} × noise"
         colour = COLOURS["before"] if lit or (exceeds and verdict != "none") else "#8a94a3"
-        fill = "#fdebdd" if lit else "#f6f7f9"
-        room = int((right - x) / 6.4)
-        text = textwrap.shorten(size, room, placeholder=" …")
-        return (
-            f'<rect x="{x:.1f}" y="{y:.1f}" width="{right - x:.1f}" height="{low - y:.1f}" rx="9" '
-            f'fill="{fill}" stroke="{colour}" stroke-width="{2.4 if lit else 1.2}"/>'
-            f'<text x="{x + 9:.1f}" y="{title:.1f}" fill="{"#a33f00" if lit else "#57606a"}" '
-            f'font-weight="{700 if lit else 400}">{escape(text)}</text>'
-        )
+        text = textwrap.shorten(size, int((right - x) / 6.4), placeholder=" …")
+        return dict(x=x, y=y, right=right, low=low, title=title, lit=lit, colour=colour, text=text)
 
-    def _arrow(self, first: str, second: str, place: dict[str, tuple[float, float]]) -> str:
-        """From one box to the next, at the height of their titles."""
-        (x, y), (to, end) = place[first], place[second]
-        if to > x:
-            start, stop = x + BOX, to - 2.0
-        else:
-            start, stop = x, to + BOX + 2.0
-        middle = 0.5 * (start + stop)
-        return (
-            f'<path d="M{start:.1f} {y + 24:.1f}C{middle:.1f} {y + 24:.1f} {middle:.1f} '
-            f'{end + 24:.1f} {stop:.1f} {end + 24:.1f}" fill="none" stroke="#6b7280" '
-            'stroke-width="1.6" marker-end="url(#chain-tip)"/>'
-        )
-
-    def _box(
-        self, part: _Part, lines: list[tuple[str, str]], x: float, y: float, height: float
-    ) -> str:
-        """A block with its symbol, its channels and what was found in it."""
-        edge = COLOURS["before"] if part.found else "#aeb5bf"
-        out = [
-            f'<rect x="{x:.1f}" y="{y:.1f}" width="{BOX}" height="{height:.1f}" rx="6" '
-            f'fill="#fff" stroke="{edge}" stroke-width="{1.8 if part.found else 1.0}"/>',
-            f'<g transform="translate({x + 8:.1f} {y + 11:.1f})" fill="none" stroke="#374151" '
-            f'stroke-width="1.5">{SYMBOLS[part.kind]}</g>',
-        ]
-        wrapped = textwrap.wrap(part.title, 12)[:2] or [""]
-        top = y + 28.0 if len(wrapped) == 1 else y + 21.0
-        out += [
-            f'<text x="{x + 42:.1f}" y="{top + 14 * k:.1f}" font-weight="600" fill="#1b1f24">'
-            f"{escape(text)}</text>"
-            for k, text in enumerate(wrapped)
-        ]
-        for k, (text, kind) in enumerate(lines):
-            base = y + 54.0 + LINE * k
-            fill = {"measured": "#1b1f24", "unmeasured": "#7a8594", "found": "#a33f00"}[kind]
-            if kind != "found":
-                dot = COLOURS["after"] if kind == "measured" else "none"
-                ring = COLOURS["after"] if kind == "measured" else "#7a8594"
-                out.append(
-                    f'<circle cx="{x + 13:.1f}" cy="{base - 4:.1f}" r="4" fill="{dot}" '
-                    f'stroke="{ring}" stroke-width="1.2"/>'
-                )
-            left, weight = (22.0, 400) if kind != "found" else (9.0, 600)
-            out.append(
-                f'<text x="{x + left:.1f}" y="{base:.1f}" fill="{fill}" font-weight="{weight}">'
-                f"{escape(text)}</text>"
-            )
-        return "".join(out)
+    def _arrow(
+        self, first: tuple[float, float], second: tuple[float, float]
+    ) -> tuple[float, float, float, float]:
+        """From one box to the next, at the height of their titles: begin and end."""
+        (x, y), (to, end) = first, second
+        start, stop = (x + BOX, to - 2.0) if to > x else (x, to + BOX + 2.0)
+        return start, y + 24.0, stop, end + 24.0
 
 
 SYMBOLS = {
