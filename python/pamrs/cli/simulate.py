@@ -198,13 +198,7 @@ def _held(
 
     from pamrs.errors import ParameterError, meant
 
-    name, equals, steps = text.partition("=")
-    name = name.strip()
-    if not equals:
-        raise ParameterError(
-            f"--hold = {text!r} is not allowed: a signal like 'valve_command = 5 V, 8 V @ 1 s' is "
-            "needed"
-        )
+    name, steps = _parted("hold", text, "a signal like 'valve_command = 5 V, 8 V @ 1 s'")
     same = [one for one in known if channel_of(one) == name]
     if name not in known and len(same) == 1:
         name = same[0]  # the only one is meant
@@ -233,18 +227,23 @@ def _held(
     return name, values
 
 
+def _parted(option: str, text: str, example: str) -> tuple[str, str]:
+    """What stands before and behind ``=``."""
+    from pamrs.errors import ParameterError
+
+    name, equals, value = text.partition("=")
+    if not equals:
+        raise ParameterError(f"--{option} = {text!r} is not allowed: {example} is needed")
+    return name.strip(), value
+
+
 def _began(text: str, known: list[str]) -> tuple[str, float]:
     """An initial value from ``"muscle_pressure.elbow = 2 bar"``; ``known`` are the states that the
     rig has.
     """
     from pamrs.errors import ParameterError, meant
 
-    name, equals, value = text.partition("=")
-    name = name.strip()
-    if not equals:
-        raise ParameterError(
-            f"--initial = {text!r} is not allowed: a state like 'muscle_pressure = 2 bar' is needed"
-        )
+    name, value = _parted("initial", text, "a state like 'muscle_pressure = 2 bar'")
     if name not in known:
         raise ParameterError(
             f"--initial = {text!r} is not allowed: the rig has no state {name!r} to begin from; "

@@ -449,9 +449,9 @@ def _rates(times: dict[str, Array]) -> list[str]:
     """What becomes of channels that were sampled at different rates."""
     rates: dict[str, float] = {}
     for name, time in times.items():
-        steps = np.diff(time)
-        if np.any(steps > 0.0) and channel_of(name) not in UNTOLD:
-            rates[name] = 1.0 / usual_interval(steps[steps > 0.0], len(steps) + 1)
+        rate = _rate(time, len(time))
+        if rate > 0.0 and channel_of(name) not in UNTOLD:
+            rates[name] = rate
     if not rates or max(rates.values()) < 1.01 * min(rates.values()):
         return []
     fastest = max(rates, key=lambda name: rates[name])
@@ -459,6 +459,13 @@ def _rates(times: dict[str, Array]) -> list[str]:
         f"sampled at {min(rates.values()):.4g} to {rates[fastest]:.4g} Hz: all are laid on the "
         f"{rates[fastest]:.4g} Hz of {fastest} (sample_time in case.toml chooses another grid)"
     ]
+
+
+def _rate(time: Array, count: int) -> float:
+    """Samples per second of so many samples; NaN where no time is later than another."""
+    steps = np.diff(time)
+    forward = steps[steps > 0.0]
+    return 1.0 / usual_interval(forward, count) if len(forward) else np.nan
 
 
 def _suspect(matches: Sequence[Match], rig: Rig | None, laid: Mapping[str, Sampled]) -> list[str]:
@@ -472,14 +479,10 @@ def _listed(series: Series, clock: Ticks | None, matches: Sequence[Match]) -> Li
     if series.labels:
         good = good[:0]
     low, high = (float(good.min()), float(good.max())) if good.size else (np.nan, np.nan)
-    rate = np.nan
-    if clock is not None:
-        steps = np.diff(sampled("", series.values, clock, "").time)
-        steps = steps[steps > 0.0]
-        if len(steps):
-            rate = 1.0 / usual_interval(steps, len(series.values))
+    times = np.empty(0) if clock is None else sampled("", series.values, clock, "").time
+    rate = _rate(times, len(series.values))
     channel = next((match.channel for match in matches if match.series is series), "")
-    return Listed(series.name, len(series.values), float(rate), series.unit, low, high, channel)
+    return Listed(series.name, len(series.values), rate, series.unit, low, high, channel)
 
 
 def _split(log: Log, clock: Ticks | None) -> tuple[str | dict[str, Any] | None, list[int], int]:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -126,7 +126,6 @@ def plan_diagnosis(
     noise: Mapping[str, float] | None = None,
     experiments: Sequence[str] | None = None,
     settings: DiagnosisSettings | None = None,
-    progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """What a diagnosis could tell of a rig from some channels, before anything is recorded.
 
@@ -148,8 +147,6 @@ def plan_diagnosis(
         and steps by default, and slow strokes of a frame.
     settings : DiagnosisSettings, optional
         From where on an effect counts as seen, and two as apart; the published ones by default.
-    progress : callable, optional
-        Called with a line of text now and then.
 
     Returns
     -------
@@ -175,7 +172,6 @@ def plan_diagnosis(
     settings = DiagnosisSettings() if settings is None else settings
     own = checked_channels(rig, tuple(channels))
     sound = _noise(rig, noise)
-    say = progress or (lambda _: None)
     every = measurable(rig)
     whole = available_blocks(rig, every)
     pool = {e.name: e for e in library(rig, settings)}
@@ -187,10 +183,6 @@ def plan_diagnosis(
     free = free_baseline(Problem(together, [], core_rig(rig), settings), rig)
     usable = {}
     for name, experiment in pool.items():
-        say(
-            f"{name}: {experiment.duration:.0f} s with {len(starts)} starts of "
-            f"{len({s.effect for s in starts})} effects"
-        )
         try:
             for measured, cut in layers:
                 heard = {c: v for c, v in sound.items() if c in measured}
