@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -15,6 +15,13 @@ if TYPE_CHECKING:
     from pamrs.rig import Rig
 
 __all__ = ["fit_report", "to_dict", "to_rig"]
+
+
+_NUMBERS: Final = (
+    *("errors", "ndata", "nvarys", "chisqr", "redchi", "aic", "aicc", "bic", "rsquared"),
+    *("condition_number", "rms_error", "max_error"),
+)
+"""What :func:`to_dict` has of a fit as it is."""
 
 
 def fit_report(fit: MuscleFit) -> str:
@@ -136,18 +143,7 @@ def to_dict(fit: MuscleFit) -> dict[str, Any]:
         "moduli": fit.moduli_kind,
         "parameters": [item.__dict__.copy() for item in fit.params.values()],
         "covar": fit.covar.tolist(),
-        "errors": fit.errors,
-        "ndata": fit.ndata,
-        "nvarys": fit.nvarys,
-        "chisqr": fit.chisqr,
-        "redchi": fit.redchi,
-        "aic": fit.aic,
-        "aicc": fit.aicc,
-        "bic": fit.bic,
-        "rsquared": fit.rsquared,
-        "condition_number": fit.condition_number,
-        "rms_error": fit.rms_error,
-        "max_error": fit.max_error,
+        **{name: getattr(fit, name) for name in _NUMBERS},
         "held_out_rms_error": held_out and held_out[0],
         "held_out_max_error": held_out and held_out[1],
         "levels": by_pressure.levels.tolist(),

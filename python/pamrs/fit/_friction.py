@@ -233,38 +233,27 @@ class FrictionFit:
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
+        plain = ("pressure", "coefficient", "stderr", "law", "at_floor", "rows")
+        arrays = ("contraction", "force", "half_width")
+        levels = [
+            {
+                **{key: law if key == "law" else getattr(level, key) for key in plain},
+                **{key: getattr(level, key).tolist() for key in arrays},
+            }
+            for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
+        ]
         return {
             "parameters": [
                 {**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()
             ],
-            "floor": self.floor,
-            "presliding": self.presliding,
-            "presliding_reason": self.presliding_reason,
-            "levels": [
-                {
-                    "pressure": level.pressure,
-                    "coefficient": level.coefficient,
-                    "stderr": level.stderr,
-                    "law": law,
-                    "at_floor": level.at_floor,
-                    "rows": level.rows,
-                    "contraction": level.contraction.tolist(),
-                    "force": level.force.tolist(),
-                    "half_width": level.half_width.tolist(),
-                }
-                for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
-            ],
+            **{key: getattr(self, key) for key in ("floor", "presliding", "presliding_reason")},
+            "levels": levels,
             "residual": self.residual.tolist(),
-            "ndata": self.ndata,
-            "nvarys": self.nvarys,
-            "nfree": self.nfree,
-            "redchi": _or_none(self.redchi),
-            "between": _or_none(self.between),
+            **{key: getattr(self, key) for key in ("ndata", "nvarys", "nfree")},
+            **{key: _or_none(getattr(self, key)) for key in ("redchi", "between")},
             "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
             "slope_pvalue": _or_none(self.slope_pvalue),
-            "slope_significant": self.slope_significant,
-            "isometric": self.isometric,
-            "issues": self.issues,
+            **{key: getattr(self, key) for key in ("slope_significant", "isometric", "issues")},
         }
 
     def _slope_words(self) -> str:

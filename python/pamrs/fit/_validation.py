@@ -151,19 +151,14 @@ class CrossValidation:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything as plain numbers, errors as fractions."""
-        return {
-            "rms": self.rms,
-            "max": self.max,
-            "interior_rms": self.interior_rms,
-            "interior_max": self.interior_max,
-            "end_rms": self.end_rms,
-            "end_max": self.end_max,
-            "rms_stderr": self.rms_stderr,
-            "levels": self.by_pressure.levels.tolist(),
-            "level_rms": self.by_pressure.rms.tolist(),
-            "level_max": self.by_pressure.max.tolist(),
-            "points": self.by_pressure.points.tolist(),
-            "weak_levels": self.by_pressure.weak.tolist(),
+        numbers = {k: v for k, v in vars(self).items() if v is None or isinstance(v, float)}
+        each = self.by_pressure
+        return numbers | {
+            "levels": each.levels.tolist(),
+            "level_rms": each.rms.tolist(),
+            "level_max": each.max.tolist(),
+            "points": each.points.tolist(),
+            "weak_levels": each.weak.tolist(),
         }
 
 
