@@ -766,7 +766,7 @@ def test_a_table_without_headings_takes_a_list_of_them(tmp_path):
     same_map(load_force_map(file, rest_length=0.3, columns=names))
     with pytest.raises(RecordingError, match=r"the first row has numbers.*columns = \["):
         load_force_map(file, rest_length=0.3)
-    with pytest.raises(RecordingError, match="columns lists 3 names, but there are 4 columns"):
+    with pytest.raises(RecordingError, match="columns lists 3 headings, but there are 4 columns"):
         load_force_map(file, rest_length=0.3, columns=names[:3])
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -18,7 +17,15 @@ from pamrs.recordings import load_recording
 from pamrs.recordings.calibration import KEYS, Calibration, read_calibration
 from pamrs.recordings.dialect import check_marks, decimal_of, dialect_of
 from pamrs.recordings.logs import read_log, table_of
-from pamrs.recordings.table import Table, is_text, read_table, read_text, stem_of
+from pamrs.recordings.table import (
+    Table,
+    has,
+    is_text,
+    read_table,
+    read_text,
+    renamed,
+    stem_of,
+)
 from pamrs.units import parse_unit, same_dimension, to_si
 
 __all__ = ["Columns", "read_map"]
@@ -95,7 +102,7 @@ def read_map(
         raise RecordingError(f"{source}: cannot be read (a folder, not a file)")
     check_marks(delimiter, decimal, source)
     delimiter, table = _table(file, delimiter, decimal, columns)
-    headings, lines = _renamed(table, columns, source)
+    headings, lines = _calibrated(table, columns, source)
     found, strange = _understood(headings, lines, source)
     decimal = decimal or decimal_of(_texts(table, found), source)
     wanted = {heading: str(value) for heading, value in (where or {}).items()}
@@ -189,36 +196,14 @@ def _table(
     return delimiter, read_table(file, delimiter=delimiter, header=False)
 
 
-def _renamed(
+def _calibrated(
     table: Table, columns: Columns | None, source: str
 ) -> tuple[list[str], dict[int, Calibration]]:
     """Headings of all columns, and the calibrations of those that have one."""
-    given = table.header or []
-    if columns is None:
-        return list(given), {}
-    if isinstance(columns, str) or not isinstance(columns, (Mapping, Sequence)):
-        raise RecordingError(
-            f"{source}: columns = {columns!r} is not allowed: a table from headings to headings, "
-            "or a list of one for each column"
-        )
-    count = table.width
-    if not isinstance(columns, Mapping):
-        if len(columns) != count:
-            raise RecordingError(
-                f"{source}: columns lists {len(columns)} names, but there are {count} columns"
-            )
-        entries: list[Any] = list(columns)
-    else:
-        strange = [key for key in columns if key not in given]
-        if strange:
-            raise RecordingError(
-                f"{source}: columns names {strange[0]!r}, but {_has(strange[0], given)}"
-            )
-        entries = [columns.get(heading, heading) for heading in given]
     problems: list[str] = []
     lines: dict[int, Calibration] = {}
     headings = []
-    for index, entry in enumerate(entries):
+    for index, entry in enumerate(renamed(table, columns, source)):
         if isinstance(entry, Mapping):
             unknown = [key for key in entry if key not in ("name", *KEYS)]
             if unknown or not isinstance(entry.get("name"), str):
@@ -326,18 +311,6 @@ def _measures(heading: str, si_unit: str) -> bool:
         return False
 
 
-def _has(name: str, header: Sequence[str]) -> str:
-    """What the file has in place of a heading, and the one that is nearly it."""
-    plain = name.strip().lower()
-    near = [
-        heading
-        for heading in header
-        if plain and (heading.lower().startswith(plain) or _split(heading)[0] == _split(name)[0])
-    ]
-    near = near or difflib.get_close_matches(name, header, n=1, cutoff=0.6)
-    return f"the file has: {', '.join(header)}" + (f"; did you mean {near[0]!r}?" if near else "")
-
-
 def _numbers(table: Table, column: _Column, channel: str, source: str, decimal: str) -> Array:
     if channel == "direction" and not isinstance(table.cells(column.position), np.ndarray):
         return _direction_cells(
@@ -396,7 +369,7 @@ def _cells(table: Table, heading: str, source: str) -> list[str]:
     header = table.header or []
     if heading not in header:
         raise RecordingError(
-            f"{source}: where names the column {heading!r}, but {_has(heading, header)}"
+            f"{source}: where names the column {heading!r}, but {has(heading, header)}"
         )
     return [str(cell).strip() for cell in table.cells(header.index(heading))]
 

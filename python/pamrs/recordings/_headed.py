@@ -18,7 +18,7 @@ from pamrs.recordings._mapping import Clock, Source
 from pamrs.recordings._recording import Issue, Recording
 from pamrs.recordings.dialect import check_marks
 from pamrs.recordings.logs import Log, Series, read_log, table_of
-from pamrs.recordings.table import Table, is_text, read_table, stem_of, thousands_of
+from pamrs.recordings.table import Table, is_text, read_table, renamed, stem_of, thousands_of
 from pamrs.units import measured_from
 
 __all__ = ["load_recording"]
@@ -95,7 +95,7 @@ def load_recording(
         table = read_table(file, delimiter=delimiter, header=header)
     else:
         table = table_of(read_log(file))
-    wanted = _understood(_headings(table, columns, source), source)
+    wanted = _understood(renamed(table, columns, source), source)
     if "time" not in wanted and sample_time is None:
         raise RecordingError(
             f"{source}: column 'time' is missing (give sample_time if the rows are evenly spaced)"
@@ -114,31 +114,6 @@ def load_recording(
 
 
 # ------------------------------------------------------------------------- columns
-
-
-def _headings(
-    table: Table, columns: Sequence[str] | Mapping[str, str] | None, source: str
-) -> list[str]:
-    found = table.header
-    if columns is None:
-        return found or []
-    if isinstance(columns, str):
-        raise RecordingError(
-            f"{source}: columns = {columns!r} is not allowed: a list of headings is needed"
-        )
-    if isinstance(columns, Mapping):
-        given = found or []
-        strange = [key for key in columns if key not in given]
-        if strange:
-            raise RecordingError(
-                f"{source}: columns names {strange[0]!r}, but the file has: {', '.join(given)}"
-            )
-        return [columns.get(heading, heading) for heading in given]
-    if len(columns) != table.width:
-        raise RecordingError(
-            f"{source}: columns lists {len(columns)} headings, but there are {table.width} columns"
-        )
-    return list(columns)
 
 
 def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, bool]]:

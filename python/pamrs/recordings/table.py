@@ -8,11 +8,12 @@ for those who call it.
 from __future__ import annotations
 
 import csv
+import difflib
 import math
 import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,11 +27,13 @@ __all__ = [
     "TEXT",
     "Lines",
     "Table",
+    "has",
     "is_text",
     "lines_of",
     "lines_of_rows",
     "read_table",
     "read_text",
+    "renamed",
     "same_width",
     "split_rows",
     "stem_of",
@@ -574,6 +577,56 @@ def read_table(path: Path, *, delimiter: str, header: bool) -> Table:
     if not body.lines:
         raise RecordingError(f"{source}: no row has {width} cells")
     return Table(headings[0] if headings else None, body, remarks)
+
+
+def renamed(table: Table, columns: Any, source: str) -> list[Any]:
+    """What is said of each column: the file's own headings, or what stands in their place.
+
+    Parameters
+    ----------
+    table : Table
+        The columns.
+    columns : mapping, sequence or None
+        From headings of the file, or one for each column; None for the file's own.
+    source : str
+        The file, for messages.
+
+    Returns
+    -------
+    list
+        One for each column.
+
+    Raises
+    ------
+    RecordingError
+        If it names a heading that is not there, or not as many as there are columns.
+    """
+    given = table.header or []
+    if columns is None:
+        return list(given)
+    if isinstance(columns, str) or not isinstance(columns, (Mapping, Sequence)):
+        raise RecordingError(
+            f"{source}: columns = {columns!r} is not allowed: a table from headings to headings, "
+            "or a list of one for each column"
+        )
+    if isinstance(columns, Mapping):
+        for key in columns:
+            if key not in given:
+                raise RecordingError(f"{source}: columns names {key!r}, but {has(key, given)}")
+        return [columns.get(heading, heading) for heading in given]
+    if len(columns) != table.width:
+        raise RecordingError(
+            f"{source}: columns lists {len(columns)} headings, but there are {table.width} columns"
+        )
+    return list(columns)
+
+
+def has(name: str, header: Sequence[str]) -> str:
+    """What the file has in place of a heading, and the one that is nearly it."""
+    plain = name.strip().lower()
+    near = [heading for heading in header if plain and heading.lower().startswith(plain)]
+    near = near or difflib.get_close_matches(name, header, n=1, cutoff=0.6)
+    return f"the file has: {', '.join(header)}" + (f"; did you mean {near[0]!r}?" if near else "")
 
 
 def thousands_of(thousands: str | Mapping[str, str] | None, name: str) -> str | None:
