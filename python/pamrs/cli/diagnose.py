@@ -138,32 +138,22 @@ def diagnose_command(
 
     with progress(f"diagnosing {loaded.name}"):
         result = diagnose(loaded, consider=consider or ())
+    protocol = result.next_experiment.protocol
+    if experiment is not None and protocol is None:
+        typer.echo(
+            f"not written: {experiment}: the next experiment has no commands to play "
+            "(it is none, or done by hand)",
+            err=True,
+        )
+        experiment = None
     files: Contents = {
         json: result.to_json,
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
-        _playable(result, experiment): lambda path: write_atomically(path, _commands(result)),
+        experiment: "" if protocol is None else protocol.to_csv(),
         png: result.figure,
         report: result.report,
     }
     write(files, result.summary())
-
-
-def _playable(result: Diagnosis, file: Path | None) -> Path | None:
-    """The file for the commands of the next experiment; None, and why, where there are none."""
-    if file is not None and result.next_experiment.protocol is None:
-        typer.echo(
-            f"not written: {file}: the next experiment has no commands to play "
-            "(it is none, or done by hand)",
-            err=True,
-        )
-        return None
-    return file
-
-
-def _commands(result: Diagnosis) -> str:
-    """The commands of the next experiment as CSV; none where there are none."""
-    protocol = result.next_experiment.protocol
-    return "" if protocol is None else protocol.to_csv()
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:

@@ -234,7 +234,64 @@ class _Assumed:
 
     def picture(self, blocks: list[Block], experiments: Sequence[str]) -> _Picture:
         """What some blocks over some experiments show."""
-        return _picture(self.parts, blocks, experiments, self.starts, self.settings)
+        used: dict[Key, _Part] = {
+            (block.name, name): part
+            for (block, name), part in self.parts.items()
+            if block in blocks and name in experiments
+        }
+        effects = list(dict.fromkeys(str(s.effect) for s in self.starts))
+        if not used:
+            return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
+        shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
+        total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
+        freed = solve_normal(total.baseline + np.eye(len(total.baseline)), total.mixed)
+        gram = total.signatures - total.mixed.T @ freed
+        sizes = {
+            key: np.sqrt(
+                np.clip(
+                    np.diag(p.signatures)
+                    - 2.0 * np.einsum("km,km->m", p.mixed, freed)
+                    + np.einsum("km,kl,lm->m", freed, p.baseline, freed),
+                    0.0,
+                    None,
+                )
+                / self.settings.effective_samples
+            )
+            for key, p in used.items()
+        }
+        power = np.sqrt(np.clip(np.diag(gram), 1e-12, None))
+        cosines = np.abs(gram) / np.outer(power, power)
+        shapes = {e: [k for k, s in enumerate(self.starts) if str(s.effect) == e] for e in effects}
+        sights: dict[str, Sight] = {}
+        best: dict[str, int] = {}
+        for effect in effects:
+            index, key = max(
+                ((k, key) for k in shapes[effect] for key in sizes),
+                key=lambda pair: float(sizes[pair[1]][pair[0]]),
+            )
+            best[effect] = index
+            sights[effect] = _sight(
+                self.starts[index], float(sizes[key][index]), key, self.settings
+            )
+        cosine, unseparated = {}, set()
+        for first, second in itertools.combinations(effects, 2):
+            mine, theirs = best[first], best[second]
+            forward = float(max(cosines[mine, k] for k in shapes[second]))
+            backward = float(max(cosines[theirs, k] for k in shapes[first]))
+            cosine[first, second] = min(1.0, max(forward, backward))
+            left = min(
+                sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)),
+                sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
+            )
+            seen = min(sights[first].left, sights[second].left) >= self.settings.seen
+            alike = cosine[first, second] > _SAME_COSINE or left < _APART
+            if seen and alike:
+                unseparated.add((first, second))
+        chosen = [best[e] for e in effects]
+        _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
+        return _Picture(
+            sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0)
+        )
 
     def needed(self, block: str, own: tuple[str, ...], every: tuple[str, ...]) -> list[str]:
         """The fewest channels that, added to those at hand, surround a block."""
@@ -442,71 +499,6 @@ def _parts(
             slope.T @ slope, slope.T @ change, change.T @ change
         )
     return products
-
-
-def _picture(
-    parts: Mapping[_Place, _Part],
-    blocks: list[Block],
-    experiments: Sequence[str],
-    starts: list[Start],
-    settings: DiagnosisSettings,
-) -> _Picture:
-    """What some blocks over some experiments show."""
-    used: dict[Key, _Part] = {
-        (block.name, name): part
-        for (block, name), part in parts.items()
-        if block in blocks and name in experiments
-    }
-    effects = list(dict.fromkeys(str(s.effect) for s in starts))
-    if not used:
-        return _Picture({e: Sight(e, 0.0) for e in effects}, {}, frozenset(), 0.0)
-    shares = [(p.baseline, p.mixed, p.signatures) for p in used.values()]
-    total = _Part(*(np.asarray(sum(share)) for share in zip(*shares, strict=True)))
-    freed = solve_normal(total.baseline + np.eye(len(total.baseline)), total.mixed)
-    gram = total.signatures - total.mixed.T @ freed
-    sizes = {
-        key: np.sqrt(
-            np.clip(
-                np.diag(p.signatures)
-                - 2.0 * np.einsum("km,km->m", p.mixed, freed)
-                + np.einsum("km,kl,lm->m", freed, p.baseline, freed),
-                0.0,
-                None,
-            )
-            / settings.effective_samples
-        )
-        for key, p in used.items()
-    }
-    power = np.sqrt(np.clip(np.diag(gram), 1e-12, None))
-    cosines = np.abs(gram) / np.outer(power, power)
-    sights: dict[str, Sight] = {}
-    best: dict[str, int] = {}
-    for effect in effects:
-        own = [k for k, s in enumerate(starts) if str(s.effect) == effect]
-        index, key = max(
-            ((k, key) for k in own for key in sizes),
-            key=lambda pair: float(sizes[pair[1]][pair[0]]),
-        )
-        best[effect] = index
-        sights[effect] = _sight(starts[index], float(sizes[key][index]), key, settings)
-    shapes = {e: [k for k, s in enumerate(starts) if str(s.effect) == e] for e in effects}
-    cosine, unseparated = {}, set()
-    for first, second in itertools.combinations(effects, 2):
-        mine, theirs = best[first], best[second]
-        forward = float(max(cosines[mine, k] for k in shapes[second]))
-        backward = float(max(cosines[theirs, k] for k in shapes[first]))
-        cosine[first, second] = min(1.0, max(forward, backward))
-        left = min(
-            sights[first].left * math.sqrt(max(0.0, 1.0 - forward**2)),
-            sights[second].left * math.sqrt(max(0.0, 1.0 - backward**2)),
-        )
-        seen = min(sights[first].left, sights[second].left) >= settings.seen
-        alike = cosine[first, second] > _SAME_COSINE or left < _APART
-        if seen and alike:
-            unseparated.add((first, second))
-    chosen = [best[e] for e in effects]
-    _, logarithm = np.linalg.slogdet(np.eye(len(chosen)) + gram[np.ix_(chosen, chosen)])
-    return _Picture(sights, cosine, frozenset(unseparated), 0.5 * float(logarithm) / math.log(2.0))
 
 
 def _sight(start: Start, left: float, key: Key, settings: DiagnosisSettings) -> Sight:
