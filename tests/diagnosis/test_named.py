@@ -103,6 +103,7 @@ def test_the_channels_decide_what_can_be_told_apart(
     ] == expected
 
 
+@pytest.mark.slow
 def test_a_nominal_antagonist_has_nothing_missing(rig: pamrs.Rig) -> None:
     found = pamrs.diagnose(case(rig, rig, n=1000))
     assert found.verdict in ("none", "parameters")
