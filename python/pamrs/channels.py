@@ -17,6 +17,7 @@ __all__ = [
     "MEASURED",
     "UNITS",
     "Channel",
+    "block_of",
     "channel_of",
     "dotted",
     "laboratory_unit",
@@ -214,6 +215,11 @@ def channel_of(name: str) -> str:
 def with_trait(trait: str) -> tuple[str, ...]:
     """The channels of recordings with a trait, in the order of the table."""
     return tuple(name for name, row in CHANNELS.items() if row.has(trait))
+
+
+def block_of(name: str) -> str:
+    """Name of the block behind the dot of a channel, a port or a kind of block; empty without."""
+    return name.partition(".")[2]
 
 
 def dotted(channel: str, name: str) -> str:

@@ -120,7 +120,7 @@ def test_each_block_may_have_a_name_of_its_own(monkeypatch: pytest.MonkeyPatch) 
         asked.append(sorted(str(c.hypothesis) for c in candidates))
         return replace(candidates[0].fit, effects=terms("heat_transfer"))
 
-    monkeypatch.setattr(Attempts, "united", united)
+    monkeypatch.setattr(Attempts, "fit_united", united)
     parts = _split_by_names(group(volume, heat), TRIAL, WEIGHING)
     assert asked == [["heat_transfer", "supply.volume"]]
     judged = judge(parts, SETTINGS)

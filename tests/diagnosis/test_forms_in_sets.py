@@ -49,12 +49,12 @@ def hurried(trial: Attempts, evaluations: int) -> Candidate:
     held = {name: value for start in starts for name, value in start.held.items()}
     effects = tuple(start.effect for start in starts)
     found = fit(trial.inner, RIG, effects, free, trial.white, fixed=held, evaluations=evaluations)
-    return trial.judged(effects, found)
+    return trial.judge(effects, found)
 
 
 def test_a_set_ends_weighted_by_what_it_leaves(trial: Attempts) -> None:
     begun = hurried(trial, 1)
-    ended = trial.without(begun, Term("heat_transfer"))
+    ended = trial.fit_without(begun, Term("heat_transfer"))
     assert ended is not None
     first, last = trial.autocorrelation(begun.fit), trial.autocorrelation(ended.fit)
     for block, left in last.items():

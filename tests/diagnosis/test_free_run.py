@@ -88,7 +88,7 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
     rig = parse_rig(WARM)
     known = [(n, p.value, p.tol) for n, p in rig.parameters.items() if 0.0 < p.tol < math.inf]
     names, values, tolerances = zip(*known, strict=True)
-    file = _free_run.Known(names, np.array(values), np.diag(tolerances))
+    file = _free_run.KnownValues(names, np.array(values), np.diag(tolerances))
     off, errors = {}, {}
     for leak in (0.0, 3e-8):
         true = rig.with_effect("leak_muscle", {"conductance": leak}) if leak else rig
@@ -111,7 +111,7 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
 def test_of_a_long_log_the_first_part_is_asked_and_said(monkeypatch: pytest.MonkeyPatch) -> None:
     rig = parse_rig(WARM)
     true = rig.with_effect("leak_muscle", {"conductance": 3e-8})
-    told = _free_run.Known(("chamber.dead_volume",), np.array([5e-4]), np.array([[5e-6]]))
+    told = _free_run.KnownValues(("chamber.dead_volume",), np.array([5e-4]), np.array([[5e-6]]))
     problem = problem_of(rig, [filled(true, "held_out", 2, PRESSURES)])
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
     runs = []

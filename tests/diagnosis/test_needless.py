@@ -26,9 +26,9 @@ def test_an_effect_that_does_nothing_is_taken_out_from_where_the_set_stands() ->
     trial = attempts(leaky, (7e5, 5e5), 150.0)
     starts = [starts_of(effect, sealed=True)[0] for effect in terms("leak_muscle", "heat_transfer")]
     start = fit(trial.inner, RIG, (), {}, trial.white)
-    both = trial.fitted(starts, start, trial.white)
+    both = trial.fit_effects(starts, start, trial.white)
     assert both is not None
-    alone = trial.fitted(starts[:1], start, trial.white)
+    alone = trial.fit_effects(starts[:1], start, trial.white)
     assert alone is not None
     told: list[str] = []
     # a fit of the leak that ended in a hollow is replaced; that of heat, which leaves much, is not

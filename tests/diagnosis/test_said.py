@@ -113,11 +113,11 @@ def test_valve_and_chamber_are_judged_without_a_gauge_at_the_tank(what: str) -> 
         assert found.wrong_parameters == []
 
 
-def known_of(rig: pamrs.Rig) -> _free_run.Known:
+def known_of(rig: pamrs.Rig) -> _free_run.KnownValues:
     """What the rig file says of the values."""
     own = {n: p for n, p in known_parameters(rig).items() if p.tol > 0.0}
     tols = np.diag([p.tol for p in own.values()])
-    return _free_run.Known(tuple(own), np.array([p.value for p in own.values()]), tols)
+    return _free_run.KnownValues(tuple(own), np.array([p.value for p in own.values()]), tols)
 
 
 @pytest.mark.parametrize(("strength", "off"), [(0.0, False), (3e-9, True)])

@@ -216,8 +216,8 @@ def test_events_are_looked_for_beside_one_cause_at_a_time() -> None:
         {"external_torque": {}}, 0.2, events=Events(Term("external_torque"), {}, {})
     )
     wrong = replace(hypothesis({}, 0.2), wrong=("arm.payload",))
-    assert trial.transient(Term("payload_change"), pushed) is None
-    assert trial.transient(Term("payload_change"), wrong) is None
+    assert trial.fit_events(Term("payload_change"), pushed) is None
+    assert trial.fit_events(Term("payload_change"), wrong) is None
 
 
 def with_wrong(found: Candidate, *names: str) -> Candidate:

@@ -219,10 +219,10 @@ def test_every_parameter_at_its_wall_is_freed_whatever_the_gain_of_pairs(
             {},
         )
 
-        def freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
+        def fit_freed(self, names: tuple[str, ...], baseline: object, share: object) -> None:
             asked.append(names)
 
-    assert wrong_parameters.freed(Trial(), None, None, lambda text: None) == []  # type: ignore[arg-type]
+    assert wrong_parameters.free_suspects(Trial(), None, None, lambda text: None) == []  # type: ignore[arg-type]
     # two pairs at the most, the one parameter with a predicted gain beyond a file that is wrong by
     # chance, and not the other
     assert asked == [*pairs[:2], ("muscle.modulus_scale",)]

@@ -24,7 +24,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from pamrs.channels import dotted
+from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup, calibrate
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
@@ -94,7 +94,7 @@ def _unsettled(rig: Rig) -> list[str]:
     """Parameters of what moves that the rig file marks unknown and that no fit moves."""
     moving = ("muscle", "transmission", "joint", "arm", "link", "load")
     unknown = [name for name, parameter in rig.parameters.items() if not parameter.known]
-    return [name for name in unknown if name.partition(".")[0] in moving]
+    return [name for name in unknown if channel_of(name) in moving]
 
 
 def _capped(group: BlockGroup, factor: float) -> BlockGroup:
@@ -127,9 +127,7 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     """
     tables = rig.tables("supply")
     drooping = [name for name in regulators_of(rig) if tables[name]["droop"] > 0.0]
-    regulated = [
-        b for b in problem.blocks if b.kind == "supply" and b.name.partition(".")[2] in drooping
-    ]
+    regulated = [b for b in problem.blocks if b.kind == "supply" and block_of(b.name) in drooping]
     recordings = problem.recordings
     found = {}
     noise_level = (
@@ -399,7 +397,7 @@ def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
     """Tanks in front of regulators that nobody measured, in words."""
     said = []
     for name, ports in rig.ports("supply").items():
-        inlet = ports.get("inlet", "").partition(".")[2]
+        inlet = block_of(ports.get("inlet", ""))
         table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
         gauge = dotted("supply_pressure", inlet)
         if table is not None and table["kind"] == "tank" and gauge not in channels:
@@ -488,7 +486,7 @@ def _problems(
     every_block = unjudged_blocks(rig, channels)
     without = [
         replace(block, why=f"{block.why}: its simulated pressure drives what it feeds")
-        if any(gauge == dotted("supply_pressure", block.name.partition(".")[2]) for gauge in tanks)
+        if any(gauge == dotted("supply_pressure", block_of(block.name)) for gauge in tanks)
         else block
         for block in every_block
         if block.name not in judged

@@ -102,12 +102,12 @@ def _wave(frequencies: Array, time: Array, turned: float = 0.0) -> Array:
     return np.asarray(wave / np.abs(wave).max())
 
 
-def _told(frequencies: Array) -> list[float]:
+def _rounded(frequencies: Array) -> list[float]:
     """Frequencies as they are said [Hz]."""
     return [round(float(f), 3) for f in frequencies]
 
 
-def _told_of(row: Row, span: Range, told: Callable[[float], float]) -> dict[str, Any]:
+def _rounded_levels(row: Row, span: Range, told: Callable[[float], float]) -> dict[str, Any]:
     """Levels of a row and reaches around them, as they are said."""
     level = [told(span.at(share)) for share in row.get("told", row.get("levels", ()))]
     step = row.get("step", 0.0) * (span.high - span.low) * 1e-5
@@ -314,7 +314,7 @@ class Maker:
             most = max(share for _, share in row["cycle"]) - min(s for _, s in row["cycle"])
             periods[-1] = self._period(periods[-1], most * (span.high - span.low))
         legs = _legs(row, periods)
-        facts = {**self._facts(row, chain), **_told_of(row, span, in_bar)}
+        facts = {**self._facts(row, chain), **_rounded_levels(row, span, in_bar)}
         facts |= {"periods": periods, "period": periods[-1] if periods else math.nan}
         reference = _course(legs, self._begin(chain), span, self.dt)
         reference = options.pop("reference", reference)
@@ -353,8 +353,8 @@ class Maker:
             size = row["reach"] * (span.high - span.low)
             moved = span.at(0.5) + size * _wave(frequencies, time, 2.0 * k)
             references[own.name] = begin + faded * (moved - begin)
-            used[own.name] = _told(frequencies)
-        facts = self._facts(row, chain) | _told_of(row, self._reach(chain), in_bar)
+            used[own.name] = _rounded(frequencies)
+        facts = self._facts(row, chain) | _rounded_levels(row, self._reach(chain), in_bar)
         facts |= self._levels() | {
             "frequencies": used if count > 1 else used[chain.name],
             "lowest": MULTISINE_FREQUENCIES[0],
@@ -466,7 +466,7 @@ class Maker:
         valves = sum(len(chain.valves) for chain in self.chains)
         facts = {
             **row,
-            **_told_of(row, stroke, in_mm),
+            **_rounded_levels(row, stroke, in_mm),
             "lengths": [in_mm(stroke.high), in_mm(stroke.low)],
             "held": f"{held} bar",
             "held_bar": levels if len(levels) > 1 else next(iter(levels.values())),
@@ -559,7 +559,7 @@ class Maker:
             references[chain.name] = begin + faded * (moved - begin)
         facts |= {
             "lengths": [in_mm(middle + reach), in_mm(middle - reach)],
-            "frequencies": [_told(own) for own in each],
+            "frequencies": [_rounded(own) for own in each],
             "lowest": each[0][0],
             "highest": each[-1][-1],
         }

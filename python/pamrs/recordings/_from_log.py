@@ -219,7 +219,7 @@ def recordings_of(
         if pieces is not None:
             raise RecordingError(f"{source}: pieces = {list(pieces)!r} needs split")
         made = [recording_of(name, role, channels, source, sample_time, said)]
-        return _told(made, log, channels, [])
+        return _with_remarks(made, log, channels, [])
     column = None
     if cut.column is not None:
         series = log.find(cut.column)
@@ -231,10 +231,10 @@ def recordings_of(
         for part in found
     ]
     made = [replace(each, left=tuple(left)) for each in made]
-    return _told(made, log, channels, remarks)
+    return _with_remarks(made, log, channels, remarks)
 
 
-def _told(
+def _with_remarks(
     made: list[Recording], log: Log, channels: Sequence[Sampled], remarks: Sequence[str]
 ) -> list[Recording]:
     """The recordings, the first of them with what was done to the log as it was read."""

@@ -248,11 +248,11 @@ def _joint(name: str, table: Mapping[str, Any]) -> dict[str, Any]:
         "transmission": own,
         "rest_angle": table["rest_angle"],
         **{key: table[key] for key in STOPS},
-        **_told(table, SPRING),
+        **_nonzero(table, SPRING),
     }
 
 
-def _told(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
+def _nonzero(table: Mapping[str, Any], names: tuple[str, ...]) -> dict[str, Any]:
     """What is not zero: the core takes what it is not told as zero."""
     return {name: table[name] for name in names if table.get(name, 0.0) != 0.0}
 
@@ -273,7 +273,7 @@ def _arm(model: Mapping[str, Any], ports: Ports) -> dict[str, Any] | None:
     arm = model["arm"]
     return {
         **{key: value for key, value in arm.items() if key not in _MOUNTING},
-        **_told(arm, _MOUNTING),
+        **_nonzero(arm, _MOUNTING),
         "links": [
             {"name": name, "joint": ends["joint"], **tables[name]}
             for name, ends in ports["link"].items()

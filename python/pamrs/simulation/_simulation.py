@@ -214,7 +214,7 @@ class Simulation(Mapping[str, Array]):
         """Stops that were reached or left, flows that became choked or no longer are, commands
         beyond the range of their valve, muscles that push, in the order of time.
         """
-        seen = [event for own in self._told() for event in own.events()]
+        seen = [event for own in self._happenings() for event in own.events()]
         return sorted([*self._happened, *seen], key=lambda event: event.time)
 
     def _clipped(self) -> list[_Told]:
@@ -235,7 +235,7 @@ class Simulation(Mapping[str, Array]):
                 found.append(_Told(dotted("valve", name), kinds, times, what, more))
         return found
 
-    def _told(self) -> list[_Told]:
+    def _happenings(self) -> list[_Told]:
         """What the recorded channels show to have happened."""
         return [*self._clipped(), *self._pushed()]
 
@@ -414,7 +414,7 @@ class Simulation(Mapping[str, Array]):
             said.append(
                 f"{block}: {kind.replace('_', ' ')} at {times[0]:.4g} s{_again(len(times))}"
             )
-        said += [own.words() for own in self._told()]
+        said += [own.words() for own in self._happenings()]
         return "\n".join([*said, *self._beyond(), *self._fallen(), str(self.balance)])
 
     def _beyond(self) -> list[str]:

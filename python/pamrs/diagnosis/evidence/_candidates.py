@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from pamrs.channels import channel_of
+from pamrs.channels import block_of, channel_of
 from pamrs.diagnosis.evidence._predictive import Densities, log_densities
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
@@ -51,16 +51,6 @@ from pamrs.effects import (
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
-
-__all__ = [
-    "Attempts",
-    "Candidate",
-    "BlockGroup",
-    "misses_only_held_out",
-    "significant",
-    "start_of",
-    "without_autocorrelation",
-]
 
 # share of impossible pressures behind a late gauge: slopes at smoothed edges are too large
 _EMPTIER_SHARE = 0.05
@@ -306,7 +296,7 @@ class Attempts:
         """Where another fit goes on from each effect of a hypothesis."""
         return [self.start_of(candidate.fit, effect) for effect in candidate.effects]
 
-    def transient(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
         """An effect with times of its own in every recording, held-out ones included, beside the
         effects of a candidate.
         """
@@ -317,26 +307,26 @@ class Attempts:
         stiffest = _LEAST_STEP_SHARE * self.inner.core.stable_step
         if core_rig(beside.fit.rig, self.inner.core).stable_step < stiffest:
             return None  # it would take too long
-        return self._tried((*beside.terms, effect), lambda: self._transient(effect, beside))
+        return self._attempt((*beside.terms, effect), lambda: self._fit_events(effect, beside))
 
-    def _transient(self, effect: Term, beside: Candidate) -> Candidate | None:
+    def _fit_events(self, effect: Term, beside: Candidate) -> Candidate | None:
         white = self.white
         model = with_effects_of(self.nominal, beside.fit.rig, self.held)
         found = fit_events(effect, self.inner, model, beside.fit, white)
         if found is None:
             return None
         if beside.effects:
-            found = self._beside(found, beside, white)
+            found = self._refit_around_events(found, beside, white)
         effects = (*beside.effects, effect)
         if self.same:
-            return self.judged(effects, found)
+            return self.judge(effects, found)
         bare = without_term(found.rig, effect)
         quiet = residuals(self.outer, bare)
         form = found.events.form if found.events else ""
         known = {n: found.values[f"{effect}.{n}"] for n in effect.info.form(form).shared}
         events = look_for_events(effect, self.outer, bare, quiet, white, known, form)
         if events is None:
-            return self.judged(effects, found, quiet)
+            return self.judge(effects, found, quiet)
         everywhere = replace(
             found,
             events=replace(
@@ -344,9 +334,11 @@ class Attempts:
                 values=found.events.values | events.values if found.events else events.values,
             ),
         )
-        return self.judged(effects, everywhere, residuals(self.outer, bare, events=events))
+        return self.judge(effects, everywhere, residuals(self.outer, bare, events=events))
 
-    def _beside(self, found: Fit, beside: Candidate, autocorrelation: dict[str, float]) -> Fit:
+    def _refit_around_events(
+        self, found: Fit, beside: Candidate, autocorrelation: dict[str, float]
+    ) -> Fit:
         """The persistent effects of a candidate fitted again, with the events that were found
         beside them held.
         """
@@ -375,7 +367,7 @@ class Attempts:
         """What a block keeps of some recordings."""
         return excess(block, problem.recordings, found, self.noise_level, self.settings)
 
-    def judged(
+    def judge(
         self, effects: tuple[Term, ...], found: Fit, outside: dict[Key, Residual] | None = None
     ) -> Candidate:
         """A fitted set on the held-out recordings, or on each recording as the others predict
@@ -426,7 +418,7 @@ class Attempts:
         places = places_of(self.nominal, effect, self.inner.blocks)
         return [Term(effect, at) for at in ("", *places)]
 
-    def fitted(
+    def fit_effects(
         self,
         starts: list[Start],
         warm: Fit,
@@ -451,11 +443,11 @@ class Attempts:
             if max(weights.values()) > CORRELATED_VARIANCE:
                 again = [self.start_of(best, effect) for effect in effects]
                 best = self._fit(again, weights, best, evaluations=limit, share=share)
-            return self.judged(effects, best)
+            return self.judge(effects, best)
 
-        return self._tried(effects, found)
+        return self._attempt(effects, found)
 
-    def fitted_shortly(
+    def fit_shortly(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
     ) -> Candidate | None:
         """A set of effects fitted in a few steps, beside other values of some parameters: enough to
@@ -467,11 +459,11 @@ class Attempts:
 
         def found() -> Candidate:
             short = self._fit(starts, self.white, warm, wrong=wrong, evaluations=_FIRST_EVALUATIONS)
-            return replace(self.judged(effects, short), wrong=wrong)
+            return replace(self.judge(effects, short), wrong=wrong)
 
-        return self._tried((*effects, *wrong), found)
+        return self._attempt((*effects, *wrong), found)
 
-    def _tried(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
+    def _attempt(self, terms: Iterable[object], work: Callable[[], Found]) -> Found | None:
         """What an attempt at a hypothesis gives; None where it leaves the range in which the model
         holds, or fails.
         """
@@ -517,7 +509,7 @@ class Attempts:
             raise SimulationError("a pressure behind a slow gauge is below the ambient")
         return found
 
-    def _moved_alone(self, names: tuple[str, ...]) -> Fit:
+    def _fit_alone(self, names: tuple[str, ...]) -> Fit:
         """Some parameters freed and fitted in a few steps with the others at their nominal values,
         where they belong if these are the wrong ones.
 
@@ -536,7 +528,7 @@ class Attempts:
             evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
         )
 
-    def freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
+    def fit_freed_shortly(self, names: tuple[str, ...]) -> Candidate | None:
         """The baseline with some parameters freed, a few steps from where they go alone: enough to
         see which of many are worth a whole fit.
         """
@@ -548,15 +540,15 @@ class Attempts:
                 (),
                 {},
                 self.white,
-                warm=self._moved_alone(names),
+                warm=self._fit_alone(names),
                 freed=names,
                 evaluations=_WRONG_PARAMETERS_FIRST_EVALUATIONS,
             )
-            return replace(self.judged((), short), wrong=names)
+            return replace(self.judge((), short), wrong=names)
 
-        return self._tried(names, found)
+        return self._attempt(names, found)
 
-    def freed(
+    def fit_freed(
         self, names: tuple[str, ...], baseline: Fit, share: float | None = None
     ) -> Candidate | None:
         """The baseline with some parameters freed from their tolerance, fitted to its end; None
@@ -564,7 +556,7 @@ class Attempts:
 
         It begins where these go alone; and, where that leaves more than noise, at the values that
         the baseline was moved to.
-        ``share`` is as in :meth:`fitted`.
+        ``share`` is as in :meth:`fit_effects`.
         """
         settings = self.settings
         least = FINAL_STEP_SHARE if share is None else share
@@ -583,15 +575,15 @@ class Attempts:
             )
 
         def found(alone: bool) -> Candidate:
-            first = fitted(self.white, self._moved_alone(names) if alone else baseline)
+            first = fitted(self.white, self._fit_alone(names) if alone else baseline)
             autocorrelation = self.autocorrelation(first)
             correlated = max(autocorrelation.values()) > CORRELATED_VARIANCE
-            judged = self.judged((), fitted(autocorrelation, first) if correlated else first)
+            judged = self.judge((), fitted(autocorrelation, first) if correlated else first)
             return replace(judged, wrong=names)
 
         best: Candidate | None = None
         for alone in (True, False):
-            judged = self._tried(names, partial(found, alone))
+            judged = self._attempt(names, partial(found, alone))
             if judged is None:
                 continue
             if best is None or judged.misfit < best.misfit:
@@ -600,7 +592,7 @@ class Attempts:
                 break
         return best
 
-    def together(
+    def fit_together(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...] = ()
     ) -> Candidate | None:
         """A set of effects, each from a start, beside other values of some parameters, which are
@@ -608,34 +600,35 @@ class Attempts:
         tolerances.
         """
         if not wrong:
-            return self.fitted(starts, warm, self.white)
+            return self.fit_effects(starts, warm, self.white)
         limit = self.settings.effect_evaluations
         names = (*(start.effect for start in starts), *wrong)
-        found = self._tried(names, lambda: self._gone_on(starts, warm, wrong, limit))
+        found = self._attempt(names, lambda: self._continue(starts, warm, wrong, limit))
         if found is None or not found.is_wrong(self.settings.most_tolerances):
             return None
         return found
 
-    def without(self, larger: Candidate, needless: Term) -> Candidate | None:
+    def fit_without(self, larger: Candidate, needless: Term) -> Candidate | None:
         """A set of persistent effects and wrong parameters without one of its terms, fitted to its
         end from where the whole set stands; None where that cannot be run.
         """
         starts = [self.start_of(larger.fit, e) for e in larger.effects if e != needless]
         wrong = tuple(name for name in larger.wrong if Term(name) != needless)
-        return self._to_its_end(starts, larger.fit, wrong)
+        return self._fit_to_the_end(starts, larger.fit, wrong)
 
-    def _to_its_end(
+    def _fit_to_the_end(
         self, starts: list[Start], warm: Fit, wrong: tuple[str, ...]
     ) -> Candidate | None:
         """Effects fitted to the end from a fit, with some parameters freed; None where that cannot
         be run.
         """
         names = (*(start.effect for start in starts), *wrong)
-        return self._tried(
-            names, lambda: self._gone_on(starts, warm, wrong, _POLISH_EVALUATIONS, FINAL_STEP_SHARE)
+        return self._attempt(
+            names,
+            lambda: self._continue(starts, warm, wrong, _POLISH_EVALUATIONS, FINAL_STEP_SHARE),
         )
 
-    def _gone_on(
+    def _continue(
         self,
         starts: list[Start],
         warm: Fit,
@@ -654,7 +647,7 @@ class Attempts:
             if not self._lighter(left, weights):
                 break
             weights, starts = left, [self.start_of(found, effect) for effect in effects]
-        return replace(self.judged(effects, found), wrong=wrong)
+        return replace(self.judge(effects, found), wrong=wrong)
 
     def _lighter(self, left: dict[str, float], weights: dict[str, float]) -> bool:
         """Whether a fit leaves so much less autocorrelation than it was weighted by that it ended
@@ -662,7 +655,7 @@ class Attempts:
         """
         return any(CORRELATED_VARIANCE * now < weights[block] for block, now in left.items())
 
-    def united(self, candidates: list[Candidate]) -> Fit | None:
+    def fit_united(self, candidates: list[Candidate]) -> Fit | None:
         """One fit with everything that some hypotheses name, each for a block of its own; None
         where it cannot be run.
         """
@@ -676,11 +669,11 @@ class Attempts:
             | {n: c.fit.values[n] for c in candidates for n in c.wrong},
         )
         names = (*(start.effect for start in starts), *wrong)
-        return self._tried(
+        return self._attempt(
             names, lambda: self._fit(starts, self.white, warm, wrong=wrong, share=FINAL_STEP_SHARE)
         )
 
-    def polished(self, candidate: Candidate) -> Candidate:
+    def polish(self, candidate: Candidate) -> Candidate:
         """A fitted set of persistent effects, fitted to its end.
 
         The first fit ends where little is to be gained; of sets that nearly say the same the one
@@ -689,7 +682,7 @@ class Attempts:
         found = candidate.fit
         if found.events is not None or not candidate.effects:
             return candidate
-        polished = self._to_its_end(self.starts_of(candidate), found, candidate.wrong)
+        polished = self._fit_to_the_end(self.starts_of(candidate), found, candidate.wrong)
         if polished is None:
             return candidate
         return replace(polished, gain=candidate.gain, forms_tried=candidate.forms_tried)
@@ -776,7 +769,7 @@ def _emptier_than_empty(problem: Problem, found: Fit) -> bool:
         lag = entry["parameters"]["time_constant"]
         for prepared in problem.recordings:
             for name, (value, slope) in prepared.signals.items():
-                block = name.partition(".")[2]
+                block = block_of(name)
                 if channel_of(name) != "muscle_pressure":
                     continue
                 rows = prepared.recording.mask[name]

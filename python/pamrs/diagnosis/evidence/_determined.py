@@ -11,8 +11,6 @@ from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate
 from pamrs.diagnosis.fit import Problem, form_in, spread_over_pieces
 from pamrs.effects import UNDECIDED, UNLISTED, Hypothesis, Term
 
-__all__ = ["drop_undetermined", "put_aside", "with_stated_std", "undetermined_effects"]
-
 # stated deviations within which a size is not determined; a stated one is twice the pieces'
 _DETERMINED_STDS = 1.0
 

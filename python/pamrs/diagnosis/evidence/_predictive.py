@@ -19,8 +19,6 @@ from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
-__all__ = ["Densities", "bootstrapped", "log_densities"]
-
 # order of the autoregression of what a hypothesis leaves (decision 14: 1, 2, 4 and 8 do alike)
 _PREDICTIVE_ORDER = 4
 # [s] stretches drawn, longer than a joint's start; 3 and 6 s do alike (decision 14)

@@ -26,17 +26,6 @@ from pamrs.effects import (
     effect_of,
 )
 
-__all__ = [
-    "WALL_TOLERANCES",
-    "Judged",
-    "calibrate",
-    "case_ambiguity",
-    "case_probabilities",
-    "case_verdict",
-    "judge",
-    "parameters_at_wall",
-]
-
 _HEALTHY = (NONE, PARAMETERS)  # hypotheses of which nothing is missing
 # odds of one effect that acts in two groups of blocks to two effects (decision 4)
 _SHARED_ODDS = 6.0

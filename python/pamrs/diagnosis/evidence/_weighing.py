@@ -27,26 +27,6 @@ from pamrs.effects import (
     usual_values,
 )
 
-__all__ = [
-    "FORM_SHARE_ALIKE",
-    "STANDING_PRICE",
-    "Weighing",
-    "capped_probability",
-    "explains",
-    "log_weight",
-    "price_of_term",
-    "penalty",
-    "price",
-    "probability_cap",
-    "possible_gain",
-    "same_recordings",
-    "share_left",
-    "lacks_drift",
-    "loss_by_values",
-    "visited_ranges",
-    "weigh",
-]
-
 # log odds of explained variance, as probable as unlisted: a name carries half (decision 14)
 _LOG_ODDS_EXPLAINED = 0.0
 # the same of what takes up much of anything, 7 % left: events, parameters (decision 14)

@@ -67,8 +67,6 @@ from pamrs.report.verdict import unknown_volumes
 from pamrs.report.verdict import verdict as verdict_in_words
 from pamrs.rig import Rig
 
-__all__ = ["assemble"]
-
 # [noise levels] gap of refit to noise below which nothing is said of how much closes
 _LEAST_GAP = 0.05
 # [tolerances] standard deviation below which a parameter counts as determined by the recordings

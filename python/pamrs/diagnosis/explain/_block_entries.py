@@ -26,8 +26,6 @@ from pamrs.findings import (
 )
 from pamrs.rig import Rig
 
-__all__ = ["block_entries", "not_judged", "unexplained"]
-
 Stages = dict[str, dict[Key, Residual]]
 
 

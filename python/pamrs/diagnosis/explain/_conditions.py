@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, binned
 from pamrs.findings import Condition, ConditionMap
 from pamrs.rig import Rig
 from pamrs.units import with_unit
-
-__all__ = ["Picture", "describe"]
 
 Array = NDArray[np.float64]
 _MAP_CELLS = 8
@@ -54,7 +52,7 @@ def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
 
 def _named(quantity: str, channel: str, unit: str) -> str:
     """A condition's label: ``muscle pressure of flexor [bar]``."""
-    name = channel.partition(".")[2]
+    name = block_of(channel)
     return with_unit(f"{quantity} of {name}" if name else quantity, f"[{unit}]" if unit else "")
 
 

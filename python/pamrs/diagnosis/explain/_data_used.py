@@ -21,8 +21,6 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
-__all__ = ["data_used"]
-
 _WITHOUT_ENERGY = (
     'the gas of {chamber} has no temperature of its own: write gas = "energy_balance" and '
     "heat_transfer_coefficient into [{chamber}] to have it judged. That of the room is "

@@ -16,9 +16,6 @@ from pamrs.errors import DiagnosisError
 from pamrs.findings import Form
 from pamrs.simulation import core_rig, default_step
 
-__all__ = ["forms_of"]
-
-
 Array = NDArray[np.float64]
 
 

@@ -16,8 +16,6 @@ from pamrs.findings import ChannelError, FitErrors, Misread, NextExperiment, Whe
 from pamrs.recordings import Case
 from pamrs.report.units import misread_advice, misread_sentence
 
-__all__ = ["misread_diagnosis"]
-
 
 def misread_diagnosis(
     case: Case,

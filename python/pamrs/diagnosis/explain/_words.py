@@ -20,14 +20,6 @@ from pamrs.report.text import (
 )
 from pamrs.report.verdict import unknown_volumes
 
-__all__ = [
-    "absolute",
-    "reservations",
-    "warnings",
-    "where",
-    "worse",
-]
-
 # [noise levels] error of a model with a name from which it is reported with a reservation
 _MISSED_NOISES = 3.0
 _MOVED_TOLERANCES = 2.0  # [tolerances] movement of a parameter beside an effect from which it is

@@ -11,8 +11,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rig.schema import ACTS, kind_of, split_name
 
-__all__ = ["acts_in", "concerns", "core_names", "depends", "fits", "places_of", "same_data_in"]
-
 _CHANNELS = {
     "supply": ("supply_pressure", "supply_command"),
     "valve": ("valve_command",),

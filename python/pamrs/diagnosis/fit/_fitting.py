@@ -28,24 +28,6 @@ from pamrs.errors import ParameterError, RigError, SimulationError
 from pamrs.rig import Parameter, Rig
 from pamrs.simulation import core_rig, default_step
 
-__all__ = [
-    "FINAL_STEP_SHARE",
-    "LEAST_START",
-    "FIT_BIN_TIME",
-    "Events",
-    "Fit",
-    "Problem",
-    "Scaling",
-    "Stopped",
-    "changes",
-    "fit",
-    "predicted_with_doubt",
-    "residuals",
-    "stacked",
-    "two_at_a_time",
-    "with_priors",
-]
-
 # multiple of its nominal value, or of other walls, for a freed parameter (decision 25)
 _FREED_MULTIPLE = 10.0
 # share of an effect parameter's usual start that its scale in a fit has at the least

@@ -11,8 +11,6 @@ from pamrs.diagnosis.fit._starts import CHOSEN
 from pamrs.effects import CATALOGUE, EFFECTS, Form
 from pamrs.rig import Parameter, Rig, named_entries
 
-__all__ = ["holdable", "known_parameters", "with_known", "without_passing"]
-
 # least tolerance of a held effect: its deviation came of a lacking model (decision 34)
 _HELD_SHARE = 0.3
 

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from pamrs.errors import SimulationError
 
-__all__ = ["levenberg_marquardt"]
-
 # [chi-square] predicted gain of a step below which a fit ends: noise makes as much (decision 14)
 _STEP_GAIN = 0.2
 _STEP_SHARE = 2e-3  # the same in a first fit, as a share of the sum of squares (decision 14)

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["lines_of"]
-
 Array = NDArray[np.float64]
 
 

@@ -15,14 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs.channels import channel_of
 from pamrs.diagnosis.fit._fitting import Problem, fit, free_baseline, residuals
 from pamrs.diagnosis.fit._held import known_parameters
 from pamrs.diagnosis.prepare import Block, Prepared, change
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
-
-__all__ = ["with_offsets"]
 
 # deviations from none of a command's offset that is applied: each of a few recordings is asked
 _OFFSET_STDS = 4.0
@@ -139,7 +138,7 @@ def _missed(problem: Problem, rig: Rig) -> list[tuple[float, int]]:
 
 def _commanded(block: Block) -> bool:
     """Whether a command drives a block."""
-    return any(name.partition(".")[0].endswith("_command") for name in block.drives)
+    return any(channel_of(name).endswith("_command") for name in block.drives)
 
 
 def _changes(prepared: Prepared) -> Rows:

@@ -19,8 +19,6 @@ from pamrs.effects import EffectParameter, Term
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["Shaken"]
-
 # lines of the spectrum tried for a vibration: two that shake, and what the drive leaves
 _MOST_LINES = 5
 

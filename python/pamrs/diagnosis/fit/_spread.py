@@ -9,8 +9,6 @@ from scipy.stats import norm, t
 from pamrs.diagnosis.fit._fitting import FIT_BIN_TIME, Fit, Key, Problem, bin_width, stacked
 from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["PIECE_TIME", "pieces_of", "pieces_spread", "spread_over_pieces"]
-
 # [s] pieces that count as looks: longer than wrong residuals stay alike; arm windows are 2.5 s
 PIECE_TIME = 5.0
 

@@ -13,17 +13,6 @@ from typing import Any
 from pamrs.effects import Form, Term
 from pamrs.rig import Rig
 
-__all__ = [
-    "CHOSEN",
-    "Start",
-    "entry_of",
-    "form_in",
-    "starts_of",
-    "with_effects_of",
-    "with_entry",
-    "without_term",
-]
-
 CHOSEN = ("choice", "side")
 """Roles of parameters that are tried at both ends of their range and not fitted."""
 _TRIED = ("shape", "place", "threshold", "time", "duration")

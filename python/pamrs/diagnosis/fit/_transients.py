@@ -39,8 +39,6 @@ from pamrs.effects import EffectParameter, Term, find_parameter
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["events_of", "fit_events", "look_for_events"]
-
 _SPACING = 0.5  # [s] distance of the times that are tried
 _FIRST_TIME = 0.25  # [s] first time that is tried
 _LAST_TIME = 0.5  # [s] time before the end of the recording from which none is tried

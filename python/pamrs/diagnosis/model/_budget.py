@@ -35,8 +35,6 @@ from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm, EffectParameterFound
 from pamrs.rig import Parameter, Rig
 
-__all__ = ["budget"]
-
 # weightings of pieces for a share's interval: ten of them lie beyond each 95 % end
 _BUDGET_DRAWS = 400
 
@@ -358,15 +356,15 @@ class _Shares:
         take.
         """
         if k < self._first:
-            return self._told(self._kept[k] - self._kept[k + 1])
+            return self._with_interval(self._kept[k] - self._kept[k + 1])
         taken = self._kept[self._first] - self._kept[-1]
-        return self._told(taken * self._parts[k - self._first])
+        return self._with_interval(taken * self._parts[k - self._first])
 
     def unexplained(self) -> tuple[float, list[float]]:
         """Share of what no term takes."""
-        return self._told(self._kept[-1])
+        return self._with_interval(self._kept[-1])
 
-    def _told(self, taken: Array) -> tuple[float, list[float]]:
+    def _with_interval(self, taken: Array) -> tuple[float, list[float]]:
         shares = taken / self._whole
         low, high = np.quantile(shares[1:], [0.025, 0.975])
         return float(shares[0]), [float(low), float(high)]

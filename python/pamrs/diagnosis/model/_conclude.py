@@ -46,7 +46,7 @@ from pamrs.diagnosis.fit import (
     without_term,
 )
 from pamrs.diagnosis.model._budget import budget
-from pamrs.diagnosis.model._free_run import Known, free_run
+from pamrs.diagnosis.model._free_run import KnownValues, free_run
 from pamrs.diagnosis.model._owners import owners_of_effects, owners_of_parameters
 from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
@@ -54,8 +54,6 @@ from pamrs.effects import CATALOGUE, NONE, PARAMETERS, Hypothesis, Term
 from pamrs.errors import SimulationError
 from pamrs.findings import BudgetTerm, ChannelError, FreeRun, channels_off
 from pamrs.rig import Rig
-
-__all__ = ["Conclusion", "Models", "conclude", "spoiled_channels", "with_std"]
 
 # [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
 _ZERO_DIFFERENCE = 0.1
@@ -289,7 +287,7 @@ def _models(nominal: Rig, fitted: Problem, judged: list[Judged], verdict: str) -
     return Models(judged, starts, chosen, owners, nominal, baseline, final, verdict)
 
 
-def _known(models: Models) -> Known:
+def _known(models: Models) -> KnownValues:
     """What is known of the values of the final model: as they were fitted, with what goes together,
     and of others what the rig file says.
     """
@@ -309,7 +307,7 @@ def _known(models: Models) -> Known:
     rest = [n for n in of_file if n not in names and math.isfinite(of_file[n].tol)]
     parts.append(np.diag([of_file[n].tol for n in rest]))
     values += [of_file[n].value for n in rest]
-    return Known((*names, *rest), np.array(values), block_diag(*parts))
+    return KnownValues((*names, *rest), np.array(values), block_diag(*parts))
 
 
 def _model_of(judged: Judged, start: Candidate) -> Candidate:

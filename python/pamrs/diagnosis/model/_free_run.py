@@ -25,8 +25,6 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig, differences, replay
 
-__all__ = ["Known", "free_run", "said_of_constants"]
-
 # times more than its block that the whole rig misses of a freed constant before that is said
 _FAR_ALONE = 5.0
 # [noise levels] missed from commands alone from which nothing is settled; true models miss one
@@ -48,7 +46,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class KnownValues:
     """What is known of the values of a rig.
 
     Attributes
@@ -81,7 +79,7 @@ def free_run(
     nominal: Rig,
     final: Rig,
     events: Events | None,
-    known: Known | None = None,
+    known: KnownValues | None = None,
 ) -> tuple[list[FreeRun] | None, str]:
     """Errors of free-running simulations of every recording.
 
@@ -100,7 +98,7 @@ def free_run(
         The model of the rig file, and the one with what was found.
     events : Events or None
         What happened in single recordings, in the place of what `final` says.
-    known : Known, optional
+    known : KnownValues, optional
         What is known of the values of `final`; without it no channel is said to be off.
 
     Returns
@@ -168,7 +166,7 @@ def _judged(
     run: FreeRun,
     prepared: Prepared,
     final: Rig,
-    known: Known | None,
+    known: KnownValues | None,
 ) -> FreeRun:
     """A free run with what it misses by more than noise and what is known of the values explain."""
     doubtful = [
@@ -189,7 +187,9 @@ def _judged(
     return replace(run, channels=channels, note=note)
 
 
-def _left(prepared: Prepared, logged: Recording, final: Rig, known: Known) -> dict[str, float]:
+def _left(
+    prepared: Prepared, logged: Recording, final: Rig, known: KnownValues
+) -> dict[str, float]:
     """What a free run misses of each channel [noise levels], at the least, where the values of the
     rig are as far from what is known of them as is likely, its commands come up to a sample earlier
     or later, and its gases begin warmer or colder.

@@ -7,8 +7,6 @@ import math
 from pamrs.diagnosis.evidence import Candidate
 from pamrs.effects import Term, effect_of, find_parameter
 
-__all__ = ["owners_of_effects", "owners_of_parameters"]
-
 
 def owners_of_parameters(candidates: list[Candidate]) -> dict[str, int]:
     """The group that tells most of each parameter that several have (sensors' zeros): the one with

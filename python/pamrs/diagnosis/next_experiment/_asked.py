@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from pamrs.channels import block_of
 from pamrs.diagnosis.evidence import Judged
 from pamrs.diagnosis.fit import Problem, concerns, without_term
 from pamrs.diagnosis.next_experiment._choice import Modelled, apart, outcome_of, propose, spoken
@@ -34,8 +35,6 @@ from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import has_frame, regulators_of
-
-__all__ = ["next_to_record"]
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def _joining(block: Block, rig: Rig) -> list[str]:
     """Names of the chambers between which air blows over where nobody sends a command, that of the
     block first; none where no line joins its chamber to another one.
     """
-    own = block.channel.partition(".")[2]
+    own = block_of(block.channel)
     if own in rig.tables("chamber"):
         reached = joined(rig, qualified("chamber", own))
         return [own, *reached] if reached else []

@@ -47,17 +47,6 @@ from pamrs.report.text import spoken_name
 from pamrs.rig import Rig
 from pamrs.simulation import Simulation, core_rig, reading
 
-__all__ = [
-    "Outcome",
-    "apart",
-    "entropy",
-    "information",
-    "outcome_of",
-    "propose",
-    "ranked",
-    "spoken",
-]
-
 _LEAST_PROBABILITY = 0.01  # probability below which a given hypothesis is not simulated
 # hypotheses that are simulated, the most probable ones (every pair is compared)
 _MOST_HYPOTHESES = 6

@@ -37,24 +37,6 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig, named_entries
 from pamrs.simulation import Simulation, core_rig, has_frame, reading
 
-__all__ = [
-    "Left",
-    "Linear",
-    "bins_of_fit",
-    "checked_channels",
-    "counted",
-    "difference",
-    "judged_alike",
-    "linear",
-    "measurable",
-    "misfit",
-    "noise_of",
-    "problem_of",
-    "taken",
-    "usual_noise",
-    "weights_of",
-]
-
 # realisations of the drives' noise for an experiment's noise level: a fifth is enough
 _REPLICATES = 4
 # relative standard deviation of an effect's parameter of which a model says none

@@ -10,8 +10,6 @@ from typing import Any
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.errors import ParameterError
 
-__all__ = ["Addition", "Plan", "Sight"]
-
 
 @dataclass(frozen=True)
 class Sight:

@@ -58,8 +58,6 @@ from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
 
-__all__ = ["plan_diagnosis"]
-
 # [noise levels] from which an arm, which scatters most, is suspect (decision 14)
 _SUSPECT_FROM = math.sqrt(0.45)
 # cosine of two signatures from which their effects are one (isolability as in Ding (2013))

@@ -7,8 +7,6 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
-__all__ = ["words"]
-
 
 @cache
 def words(table: str) -> dict[str, Any]:

@@ -8,8 +8,6 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.fit import Key, bin_width
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
-__all__ = ["CORRELATED_VARIANCE", "correlation_time", "inflated", "inflation"]
-
 # variance times autocorrelation time of residuals that weights a fit again (decision 20)
 CORRELATED_VARIANCE = 2.0
 

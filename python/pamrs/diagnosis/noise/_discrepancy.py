@@ -10,11 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of, with_trait
+from pamrs.channels import block_of, channel_of, with_trait
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
-
-__all__ = ["Stated", "curves", "visited", "whitening"]
 
 # waves of a stated error: a shift, one to fifteen half periods over the visited (decision 95)
 _CURVE_WAVES = 16
@@ -22,7 +20,7 @@ _CURVE_WAVES = 16
 
 Array = NDArray[np.float64]
 Stated = Mapping[str, Mapping[str, float]]
-Ranges = Mapping[str, tuple[float, float]]
+OperatingRanges = Mapping[str, tuple[float, float]]
 """Least value and width of what was visited, by channel [SI]."""
 
 _FLOWS = {"supply": ("supply", "line"), "chamber": ("line", "chamber")}
@@ -35,7 +33,7 @@ _MOTION = ("joint_angle", "length")
 _COMMANDS = with_trait("driven")
 
 
-def visited(block: Block, recordings: list[Prepared]) -> Ranges:
+def operating_ranges(block: Block, recordings: list[Prepared]) -> OperatingRanges:
     """What all recordings visit of each signal at a block."""
     found = {}
     for name in (block.channel, *block.drives):
@@ -51,7 +49,7 @@ def curves(
     core: _core.Rig,
     base: Residual,
     prepared: Prepared,
-    ranges: Ranges,
+    ranges: OperatingRanges,
     stated: Stated,
     width: int,
 ) -> Array | None:
@@ -126,7 +124,7 @@ def _signal(prepared: Prepared, name: str) -> Array | None:
     return prepared.commands.get(name)
 
 
-def _size(stated: Stated, name: str, ranges: Ranges) -> float:
+def _size(stated: Stated, name: str, ranges: OperatingRanges) -> float:
     """Stated error of a reading [SI]; a share is one of what was visited."""
     if name not in ranges:
         return 0.0
@@ -138,15 +136,15 @@ def _shares(stated: Stated, kinds: tuple[str, ...], own: str | None = None) -> f
     """The shares of some kinds of block together; of those with a name those called `own` alone."""
     there = [n for n in stated if channel_of(n) in kinds]
     if own is not None:
-        there = [n for n in there if n.partition(".")[2] in ("", own)]
+        there = [n for n in there if block_of(n) in ("", own)]
     return math.hypot(*(stated[n].get("share", 0.0) for n in there))
 
 
-def _flow_errors(block: Block, ranges: Ranges, stated: Stated) -> list[tuple[str, float]]:
+def _flow_errors(block: Block, ranges: OperatingRanges, stated: Stated) -> list[tuple[str, float]]:
     """Over what an error of the flow into a block is a curve, and its share."""
     if block.kind not in _FLOWS or block.channel not in ranges:
         return []
-    own = block.channel.partition(".")[2]
+    own = block_of(block.channel)
     command = next((n for n in block.drives if channel_of(n) in _COMMANDS and n in ranges), None)
     found = [
         (block.channel, _shares(stated, _FLOWS[block.kind], own)),
@@ -156,7 +154,7 @@ def _flow_errors(block: Block, ranges: Ranges, stated: Stated) -> list[tuple[str
 
 
 def _drive_errors(
-    block: Block, prepared: Prepared, ranges: Ranges, stated: Stated
+    block: Block, prepared: Prepared, ranges: OperatingRanges, stated: Stated
 ) -> list[tuple[str, str, Array]]:
     """Which drive is off, over what its error is a curve, and how much [SI]: the reading itself,
     and the force that a pressure stands for.

@@ -17,12 +17,10 @@ from scipy.stats import chi2, t
 from pamrs import _core
 from pamrs.diagnosis.fit import FIT_BIN_TIME, PIECE_TIME, Key, Problem, bin_width
 from pamrs.diagnosis.noise._autocorrelation import inflated
-from pamrs.diagnosis.noise._discrepancy import Stated, curves, visited, whitening
+from pamrs.diagnosis.noise._discrepancy import Stated, curves, operating_ranges, whitening
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change, residual, smoothed
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import SimulationError
-
-__all__ = ["Excess", "NoiseLevel", "bins_of", "excess", "noise_levels"]
 
 _BIN_TIME = 0.1  # [s] bins of residuals against noise: what is missing is slower (decision 14)
 _LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
@@ -128,7 +126,7 @@ def noise_levels(
     """
     found: dict[Key, NoiseLevel] = {}
     settings, known = problem.settings, stated or {}
-    ranges = {b.name: visited(b, problem.recordings) for b in problem.blocks if known}
+    ranges = {b.name: operating_ranges(b, problem.recordings) for b in problem.blocks if known}
     for prepared in problem.recordings:
         seed = [settings.seed, crc32(prepared.recording.name.encode())]
         rng, white_noise = np.random.default_rng(seed), np.random.default_rng([*seed, 1])

@@ -12,8 +12,6 @@ from pamrs.errors import DiagnosisError, ParameterError
 from pamrs.recordings import Recording
 from pamrs.rig import Parameter, Rig
 
-__all__ = ["AMBIENT", "AMBIENT_PRESSURE", "at_ambient"]
-
 # [tolerances] of a room from that of the rig file, from which it may be another one
 _ROOM_TOLERANCES = 3.0
 # [K] between recordings' rooms, taken for one: it moves a valve's flow by one percent

@@ -15,8 +15,6 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.recordings import Recording
 
-__all__ = ["averaged", "averaged_to_need"]
-
 # [s] sample time that is needed where every block is a sealed chamber, which hardly moves
 _NEEDED_SEALED_SAMPLE_TIME = 0.1
 

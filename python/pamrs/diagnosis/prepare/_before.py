@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from pamrs.channels import channel_of, with_trait
 from pamrs.diagnosis.prepare._signals import Prepared
 
-__all__ = ["Before"]
-
 # [Pa] how far a pressure is followed back to before a recording: a rate at its edge is uncertain
 _MOST_MOVED = 2e4
 

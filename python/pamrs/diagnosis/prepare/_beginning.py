@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import dotted
+from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._blocks import (
     WINDOW_SAMPLES_PER_STATE,
@@ -31,8 +31,6 @@ from pamrs.diagnosis.prepare._blocks import (
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig.schema import qualified
-
-__all__ = ["begun_alike", "said_of_beginnings"]
 
 # Newton steps, of one number, to the temperature at which a gas begins that is not at rest
 _BEGUN_STEPS = 6
@@ -189,7 +187,7 @@ class _Beginnings:
         """What it makes that regulators begin at what they are set to."""
         prepared = self.prepared
         outlets = {
-            qualified("supply", name.partition(".")[2]): max(0.0, float(prepared.held[name][0]))
+            qualified("supply", block_of(name)): max(0.0, float(prepared.held[name][0]))
             for name in _set(block)
         }
         try:
@@ -271,14 +269,14 @@ class _Beginnings:
 
 def _set(block: Block) -> list[str]:
     """Commands of the regulators that a block is driven by."""
-    return [name for name in block.drives if name.partition(".")[0] == "supply_command"]
+    return [name for name in block.drives if channel_of(name) == "supply_command"]
 
 
 def _unmeasured(block: Block) -> str:
     """What nobody measured in a block, in words, and what would tell it."""
     told = []
     if _set(block) and block.beside:
-        gauges = [dotted("supply_pressure", name.partition(".")[2]) for name in _set(block)]
+        gauges = [dotted("supply_pressure", block_of(name)) for name in _set(block)]
         told.append(
             "they show where the regulator began, and nobody measured that (a gauge for "
             f"{' or '.join(gauges)} would)"

@@ -13,26 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.channels import channel_of, dotted
+from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.prepare._before import Before
 from pamrs.diagnosis.prepare._signals import DRIVES, Prepared, pulls_of, thermometers_of
 from pamrs.effects import CLOSURE_OF
 from pamrs.rig import Rig
 from pamrs.rig.schema import keys_of, qualified
 from pamrs.simulation import default_step
-
-__all__ = [
-    "Before",
-    "Block",
-    "Residual",
-    "Tube",
-    "Unjudged",
-    "available_blocks",
-    "change",
-    "predicted",
-    "residual",
-    "unjudged_blocks",
-]
 
 # [s] a joint's windows: its start has faded, a wrong break-away spoils no more (decision 14)
 _ARM_WINDOW = 2.5
@@ -128,7 +115,7 @@ class Block:
         ``arm`` (of a hanging load too) or ``pull`` (what the muscles put on a joint or a load): its
         name without that of the tank, chamber or joint.
         """
-        kind = self.name.partition(".")[0]
+        kind = channel_of(self.name)
         alike = {"line": "chamber", "load": "arm", "force": "pull", "torque": "pull"}
         return alike.get(kind, kind)
 
@@ -137,7 +124,7 @@ class Block:
         """The sum of terms that can stand for what is missing in it; None where the simulator has
         none: at a load, at a force, at a temperature and in front of a line.
         """
-        named = self.name.partition(".")[0]
+        named = channel_of(self.name)
         return None if named in ("load", "line") else CLOSURE_OF.get(self.kind)
 
     @property
@@ -230,10 +217,10 @@ class _Map:
             else tuple(dotted("joint_angle", name) for name in rig.tables("joint"))
         )
         self.pulling = {
-            name: ends["chamber"].partition(".")[2] for name, ends in rig.ports("muscle").items()
+            name: block_of(ends["chamber"]) for name, ends in rig.ports("muscle").items()
         }
         self.joint_of = {
-            name: ends["joint"].partition(".")[2] for name, ends in rig.ports("muscle").items()
+            name: block_of(ends["joint"]) for name, ends in rig.ports("muscle").items()
         }
 
     def pressure(self, block: str) -> str:
@@ -269,7 +256,7 @@ class _Map:
         says what it is.
         """
         ends = dict.fromkeys(end for way in self.around(block) for end in way.ends)
-        return [end.partition(".")[2] for end in ends if self._unread(end, "regulator")]
+        return [block_of(end) for end in ends if self._unread(end, "regulator")]
 
     def behind(self, supply: str) -> list[str]:
         """Names of the regulators whose inlet a supply is: what they let through is drawn from
@@ -368,9 +355,9 @@ class _Map:
         simulated = [e for e in ends if e == block or self._unread(e, "regulator")]
         supplies = self.rig.ports("supply")
         inlets = [
-            supplies.get(e.partition(".")[2], {}).get("inlet", "")
+            supplies.get(block_of(e), {}).get("inlet", "")
             for e in simulated
-            if e.partition(".")[0] == "supply"
+            if channel_of(e) == "supply"
         ]
         return ends | {inlet for inlet in inlets if inlet}
 
@@ -458,7 +445,7 @@ class _Map:
             *self.commands(full),
             *(dotted("supply_command", supply) for supply in unread),
             *(channel for supply in unread for channel in self.in_front(supply)),
-            *(a for a in self.angles if a.partition(".")[2] in joints),
+            *(a for a in self.angles if block_of(a) in joints),
         )
         if lacking := self.lacking(full, covers, (self.pressure(full), *drives, *self.angles)):
             return lacking
@@ -499,7 +486,7 @@ class _Map:
         """
         if isinstance(chamber, Unjudged) or not chamber.thermometer:
             return None
-        name = chamber.name.partition(".")[2]
+        name = block_of(chamber.name)
         return replace(
             chamber,
             name=dotted("temperature", name),

@@ -21,8 +21,6 @@ from scipy.ndimage import uniform_filter1d
 from pamrs.channels import channel_of
 from pamrs.recordings import Recording
 
-__all__ = ["Alignment", "Channels", "Told", "is_set", "told"]
-
 # correlation of noise in chance deviations: repetitions reach 5.3, copies 9.2 (decision 111)
 _LEAST_PEAK = 6.5
 # the correlation itself: corners of a command leave 0.15, a noisy copy 0.3 (decision 111)

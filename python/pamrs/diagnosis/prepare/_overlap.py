@@ -24,8 +24,6 @@ from pamrs.diagnosis.prepare._deviations import (
 )
 from pamrs.recordings import Recording
 
-__all__ = ["Overlap", "overlap", "without_copies"]
-
 _COPY_SHARE = 0.5  # share of a recording that is in another one of its role before it is left out
 # [s] between what is shared and what is kept: within it a joint's past fades (decision 111)
 _GAP = 2.5

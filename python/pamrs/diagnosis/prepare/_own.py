@@ -20,8 +20,6 @@ from pamrs.report.text import format_number
 from pamrs.rig import Rig, effect_parameter
 from pamrs.rig.schema import qualified
 
-__all__ = ["own_of_rig", "said_of_own", "varying", "with_own_values"]
-
 # steps to find a recording's own value, each at most a factor 3: 3 orders and a few to settle
 _OWN_STEPS = 12
 _OWN_APART = 1.5  # ratio of such values between recordings from which it is said

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs._stretches import stretches
-from pamrs.channels import channel_of, dotted, with_trait
+from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.prepare._blocks import Block, predicted
 from pamrs.diagnosis.prepare._signals import Prepared, moves_by_gauges
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -28,14 +28,6 @@ from pamrs.errors import DiagnosisError, SimulationError, joined
 from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
-
-__all__ = [
-    "check_plausible",
-    "check_sense",
-    "implausible",
-    "without_dead_commands",
-    "without_impossible",
-]
 
 # [Pa] gauge pressure that a channel exceeds somewhere: bar under a heading in Pa does not
 _LEAST_PRESSURE = 100.0
@@ -196,7 +188,7 @@ def without_impossible(
             if channel_of(name) in (*_PRESSURES, "supply_command"):
                 low, high = _LEAST_GAUGE_PRESSURE, settings.most_pressure
             bad = mask[name] & ((channels[name] < low) | (channels[name] > high))
-            table = rig.tables("valve").get(name.partition(".")[2])
+            table = rig.tables("valve").get(block_of(name))
             if channel_of(name) == "valve_command" and table is not None:
                 bad, low, high = _lost(channels[name], mask[name], table, settings)
             if bad.any():
@@ -306,9 +298,7 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
         elif name in rated:
             size, command = rated[name]
             source = f"the largest {command} is" if command else "the rig file has"
-            low_end = _SUPPLY_LEAST_SHARE * min(
-                size, _in_front(recording, rig, name.partition(".")[2])
-            )
+            low_end = _SUPPLY_LEAST_SHARE * min(size, _in_front(recording, rig, block_of(name)))
             if size > 0.0 and not low_end <= high <= _SUPPLY_MOST_SHARE * size:
                 yield (
                     f"{name} is at most {high:.3g} Pa and {source} {size:.3g} Pa; "
@@ -319,7 +309,7 @@ def _pressures(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> I
 
 def _inlet_of(rig: Rig, supply: str) -> str:
     """Name of the supply in front of a regulator, empty where there is none."""
-    return rig.ports("supply")[supply].get("inlet", "").partition(".")[2]
+    return block_of(rig.ports("supply")[supply].get("inlet", ""))
 
 
 def _in_front(recording: Recording, rig: Rig, supply: str) -> float:
@@ -460,9 +450,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     found = []
     for joint, table in rig.tables("joint").items():
         low, high = float(table["min_angle"]), float(table["max_angle"])
-        pulled = tuple(
-            e["chamber"].partition(".")[2] for e in ends if e["joint"] == dotted("joint", joint)
-        )
+        pulled = tuple(block_of(e["chamber"]) for e in ends if e["joint"] == dotted("joint", joint))
         margin = max(_LEAST_ANGLE_MARGIN, settings.range_margin * (high - low))
         found.append(
             _Moving(
@@ -478,7 +466,7 @@ def _moving(rig: Rig, settings: DiagnosisSettings) -> list[_Moving]:
     load = rig.model["load"]
     if load and load["kind"] == "mass":
         low, high = float(load["min_length"]), float(load["max_length"])
-        pulled = tuple(e["chamber"].partition(".")[2] for e in ends)
+        pulled = tuple(block_of(e["chamber"]) for e in ends)
         margin = max(_LEAST_LENGTH_MARGIN, settings.range_margin * (high - low))
         found.append(_Moving("length", "m", low, high, margin, _FASTEST_LOAD, pulled))
     return found
@@ -546,7 +534,7 @@ def _valves(recording: Recording, rig: Rig) -> Iterator[str]:
     inlets = {dotted("line", name): e["to"] for name, e in rig.ports("line").items()}
     for valve, ends in rig.ports("valve").items():
         name, table = dotted("valve_command", valve), rig.tables("valve")[valve]
-        chamber = inlets.get(ends["to"], ends["to"]).partition(".")[2]
+        chamber = block_of(inlets.get(ends["to"], ends["to"]))
         pressure = dotted("muscle_pressure", chamber)
         if name not in recording.channels or pressure not in recording.channels:
             continue
@@ -605,7 +593,7 @@ def _commanded(rig: Rig) -> Iterator[tuple[str, str]]:
     inlets = {dotted("line", name): ends["to"] for name, ends in lines.items()}
 
     def filled(end: str) -> str:
-        return dotted("muscle_pressure", inlets.get(end, end).partition(".")[2])
+        return dotted("muscle_pressure", block_of(inlets.get(end, end)))
 
     for valve, ends in rig.ports("valve").items():
         yield dotted("valve_command", valve), filled(ends["to"])

@@ -13,8 +13,6 @@ from pamrs.findings import Faulty
 from pamrs.recordings import Recording
 from pamrs.units import parse_unit
 
-__all__ = ["without_rails"]
-
 # samples beside one at its sensor's end, masked as well: their noise is cut off on one side
 _RAIL_SAMPLES = 3
 
@@ -60,7 +58,7 @@ def without_rails(recordings: Sequence[Recording]) -> tuple[list[Recording], lis
                 if bad.any():
                     counts[recording.name] = int(bad.sum())
                     found[k] = _masked(recording, channel, bad)
-            said.append(Faulty(channel, "clipped", _told(found, channel, rail, counts)))
+            said.append(Faulty(channel, "clipped", _sentence(found, channel, rail, counts)))
     return found, said
 
 
@@ -94,7 +92,7 @@ def _masked(recording: Recording, channel: str, bad: NDArray[np.bool_]) -> Recor
     )
 
 
-def _told(
+def _sentence(
     recordings: Sequence[Recording], channel: str, rail: float, counts: dict[str, int]
 ) -> str:
     """Where a sensor's range ends and what of each recording was masked for it, in words."""

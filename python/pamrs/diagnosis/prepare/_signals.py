@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.signal import savgol_filter
 from scipy.stats import chi2, norm
 
-from pamrs.channels import channel_of, dotted, with_trait
+from pamrs.channels import block_of, channel_of, dotted, with_trait
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import EFFECTS
 from pamrs.errors import DiagnosisError
@@ -19,20 +19,6 @@ from pamrs.recordings import Recording
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig
-
-__all__ = [
-    "COMMANDS",
-    "Prepared",
-    "binned",
-    "few_usable",
-    "held",
-    "moves_by_gauges",
-    "noise_level",
-    "prepare",
-    "smoothed",
-    "thermometers_of",
-    "warm_chambers",
-]
 
 # chance that noise alone shortens the filter: a corner has to miss more (decision 22)
 _SMOOTHING_ODDS = 1e-3
@@ -591,7 +577,7 @@ def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
         else [dotted("joint_angle", name) for name in rig.tables("joint")]
     )
     pulling = [
-        dotted("muscle_pressure", ends["chamber"].partition(".")[2])
+        dotted("muscle_pressure", block_of(ends["chamber"]))
         for ends in rig.ports("muscle").values()
     ]
     return bool(joints) and {*joints, *pulling} <= set(recording.channels)

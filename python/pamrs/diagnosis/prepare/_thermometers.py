@@ -11,8 +11,6 @@ from pamrs.diagnosis.prepare._signals import few_usable, thermometers_of
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
 
-__all__ = ["without_poor_thermometers"]
-
 # share of new samples (no repeats, no lines) from which a thermometer keeps up with the log
 _LEAST_NEW_SHARE = 0.5
 

@@ -9,8 +9,6 @@ import numpy as np
 
 from pamrs.recordings import Case, suspicions
 
-__all__ = ["noted_units", "suspected_units"]
-
 _FEW: Final = 8  # parts that are named
 
 

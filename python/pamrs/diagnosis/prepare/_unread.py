@@ -8,14 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from pamrs import _core
-from pamrs.channels import dotted
+from pamrs.channels import block_of, dotted
 from pamrs.diagnosis.prepare._blocks import Block, available_blocks, predicted
 from pamrs.diagnosis.prepare._signals import Prepared
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
-
-__all__ = ["blocks_beside_tanks", "said_of_tanks", "unread_tanks", "with_tanks"]
 
 
 def begins_at(gauge: str) -> str:
@@ -75,7 +73,7 @@ def with_tanks(rig: Rig, core: _core.Rig, prepared: Prepared, tanks: Sequence[st
     """
     names = tuple(prepared.recording.channels)
     for tank in tanks:
-        name = tank.partition(".")[2]
+        name = block_of(tank)
         full = qualified("supply", name)
         there = prepared.recording.parameters.get(begins_at(tank))
         begun = rig.parameter(begins_at(tank)).value if there is None else there.value

@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 from pamrs.diagnosis.fit import FIT_BIN_TIME, Fit, Key, Problem, bin_width, residuals, stacked
 from pamrs.diagnosis.prepare import Residual
 
-__all__ = ["predicted_by_others"]
-
 # share of a direction that one recording alone tells (leverage, Cook & Weisberg 1982)
 _SOLE_SOURCE = 0.9
 _PIECES_LEFT_OUT = 5  # pieces of a single recording, each predicted by the others (decision 111)

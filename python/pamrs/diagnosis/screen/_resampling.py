@@ -22,8 +22,6 @@ from pamrs.diagnosis.screen._screening import Screen, best_size
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import Term
 
-__all__ = ["inclusion_shares"]
-
 # resamples of the recordings that say how often an effect would be taken: within 4 %
 _RESAMPLES = 200
 # [s] length of the segments that are drawn: longer than the residual remembers (Kuensch (1989))

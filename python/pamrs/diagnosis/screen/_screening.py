@@ -36,18 +36,6 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.rig.schema import BLOCKS
 
-__all__ = [
-    "STRONG_SIZES",
-    "Score",
-    "Screen",
-    "Tangent",
-    "best_of_each_kind",
-    "best_size",
-    "by_effect",
-    "screen",
-    "tangent_of",
-]
-
 _MOST_SIZE = 8.0  # [typical sizes] largest size at which a linear gain is relied on (decision 13)
 # [typical sizes] smallest start: a compressor may deliver 500 times less (decision 20)
 _LEAST_SIZE = 0.002

@@ -21,8 +21,6 @@ from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["refitted", "thorough", "with_autocorrelation"]
-
 
 def with_autocorrelation(
     problem: Problem, nominal: Rig, first: Fit, noise_level: Mapping[Key, NoiseLevel]

@@ -38,8 +38,6 @@ from pamrs.diagnosis.screen import Screen, Tangent, by_effect, inclusion_shares,
 from pamrs.effects import UNDECIDED, UNLISTED, Term
 from pamrs.errors import SimulationError
 
-__all__ = ["find_below_noise"]
-
 # share of a stated error that a signature has by chance: most had less (decision 111)
 _STATED_SHARE = 0.3
 _RIVAL_SHARE = 0.3  # share of the largest gain from which another effect is its rival (decision 20)
@@ -128,7 +126,7 @@ def find_below_noise(
             + (why or f"with a signature of {effect} in it (chi-square {gains[effect]:.3g})")
         )
         values = against.fit.values | begun.back
-        tried = trial.fitted(
+        tried = trial.fit_effects(
             [begun.start], replace(against.fit, values=values), autocorrelation, share=0.0
         )
         if tried is not None:

@@ -34,8 +34,6 @@ from pamrs.effects import (
 from pamrs.errors import DiagnosisError, SimulationError
 from pamrs.rig import Rig
 
-__all__ = ["find_closure"]
-
 # share of the misfit that it may leave: with less gain it mends the smoothing of drives
 _MOST_MISFIT_SHARE = 0.75
 _MOST_TERMS = 6  # terms that it may have: more is no form that a person reads
@@ -50,7 +48,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class _Candidate:
+class _ShapedTerm:
     """One term of one closure, with the shape of its memory."""
 
     closure: str
@@ -143,14 +141,14 @@ def find_closure(
     closures = _closures(blocks)
     say(f"{' and '.join(b.name for b in blocks)}: looking for a form of what is missing")
     candidates, columns = _at_zero(problem, baseline, inflation, blocks, closures)
-    chosen = _select(_Frame.of(problem, baseline, baseline, inflation), candidates, columns, {})
+    chosen = _select(_Stacked.of(problem, baseline, baseline, inflation), candidates, columns, {})
     found = None if chosen is None else _fitted(problem, nominal, baseline, inflation, chosen, say)
     if found is None:
         return None
     autocorrelation = autocorrelation_of(problem, found, noise_level or {})
     candidates, columns, warm = _again(problem, baseline, found, autocorrelation, blocks, closures)
     second = _select(
-        _Frame.of(problem, warm, found, autocorrelation), candidates, columns, found.values
+        _Stacked.of(problem, warm, found, autocorrelation), candidates, columns, found.values
     )
     other = (
         None if second is None else _fitted(problem, nominal, warm, autocorrelation, second, say)
@@ -206,24 +204,24 @@ def _at_zero(
     inflation: dict[str, float],
     blocks: list[Block],
     closures: dict[str, str],
-) -> tuple[list[_Candidate], Array]:
+) -> tuple[list[_ShapedTerm], Array]:
     """Every term at every shape of its memory, and what each does to the stacked residuals per unit
     of its coefficient (n, m).
     """
     tried = {closure: _shapes(closure) for closure in closures.values()}
     rounds = max(len(values) for shapes in tried.values() for values in shapes.values())
-    candidates: list[_Candidate] = []
+    candidates: list[_ShapedTerm] = []
     columns = []
     for k in range(rounds):
         rig = baseline.rig
-        now: list[_Candidate] = []
+        now: list[_ShapedTerm] = []
         for closure, shapes in tried.items():
             here = {name: values[min(k, len(values) - 1)] for name, values in shapes.items()}
             rig = rig.with_effect(closure, here)
             for term in CLOSURE_TERMS[closure]:
                 shape = MEMORY_OF.get(term.kind)
                 if shape is not None or k == 0:
-                    now.append(_Candidate(closure, term, here[shape] if shape else None))
+                    now.append(_ShapedTerm(closure, term, here[shape] if shape else None))
         columns.append(_columns(problem, baseline, rig, [c.name for c in now], inflation, blocks))
         candidates += now
     return candidates, np.concatenate(columns, axis=1)
@@ -236,7 +234,7 @@ def _again(
     inflation: dict[str, float],
     blocks: list[Block],
     closures: dict[str, str],
-) -> tuple[list[_Candidate], Array, Fit]:
+) -> tuple[list[_ShapedTerm], Array, Fit]:
     """The same at a fitted closure, every memory as it is there; and the baseline there, with
     sensitivities beside the closure.
     """
@@ -246,7 +244,7 @@ def _again(
             rig = rig.with_effect(closure)
     shapes = {e["id"]: e["parameters"] for e in rig.effects}
     candidates = [
-        _Candidate(
+        _ShapedTerm(
             closure, term, shapes[closure][MEMORY_OF[term.kind]] if term.kind in MEMORY_OF else None
         )
         for closure in closures.values()
@@ -272,7 +270,7 @@ def _again(
 
 
 @dataclass(frozen=True, eq=False)
-class _Frame:
+class _Stacked:
     """Stacked residuals of a fit with what the baseline can do beside a closure.
 
     Attributes
@@ -296,7 +294,7 @@ class _Frame:
     series: list[slice]
 
     @staticmethod
-    def of(problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float]) -> _Frame:
+    def of(problem: Problem, baseline: Fit, found: Fit, inflation: dict[str, float]) -> _Stacked:
         """Residuals of a fit, sensitivities of the baseline it grew from."""
         rows, _ = stacked(problem, found.residuals, inflation)
         _, jacobian = stacked(problem, baseline.residuals, inflation)
@@ -315,7 +313,7 @@ class _Frame:
                 series.append(slice(start, start + size))
                 recording.append(np.full(size, k))
                 start += size
-        return _Frame(
+        return _Stacked(
             rows,
             freedom,
             np.array([found.moved[name] for name in names]),
@@ -361,7 +359,7 @@ def _better(
     """
     misfits = [with_priors(problem, model, inflation) for model in models]
     least = models[int(np.argmin(misfits))]
-    frame = _Frame.of(problem, models[0], least, inflation)
+    frame = _Stacked.of(problem, models[0], least, inflation)
     samples = frame.independent(frame.rows)
     worth = [
         -samples * math.log(misfit) - len(model.effect_values) * _price(samples, among)
@@ -373,8 +371,8 @@ def _better(
 
 
 def _select(
-    frame: _Frame,
-    candidates: list[_Candidate],
+    frame: _Stacked,
+    candidates: list[_ShapedTerm],
     columns: Array,
     present: dict[str, float],
 ) -> _Choice | None:
@@ -390,9 +388,9 @@ def _select(
 
     Parameters
     ----------
-    frame : _Frame
+    frame : _Stacked
         Residuals to explain and what the baseline can do.
-    candidates : list of _Candidate
+    candidates : list of _ShapedTerm
         Terms.
     columns : (n, m) array
         What each does to the residuals per unit of its coefficient.
@@ -446,7 +444,7 @@ class _Selection:
     """
 
     def __init__(
-        self, candidates: list[_Candidate], target: Array, wide: Array, least_power: float
+        self, candidates: list[_ShapedTerm], target: Array, wide: Array, least_power: float
     ) -> None:
         self.left, self._free = target.copy(), wide.copy()
         self.order: list[int] = []
@@ -490,8 +488,8 @@ class _Selection:
 
 
 def _solved(
-    frame: _Frame,
-    candidates: list[_Candidate],
+    frame: _Stacked,
+    candidates: list[_ShapedTerm],
     rows: Array,
     unit: Array,
     size: Array,
@@ -550,7 +548,7 @@ class _Crossed:
     prior: Array
 
     @staticmethod
-    def of(frame: _Frame, rows: Array, unit: Array) -> _Crossed:
+    def of(frame: _Stacked, rows: Array, unit: Array) -> _Crossed:
         everything = np.concatenate([frame.freedom, unit, rows[:, None]], axis=1)
         parts = [everything[frame.recording == k] for k in np.unique(frame.recording)]
         return _Crossed(np.array([part.T @ part for part in parts]), frame.moved)

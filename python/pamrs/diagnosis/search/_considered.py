@@ -8,8 +8,6 @@ from pamrs.diagnosis.screen import STRONG_SIZES
 from pamrs.diagnosis.search._sets import Search
 from pamrs.effects import Hypothesis, Term
 
-__all__ = ["fit_considered"]
-
 
 def fit_considered(search: Search) -> list[Candidate]:
     """What of the hypotheses that the caller asks for acts in the blocks of a mismatch, the terms
@@ -27,7 +25,7 @@ def fit_considered(search: Search) -> list[Candidate]:
         if not effects and not wrong:
             continue
         search.tell(f"trying {Hypothesis((*effects, *map(Term, wrong)))}, which was asked for")
-        best = search.start if not wrong else trial.freed(wrong, search.start.fit)
+        best = search.start if not wrong else trial.fit_freed(wrong, search.start.fit)
         for effect in effects:
             best = None if best is None else _add_effect(search, best, effect)
         found += [] if best is None else [best]
@@ -42,17 +40,17 @@ def _add_effect(search: Search, beside: Candidate, effect: Term) -> Candidate | 
     if beside.fit.events is not None:
         return None  # beside events nothing else is fitted
     if not info.lasting:
-        return trial.transient(effect if info.own else Term(effect.id), beside)
+        return trial.fit_events(effect if info.own else Term(effect.id), beside)
     begun = trial.starts_of(beside)
     short: dict[str, list[Candidate]] = {}
     for one in _possible_starts(search, beside, effect):
-        tried = trial.fitted_shortly([*begun, one], beside.fit, beside.wrong)
+        tried = trial.fit_shortly([*begun, one], beside.fit, beside.wrong)
         if tried is not None:
             short.setdefault(one.form, []).append(tried)
     near = (max(tried, key=search.weight) for tried in short.values())
-    ended = [trial.together(trial.starts_of(best), best.fit, best.wrong) for best in near]
+    ended = [trial.fit_together(trial.starts_of(best), best.fit, best.wrong) for best in near]
     if info.transient:
-        ended.append(trial.transient(Term(effect.id), beside))
+        ended.append(trial.fit_events(Term(effect.id), beside))
     return max((c for c in ended if c is not None), key=search.weight, default=None)
 
 

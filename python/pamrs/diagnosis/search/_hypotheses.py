@@ -87,8 +87,6 @@ from pamrs.errors import SimulationError
 from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 
-__all__ = ["examine"]
-
 _FROM_PROBABILITY = 0.3  # probability of unlisted from which a form is looked for (decision 4)
 # share of the mismatch that it may leave, held-out too: no form of anything carries less
 _MOST_SHARE_LEFT = 0.8
@@ -424,12 +422,12 @@ class _Mismatch:
         best = max(named, key=lambda c: _probability(self.weighed, c), default=None)
         found: list[Candidate] = []
         for one in acting:
-            alone = trial.fitted([one], start.fit, trial.white)
+            alone = trial.fit_effects([one], start.fit, trial.white)
             if alone is None or not _is_visible(alone, one):
                 continue  # a clock that is late by the same for all that a block sees
             found.append(alone)
             if best is not None and not one.effect.excluded_by(best.effects):
-                both = trial.together([*trial.starts_of(best), one], best.fit, best.wrong)
+                both = trial.fit_together([*trial.starts_of(best), one], best.fit, best.wrong)
                 found += [] if both is None else [both]
         candidates = _best_of_each([*self.candidates, *found])
         candidates, weighed = _weigh_to_the_end(self.search, candidates)
@@ -496,7 +494,7 @@ def _fit_hypotheses(
     part = trial.inner.losses.part
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
-    singles += [c for e in own if (c := trial.transient(e, start)) is not None]
+    singles += [c for e in own if (c := trial.fit_events(e, start)) is not None]
     value = max(mistaken, key=alone, default=None)
     if value is not None and all(alone(c) <= alone(value) for c in singles):
         search = replace(search, value=value)
@@ -504,7 +502,7 @@ def _fit_hypotheses(
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
-        singles += [c for e in transient if (c := trial.transient(e, start)) is not None]
+        singles += [c for e in transient if (c := trial.fit_events(e, start)) is not None]
         singles = _best_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
@@ -556,7 +554,7 @@ def _weigh_to_the_end(
         def best(candidate: Candidate) -> Candidate:
             what = f"the search for the best form of {candidate.hypothesis}"
             work = partial(in_best_forms, search, candidate)
-            return trial.polished(trial.inner.losses.part(what, work, candidate))
+            return trial.polish(trial.inner.losses.part(what, work, candidate))
 
         ended = [best(c) if c in close else c for c in candidates]
         # what came back inside its tolerances on the way to the end is not wrong
@@ -612,7 +610,7 @@ def _add_form(group: BlockGroup, refit: _Refit, say: Say, tell: Say) -> BlockGro
     if closed is None:
         return group
     try:
-        judged = trial.judged(closed.effects, closed)
+        judged = trial.judge(closed.effects, closed)
     except SimulationError:
         return group
     # what does not carry over to recordings that were held out is no form of anything
@@ -654,7 +652,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
         )
         for b in named
     ]
-    common = best[0].fit if len(best) == 1 else trial.united(best)
+    common = best[0].fit if len(best) == 1 else trial.fit_united(best)
     if common is None:
         return []
     start = replace(start, fit=common)
@@ -765,10 +763,10 @@ def _fit_effect(
     """An effect fitted from a start beside the baseline; where that leaves more than a few steps to
     the same start had left, from where these had moved the baseline too.
     """
-    found = trial.fitted([start], baseline, trial.white)
+    found = trial.fit_effects([start], baseline, trial.white)
     if short is None or (found is not None and found.misfit <= short.misfit):
         return found
-    again = trial.fitted([start], short.fit, trial.white)
+    again = trial.fit_effects([start], short.fit, trial.white)
     both = [c for c in (found, again) if c is not None]
     return min(both, key=lambda c: c.misfit, default=None)
 
@@ -794,7 +792,7 @@ def _shortlist(
 
     def begin(starts: dict[Term, list[Start]]) -> None:
         tasks = [(e, start) for e, own in starts.items() for start in own]
-        tried = two_at_a_time(lambda one: trial.fitted_shortly([one[1]], baseline), tasks)
+        tried = two_at_a_time(lambda one: trial.fit_shortly([one[1]], baseline), tasks)
         for effect in starts:
             own = [c for (e, _), c in zip(tasks, tried, strict=True) if e == effect]
             known = [*short.get(effect, []), *(c for c in own if c is not None)]
@@ -907,7 +905,7 @@ def _in_shape(search: Search, single: Candidate, same: SameData) -> Candidate:
     held = {f"{own.effect}.{name}": value for name, value in same.held}
     if all(own.held[name] == value for name, value in held.items()):
         return single
-    alike = trial.fitted([replace(own, held=own.held | held)], search.start.fit, trial.white)
+    alike = trial.fit_effects([replace(own, held=own.held | held)], search.start.fit, trial.white)
     if alike is None:
         return single
     shaped, free = map(search.share_left, (alike, single))
@@ -921,7 +919,7 @@ def _as_other(
     own = EFFECTS[same.effect].form(same.form).parameters
     usual = {f"{same.effect}.{p.name}": p.default for p in own}
     usual[f"{same.effect}.{same.parameter}"] = single.fit.values[f"{single.effects[0]}.{same.size}"]
-    return trial.fitted(
+    return trial.fit_effects(
         [Start(Term(same.effect), usual, {}, (), False, same.form)], start.fit, trial.white
     )
 
@@ -935,4 +933,4 @@ def _as_twin(
         return None
     free = {f"{twin}.{same.size}": size, f"{twin}.{same.without}": 0.0}
     held = {f"{twin}.{name}": value for name, value in same.held}
-    return trial.fitted([Start(twin, free, held, (), False)], start.fit, trial.white)
+    return trial.fit_effects([Start(twin, free, held, (), False)], start.fit, trial.white)

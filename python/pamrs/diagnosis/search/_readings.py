@@ -40,8 +40,6 @@ from pamrs.rig import Rig
 from pamrs.simulation import core_rig
 from pamrs.units import measured_from, parse_unit
 
-__all__ = ["Reading", "find_misread", "reading_errors"]
-
 # [variances of the noise] from which units are doubted: a wrong one leaves hundreds, drives two
 _SUSPECT = 3.0
 # share of that excess which a unit may leave after one step of the parameters to be worth a fit

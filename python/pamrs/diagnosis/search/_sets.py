@@ -34,19 +34,6 @@ from pamrs.diagnosis.screen import (
 from pamrs.diagnosis.search._wrong_parameters import FURTHER_SHARE, far_parameters
 from pamrs.effects import Hypothesis, Term
 
-__all__ = [
-    "Say",
-    "Search",
-    "with_freed_values",
-    "far_above_noise",
-    "in_best_forms",
-    "log_misfit",
-    "cannot_gain",
-    "settles",
-    "combine",
-    "without_needless",
-]
-
 # strong mismatch, ten times the noise: linear signatures tell no sizes (decision 13)
 _STRONG_RATIO = 100.0
 LEAST_GAIN = 12.0  # [chi-square] gain by the screen from which an effect is fitted (decision 13)
@@ -144,7 +131,7 @@ def combine(
     happening = []
     for effect, beside in _event_partners(search, singles, transient):
         search.tell(f"looking for {effect} with {beside.effects[0]}")
-        found = search.trial.transient(effect, beside)
+        found = search.trial.fit_events(effect, beside)
         happening += [] if found is None else [found]
     return [*sets, *happening, *growing.grow(sets)]
 
@@ -155,7 +142,7 @@ def with_freed_values(search: Search, single: Candidate) -> list[Candidate]:
     for name in far_parameters(search.trial, single.fit):
         search.tell(f"trying {single.hypothesis} with another {name}")
         begun = search.trial.starts_of(single)
-        beside = search.trial.together(begun, single.fit, (name,))
+        beside = search.trial.fit_together(begun, single.fit, (name,))
         found += [] if beside is None else [beside]
     return found
 
@@ -245,7 +232,7 @@ class _Growing:
             starts = [
                 trial.start_of((best if e in mended else rival).fit, e) for e in rival.effects
             ]
-            return trial.together(starts, rival.fit, rival.wrong)
+            return trial.fit_together(starts, rival.fit, rival.wrong)
 
         tried = two_at_a_time(formed, rivals[: trial.settings.most_polished])
         return [best, *(c for c in tried if c is not None)]
@@ -263,7 +250,7 @@ class _Growing:
         def fitted(partner: _Partner) -> Candidate | None:
             warm = replace(base.fit, values=base.fit.values | partner.values)
             wrong = (*base.wrong, *partner.wrong)
-            return self.trial.together([*begun, *partner.starts], warm, wrong)
+            return self.trial.fit_together([*begun, *partner.starts], warm, wrong)
 
         return [c for c in two_at_a_time(fitted, partners) if c is not None]
 
@@ -317,7 +304,7 @@ class _Growing:
         """
 
         def begin(start: Start) -> Candidate | None:
-            return self.trial.fitted_shortly([*begun, start], base.fit, base.wrong)
+            return self.trial.fit_shortly([*begun, start], base.fit, base.wrong)
 
         tried = zip(two_at_a_time(begin, starts), starts, strict=True)
         found = [(c, start) for c, start in tried if c is not None]
@@ -471,13 +458,13 @@ def _in_another_form(
         # parameters that both forms have go on from where they are
         own = {n: base.fit.values.get(n, value) for n, value in start.free.items()}
         begun = [*rest, replace(start, free=own)]
-        return trial.fitted_shortly(begun, base.fit, base.wrong)
+        return trial.fit_shortly(begun, base.fit, base.wrong)
 
     short = [c for c in two_at_a_time(begin, others) if c is not None]
     best = min(short, key=lambda c: c.misfit, default=None)
     if best is None or best.misfit > base.misfit / NEAR_PLACE:
         return None
-    found = trial.together(trial.starts_of(best), best.fit, base.wrong)
+    found = trial.fit_together(trial.starts_of(best), best.fit, base.wrong)
     if found is None or log_misfit(found) > log_misfit(base) - FORM_SHARE_ALIKE:
         return None
     return replace(found, gain=base.gain)
@@ -515,7 +502,7 @@ def without_needless(
             if (1.0 - FURTHER_SHARE) * known.get(rest, math.inf) < larger.misfit:
                 continue
             search.tell(f"trying {rest} from {larger.hypothesis}")
-            smaller = search.trial.without(larger, needless)
+            smaller = search.trial.fit_without(larger, needless)
             if smaller is not None and smaller.misfit < known.get(rest, math.inf):
                 found[rest], known[rest] = smaller, smaller.misfit
     walls = search.trial.settings.most_tolerances

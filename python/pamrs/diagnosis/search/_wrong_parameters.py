@@ -30,8 +30,6 @@ from pamrs.diagnosis.prepare import Block
 from pamrs.rig import Rig
 from pamrs.rig.schema import split_name
 
-__all__ = ["find_wrong_values", "free_suspects", "far_parameters", "suspects_at_wall"]
-
 # evaluations of the linear model that predicts the gain of freeing a parameter: to its end
 _PREDICTED_GAIN_EVALUATIONS = 50
 # share of what a set leaves that a further effect takes; less is the form of the others
@@ -198,13 +196,13 @@ def _fit_freed(
     """
 
     def to_the_end(several: list[tuple[str, ...]]) -> dict[tuple[str, ...], Candidate | None]:
-        ended = two_at_a_time(lambda names: trial.freed(names, baseline, share), several)
+        ended = two_at_a_time(lambda names: trial.fit_freed(names, baseline, share), several)
         return dict(zip(several, ended, strict=True))
 
     if len(sets) <= _MOST_FINISHED:
         return to_the_end(sets)
     say(f"trying other values of {', '.join(' and '.join(names) for names in sets)}")
-    begun = zip(sets, two_at_a_time(trial.freed_shortly, sets), strict=True)
+    begun = zip(sets, two_at_a_time(trial.fit_freed_shortly, sets), strict=True)
     short = {names: c for names, c in begun if c is not None}
     worth = [names for names in short if not _needless(names, short, trial)]
     best = sorted(worth, key=lambda names: short[names].misfit)[:_MOST_FINISHED]
