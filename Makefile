@@ -104,6 +104,7 @@ test:  ## everything that CI checks: the long trials are left to test-all
 
 test-all: export CARGO_PROFILE_TEST_DEBUG_ASSERTIONS = true
 test-all: export CARGO_PROFILE_TEST_OVERFLOW_CHECKS = true
+test-all: export PROPTEST_CASES = 256
 test-all:  ## the same with the long trials, the core's tests with checks of overflow
 	@$(MAKE) --jobs=2 --output-sync=target checks
 	@$(MAKE) test-python-all
@@ -120,9 +121,9 @@ lint-python: build
 	$(BIN)/mypy --no-error-summary python/pamrs trial reproduction
 	$(BIN)/python -m mypy.stubtest pamrs._core
 
-test-rust:  ## the core's tests, documentation examples included
-	$(CARGO) test --quiet --workspace --exclude pam-py $(LOCKED) --lib --tests
-	$(CARGO) test --quiet -p pam-core $(LOCKED) --doc
+test-rust: export PROPTEST_CASES ?= 64
+test-rust:  ## the core's tests: its units and its laws
+	$(CARGO) test --quiet -p pam-core $(LOCKED) --lib
 
 test-python: build  ## pytest without what is marked slow (WORKERS=2 to choose)
 	$(PYTEST) -m "not slow"
@@ -132,7 +133,7 @@ test-python-all: build
 
 snapshots: build  ## write the files of the work done anew, where it has changed on purpose
 	PAMRS_SNAPSHOTS=write $(BIN)/python -m pytest -q tests/work
-	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --test laws work::
+	PAMRS_SNAPSHOTS=write $(CARGO) test --quiet -p pam-core $(LOCKED) --lib laws::work::
 
 hostile: build  ## the table of hostile inputs that were tried, and what each came to
 	$(BIN)/python -m tests.hostile
@@ -145,7 +146,7 @@ EXAMPLES ?= 20000
 fuzz: export PROPTEST_CASES = $(EXAMPLES)
 fuzz: build  ## rigs, commands, states and bytes of logs changed at random (EXAMPLES=100000 for hours)
 	PAMRS_FUZZ=$(EXAMPLES) $(BIN)/python -m pytest -q tests/hostile/test_fuzz.py
-	$(CARGO) test --quiet --release -p pam-core $(LOCKED) --test laws fuzz::
+	$(CARGO) test --quiet --release -p pam-core $(LOCKED) --lib laws::fuzz::
 
 deny:  ## licences, sources and duplicates of the crates (needs cargo-deny)
 	@command -v cargo-deny > /dev/null || { echo "cargo-deny is not installed; it is with: cargo install --locked cargo-deny"; exit 1; }

@@ -31,6 +31,13 @@ pub mod scalar;
 pub mod simulate;
 mod vector;
 
+// The laws see the crate as its users do.
+#[cfg(test)]
+extern crate self as pam_core;
+#[cfg(test)]
+#[path = "../tests/laws/main.rs"]
+mod laws;
+
 pub use description::RigSpec;
 pub use error::{Error, Result};
 pub use plant::Rig;

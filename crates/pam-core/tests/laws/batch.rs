@@ -1,6 +1,7 @@
 //! Laws of a batch: each row is the plant alone (to the last bit where its rig does not run in
 //! lanes), whoever advances it and in however many calls; a row that ends takes none along.
 
+use super::rigs::compiled;
 use pam_core::batch::Batch;
 use pam_core::description::EffectSpec;
 use pam_core::simulate::drive::Drive;
@@ -11,7 +12,7 @@ use std::sync::Arc;
 const TIMING: Timing = Timing { sample_time: 0.002, substeps: 2 };
 
 fn rig() -> Arc<Rig> {
-    Arc::new(Rig::new(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()).unwrap())
+    Arc::new(compiled(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()))
 }
 
 /// The same with an effect, which lanes do not know.
@@ -21,7 +22,7 @@ fn leaky() -> Arc<Rig> {
     let parameters = parameters.map(|(name, value)| (name.to_string(), value)).into();
     let (id, form, at) = ("leak_muscle".into(), String::new(), String::new());
     spec.effects = vec![EffectSpec { id, form, at, parameters }];
-    Arc::new(Rig::new(spec).unwrap())
+    Arc::new(compiled(spec))
 }
 
 /// The same arm with another payload.
@@ -152,7 +153,7 @@ fn beyond_the_curves_a_plant_runs_alone_and_a_restart_is_still_exact() {
     let mut spec = rig().spec().clone();
     spec.joints[0].stop_stiffness = 5.0;
     spec.joints[0].stop_damping = 0.0;
-    let base = Arc::new(Rig::new(spec).unwrap());
+    let base = Arc::new(compiled(spec));
     let (rigs, samples) = (vec![Arc::clone(&base); 6], 400);
     let throw = |k: usize| Initial::rest(&base).with(&base, "joint_rate", 4.0 * k as f64).unwrap();
     let initial: Vec<_> = (0..6).map(throw).collect();
@@ -261,9 +262,8 @@ fn a_bad_command_is_an_error_or_the_end_of_its_row() {
 #[test]
 fn what_does_not_fit_is_named_with_its_row() {
     let base = rig();
-    let other = Arc::new(
-        Rig::new(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()).unwrap(),
-    );
+    let other =
+        Arc::new(compiled(RigSpec::from_json(include_str!("../data/shoulder.json")).unwrap()));
     let mut spec = base.spec().clone();
     spec.muscles[0].name = "flexor".into();
     spec.chambers[0].name = "flexor".into();

@@ -1,6 +1,6 @@
 //! Effects against what is known in closed form, and the order of convergence with them.
 
-use crate::rigs::{effect, lone_tank, regulated, shoulder, TYPICAL};
+use super::rigs::{compiled, effect, lone_tank, regulated, shoulder, TYPICAL};
 use pam_core::description::{ArmSpec, EffectSpec, JointSpec, LinkSpec};
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
@@ -9,7 +9,7 @@ const AMBIENT: f64 = 101_325.0;
 const RT: f64 = 287.05 * 293.15;
 
 fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
-    Rig::new(RigSpec { effects, ..spec }).unwrap()
+    compiled(RigSpec { effects, ..spec })
 }
 
 struct Run {

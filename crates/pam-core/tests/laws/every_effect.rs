@@ -1,9 +1,9 @@
 //! Laws of every effect: off it changes nothing, its sensitivities are those of differences, a
 //! restart is bit for bit, one block can be named, and every kind of rig takes it.
 
-use crate::rigs::{
-    antagonists, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder, two_joints,
-    with_struts, Typical, FORMS, TYPICAL,
+use super::rigs::{
+    antagonists, compiled, effect, effect_at, every, fitting, lone_tank, rig_for, shoulder,
+    two_joints, with_struts, Typical, FORMS, TYPICAL,
 };
 use pam_core::cut_chain::{predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
@@ -70,7 +70,7 @@ fn lacks_supply(id: &str, spec: &RigSpec) -> bool {
 }
 
 fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
-    Rig::new(RigSpec { effects, ..spec }).unwrap()
+    compiled(RigSpec { effects, ..spec })
 }
 
 #[test]
@@ -438,7 +438,7 @@ fn predictions_repeat_what_was_simulated() {
 #[test]
 fn a_clock_ahead_is_read_from_a_recording() {
     // Both pressures were logged three samples early, or late; angle and command were not.
-    let free = Rig::new(shoulder()).unwrap();
+    let free = compiled(shoulder());
     let truth = run(&free, ROWS);
     let inputs = signals(&free, ROWS);
     let names = ["supply_pressure", "muscle_pressure", "joint_angle"];
@@ -472,7 +472,7 @@ fn a_clock_ahead_is_read_from_a_recording() {
 
 #[test]
 fn late_pressures_do_not_move_the_arm() {
-    let free = run(&Rig::new(shoulder()).unwrap(), ROWS);
+    let free = run(&compiled(shoulder()), ROWS);
     let dt = TIMING.sample_time;
     let clock = [("offset", 2.25 * dt), ("rate", 0.0), ("angle_share", 0.0)];
     let rig = with(shoulder(), vec![effect_at("clock_skew", "", &clock)]);

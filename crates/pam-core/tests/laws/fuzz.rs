@@ -1,6 +1,7 @@
 //! Rigs, commands and states at random: an error that says what is wrong, or finite numbers; no
 //! panic, and no allocation without an end. `PROPTEST_CASES` says how many (`make fuzz`).
 
+use super::rigs::compiled;
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 use proptest::prelude::*;
@@ -54,7 +55,8 @@ fn changed(changes: &[(Index, bool, f64)]) -> Option<Rig> {
         let was = place.as_f64().unwrap();
         **place = Value::from(if *replaced { *by } else { was * by });
     }
-    RigSpec::from_json(&document.to_string()).and_then(Rig::new).ok()
+    let usual = compiled(RigSpec::from_json(SHOULDER).unwrap());
+    RigSpec::from_json(&document.to_string()).and_then(|spec| usual.respecified(spec)).ok()
 }
 
 /// Whether every number of a run can be used.

@@ -1,8 +1,8 @@
 //! Several instances of one effect, each at its own block with its own parameters, and what cannot
 //! be together.
 
-use crate::rigs::{
-    antagonists, effect, effect_at, lone_tank, regulated, shoulder, two_joints, TYPICAL,
+use super::rigs::{
+    antagonists, compiled, effect, effect_at, lone_tank, regulated, shoulder, two_joints, TYPICAL,
 };
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
@@ -17,7 +17,7 @@ const ROWS: usize = 60;
 const TIMING: Timing = Timing { sample_time: 0.01, substeps: 10 };
 
 fn with(spec: RigSpec, effects: Vec<EffectSpec>) -> Rig {
-    Rig::new(RigSpec { effects, ..spec }).unwrap()
+    compiled(RigSpec { effects, ..spec })
 }
 
 fn leak(at: &str, conductance: f64) -> EffectSpec {

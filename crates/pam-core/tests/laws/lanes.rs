@@ -6,7 +6,7 @@ use pam_core::simulate::run::Run;
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::Rig;
 
-use crate::rigs;
+use super::rigs::{self, compiled};
 
 const ROWS: usize = 161;
 const TIMING: Timing = Timing { sample_time: 0.005, substeps: 5 };
@@ -109,7 +109,7 @@ fn one_link_rigs() -> Vec<(&'static str, Rig)> {
         ("tilted", tilted),
         ("warm", warm),
     ];
-    specs.map(|(name, spec)| (name, Rig::new(spec).unwrap())).into()
+    specs.map(|(name, spec)| (name, compiled(spec))).into()
 }
 
 #[test]
@@ -139,7 +139,7 @@ fn each_lane_is_the_plant_alone() {
 
 #[test]
 fn neighbours_and_threads_change_no_bit() {
-    let rig = Rig::new(rigs::shoulder()).unwrap();
+    let rig = compiled(rigs::shoulder());
     let signals = commands(&rig);
     let payload = spread(&rig, "arm.payload", 150);
     let whole = run(&rig, &request(&rig, 150, &signals, vec![("arm.payload", &payload)]));
@@ -157,7 +157,7 @@ fn neighbours_and_threads_change_no_bit() {
 
 #[test]
 fn numbers_of_a_run_are_those_of_its_samples() {
-    let rig = Rig::new(rigs::shoulder()).unwrap();
+    let rig = compiled(rigs::shoulder());
     let signals = commands(&rig);
     let payload = spread(&rig, "arm.payload", 11);
     let mut request = request(&rig, 11, &signals, vec![("arm.payload", &payload)]);

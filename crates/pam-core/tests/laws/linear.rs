@@ -2,7 +2,9 @@
 //! effects move. That they are the differences of simulations is tested from Python, for every
 //! packaged rig.
 
-use crate::rigs::{antagonists, effect_at, regulated, rig_for, shoulder, two_joints, TYPICAL};
+use super::rigs::{
+    antagonists, compiled, effect_at, regulated, rig_for, shoulder, two_joints, TYPICAL,
+};
 use pam_core::effects::{Role, EFFECTS};
 use pam_core::plant::{LinearModel, Side};
 use pam_core::simulate::{Initial, Progress};
@@ -30,7 +32,7 @@ fn row<'m>(model: &'m LinearModel, name: &str) -> (&'m [f64], &'m [f64]) {
 #[test]
 fn coefficients_are_those_of_the_equations() {
     let spec = shoulder();
-    let rig = Rig::new(spec.clone()).unwrap();
+    let rig = compiled(spec.clone());
     let (fill, vent, mean) =
         (linearised(&rig, Side::Fill), linearised(&rig, Side::Vent), linearised(&rig, Side::Mean));
     assert_eq!(mean.states, ["supply_pressure", "muscle_pressure", "joint_angle", "joint_rate"]);
@@ -59,7 +61,7 @@ fn a_regulator_follows_what_it_is_set_to_by_its_time_constant() {
     for limit in [1e12, 1e5] {
         let mut spec = regulated();
         (spec.supplies[0].rise_limit, spec.supplies[0].fall_limit) = (limit, limit);
-        let rig = Rig::new(spec).unwrap();
+        let rig = compiled(spec);
         // at rest away from where it begins by itself, so that a limit is none to a small motion
         let start = Initial::rest(&rig).with(&rig, "supply_pressure", 3e5).unwrap();
         let start = start.with(&rig, "muscle_pressure", 2e5).unwrap();
@@ -75,7 +77,7 @@ fn a_regulator_follows_what_it_is_set_to_by_its_time_constant() {
 #[test]
 fn a_spring_across_the_joint_is_stiffness_over_inertia() {
     let by_angle = |spec: &RigSpec| {
-        let model = linearised(&Rig::new(spec.clone()).unwrap(), Side::Fill);
+        let model = linearised(&compiled(spec.clone()), Side::Fill);
         row(&model, "joint_rate").0[place(&model, "joint_angle")]
     };
     let (plain, mut sprung) = (shoulder(), shoulder());
@@ -106,7 +108,7 @@ fn what_effects_move_has_a_row_each() {
                 name => format!("{}.{name}", info.id),
             });
         let spec = rig_for(typical.id);
-        let rig = Rig::new(RigSpec { effects: vec![typical.on()], ..spec }).unwrap();
+        let rig = compiled(RigSpec { effects: vec![typical.on()], ..spec });
         let model = linearised(&rig, Side::Fill);
         let mut found: Vec<String> = model.states[4..].to_vec();
         found.retain(|name| !name.ends_with("air_mass"));
@@ -121,7 +123,7 @@ fn what_effects_move_has_a_row_each() {
 fn effects_in_closed_form_have_the_rates_of_their_equations() {
     let lag = |at| effect_at("input_path_lag", at, &[("time_constant", 0.02), ("delay", 0.03)]);
     let late = effect_at("pressure_lag", "flexor", &[("time_constant", 0.05)]);
-    let rig = Rig::new(RigSpec { effects: vec![late, lag("extensor")], ..antagonists() }).unwrap();
+    let rig = compiled(RigSpec { effects: vec![late, lag("extensor")], ..antagonists() });
     let half_range = rig.spec().valves[1].half_range;
     let model = linearised(&rig, Side::Mean);
     assert_eq!(model.states[5], "pressure_lag.flexor"); // as they were given
@@ -150,8 +152,8 @@ fn effects_in_closed_form_have_the_rates_of_their_equations() {
 #[test]
 fn friction_before_it_slips_is_a_spring_about_the_point() {
     let typical = TYPICAL.iter().find(|t| t.id == "muscle_hysteresis").unwrap();
-    let plain = Rig::new(two_joints()).unwrap();
-    let rough = Rig::new(RigSpec { effects: vec![typical.on()], ..two_joints() }).unwrap();
+    let plain = compiled(two_joints());
+    let rough = compiled(RigSpec { effects: vec![typical.on()], ..two_joints() });
     let [plain, rough] = [plain, rough].map(|rig| linearised(&rig, Side::Mean));
     assert_eq!(plain.states, rough.states);
     let spring =

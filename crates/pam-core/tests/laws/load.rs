@@ -1,6 +1,7 @@
 //! Linear loads: a mass hangs where the muscle carries it and keeps its energy, a frame gives the
 //! static force.
 
+use super::rigs::compiled;
 use pam_core::muscle::{Muscle, MuscleSpec};
 use pam_core::simulate::drive::Drive;
 use pam_core::simulate::{Initial, Progress, Timing, Trajectory};
@@ -20,7 +21,7 @@ fn rig(kind: &str, mass: f64, friction: f64) -> Rig {
             "min_length": 0.2, "max_length": 0.28, "stop_stiffness": 1e6, "stop_damping": 1e3}}"#
     );
     spec.load = Some(serde_json::from_str(&text).unwrap());
-    Rig::new(spec).unwrap()
+    compiled(spec)
 }
 
 struct Run(Rig, Trajectory);
@@ -98,7 +99,7 @@ fn a_held_pressure_stays_and_a_moving_one_is_followed() {
         assert!((out.get("muscle_pressure")[k] - pressure[k]).abs() < 1e-9);
         assert!((out.get("contraction_ratio")[k] - (1.0 - length[k] / 0.276)).abs() < 1e-14);
     }
-    let valve = Rig::new(RigSpec::from_json(SHOULDER).unwrap()).unwrap();
+    let valve = compiled(RigSpec::from_json(SHOULDER).unwrap());
     let signals: [(&str, &[f64]); 2] = [("valve_command", &[5.0]), ("pressure", &[1e5])];
     let message = Drive::new(&valve, 1, &signals).unwrap_err().to_string();
     assert!(message.contains("without [valve]"), "{message}");

@@ -1,4 +1,4 @@
-//! Laws of the core, in one binary: each further one would be compiled and linked anew.
+//! Laws of the core, in the binary of its unit tests: the core is compiled once for both.
 
 mod batch;
 mod effect_forms;
@@ -21,6 +21,3 @@ mod toy_effect;
 mod toy_spring;
 mod waves;
 mod work;
-
-// What `toy_spring` takes from the crate that it belongs to.
-use pam_core::{blocks, effects, made_by, scalar};

@@ -1,9 +1,10 @@
 //! Every force model on every geometry: table against exact solve, limits in which models become
 //! each other, the published ends, and the branches in a running plant.
 
+use super::rigs::compiled;
 use pam_core::muscle::{CompiledMuscle, ForceModel, Muscle, MuscleSpec};
 use pam_core::simulate::{simulate, Initial, Timing};
-use pam_core::{Rig, RigSpec};
+use pam_core::RigSpec;
 
 const SHOULDER: &str = include_str!("../data/shoulder.json");
 const GEOMETRIES: [&str; 3] = ["cylinder", "elliptic", "elliptic_published"];
@@ -121,7 +122,7 @@ fn published_ends_meet_the_fibre_in_contraction_and_keep_their_radius_in_extensi
 fn lift(change: impl Fn(&mut MuscleSpec)) -> Vec<f64> {
     let mut rig = RigSpec::from_json(SHOULDER).unwrap();
     change(&mut rig.muscles[0].muscle);
-    let rig = Rig::new(rig).unwrap();
+    let rig = compiled(rig);
     let command: Vec<f64> = (0..601).map(|k| 5.0 + 1.2 * (f64::from(k) * 0.02).sin()).collect();
     let timing = Timing { sample_time: 0.005, substeps: 10 };
     let run =

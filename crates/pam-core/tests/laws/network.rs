@@ -7,7 +7,7 @@ use pam_core::description::{ArmSpec, ChamberSpec, LineSpec, LinkSpec, SupplySpec
 use pam_core::simulate::{simulate, Initial, Progress, Timing, Trajectory};
 use pam_core::{Rig, RigSpec};
 
-use crate::rigs::{antagonists, shoulder, two_joints, with_struts};
+use super::rigs::{antagonists, compiled, shoulder, two_joints, with_struts};
 
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;
@@ -92,7 +92,7 @@ fn imbalance(rig: &Rig, run: &Trajectory) -> f64 {
 fn mass_in_is_mass_stored_and_vented() {
     let (a, b) = (wave(400, 0.0), wave(400, 2.0));
     let pair: [(&str, &[f64]); 2] = [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
-    let rig = Rig::new(antagonists()).unwrap();
+    let rig = compiled(antagonists());
     let out = run(&rig, 400, &pair, 0.005, 1e-3);
     assert!(imbalance(&rig, &out) < 1e-12, "{}", imbalance(&rig, &out));
     assert!(last(&rig, &out, "mass_supplied") > 1e-4 && last(&rig, &out, "mass_vented") > 1e-4);
@@ -102,11 +102,10 @@ fn mass_in_is_mass_stored_and_vented() {
     let lost = (tank[0] - tank[399]) * 0.015;
     assert!((lost / last(&rig, &out, "energy_supplied") - 1.0).abs() < 1e-9);
     assert!((lost / RT / last(&rig, &out, "mass_supplied") - 1.0).abs() < 1e-9);
-    let closed = Rig::new(gas(
+    let closed = compiled(gas(
         &[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)],
         vec![tube("chamber.a", "chamber.b", 2.0, 0.004)],
-    ))
-    .unwrap();
+    ));
     let out = run(&closed, 200, &[], 0.01, 1e-3);
     assert!(imbalance(&closed, &out) < 1e-13);
 }
@@ -114,8 +113,7 @@ fn mass_in_is_mass_stored_and_vented() {
 #[test]
 fn a_choked_isothermal_blow_down_is_an_exponential() {
     let (volume, area) = (2e-3, 1e-6);
-    let rig =
-        Rig::new(gas(&[("", volume, 9e5)], vec![orifice("chamber", "ambient", area)])).unwrap();
+    let rig = compiled(gas(&[("", volume, 9e5)], vec![orifice("chamber", "ambient", area)]));
     let out = run(&rig, 401, &[], 0.05, 1e-3);
     let psi = (2.0_f64 / 2.4).powf(2.5) * (1.4_f64 / 2.4).sqrt();
     let tau = volume / (RT * area * (2.0 / RT).sqrt() * psi);
@@ -141,7 +139,7 @@ fn a_tube_brings_two_chambers_to_one_pressure() {
         &[("a", 1e-4, 5e5), ("b", 3e-4, 0.0)],
         vec![tube("chamber.a", "chamber.b", 2.0, 0.004)],
     );
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let out = run(&rig, 300, &[], 0.01, 1e-3);
     let half = std::f64::consts::PI * 0.002 * 0.002 * 2.0 / 2.0;
     let (va, vb) = (1e-4 + half, 3e-4 + half);
@@ -153,7 +151,7 @@ fn a_tube_brings_two_chambers_to_one_pressure() {
 
 #[test]
 fn antagonists_at_one_pressure_stay_in_the_middle_and_move_with_a_difference() {
-    let rig = Rig::new(antagonists()).unwrap();
+    let rig = compiled(antagonists());
     let (five, six) = (vec![5.0; 300], vec![5.4; 300]);
     let still = run(
         &rig,
@@ -185,7 +183,7 @@ fn what_the_muscles_give_the_arm_takes() {
     let arm = spec.arm.as_mut().unwrap();
     (arm.viscous, arm.coulomb) = (0.0, 0.0);
     let inertia = arm.inertia + arm.payload * arm.length * arm.length;
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let (a, b) = (vec![5.2; 60], vec![5.0; 60]);
     let out =
         run(&rig, 60, &[("valve_command.flexor", &a), ("valve_command.extensor", &b)], 0.005, 2e-4);
@@ -200,7 +198,7 @@ fn what_the_muscles_give_the_arm_takes() {
 
 #[test]
 fn a_planar_arm_of_one_link_is_the_one_link_arm() {
-    let one = Rig::new(shoulder()).unwrap();
+    let one = compiled(shoulder());
     let mut spec = shoulder();
     let arm = spec.arm.clone().unwrap();
     // mass and centre that give the same first moment and, with their inertia, the same about the
@@ -223,7 +221,7 @@ fn a_planar_arm_of_one_link_is_the_one_link_arm() {
     let mut one_link = shoulder();
     one_link.arm = Some(same);
     spec.arm = Some(ArmSpec { kind: "planar".into(), links: vec![link], ..arm });
-    let (planar, one_link) = (Rig::new(spec).unwrap(), Rig::new(one_link).unwrap());
+    let (planar, one_link) = (compiled(spec), compiled(one_link));
     let u = wave(300, 0.0);
     let a = run(&planar, 300, &[("valve_command", &u)], 0.005, 1e-3);
     let b = run(&one_link, 300, &[("valve_command", &u)], 0.005, 1e-3);
@@ -256,7 +254,7 @@ fn regulator(droop: f64) -> SupplySpec {
 fn a_regulator_settles_and_its_droop_follows_the_flow() {
     let mut spec = gas(&[("", 1e-3, 0.0)], vec![orifice("supply", "chamber", 5e-6)]);
     spec.supplies = vec![regulator(4e6)];
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let out = run(&rig, 500, &[], 0.02, 1e-3);
     assert!((last(&rig, &out, "muscle_pressure") - 4e5).abs() < 1.0);
     let supply = out.get(&rig, "supply_pressure").unwrap();
@@ -291,7 +289,7 @@ fn small_bottle() -> RigSpec {
 
 #[test]
 fn what_a_regulator_lets_through_is_drawn_from_its_inlet() {
-    let rig = Rig::new(small_bottle()).unwrap();
+    let rig = compiled(small_bottle());
     let set = vec![6e5; 600];
     let out = run(&rig, 600, &[("supply_command.regulator", &set)], 0.01, 1e-3);
     let of = |name: &str| out.get(&rig, name).unwrap();
@@ -331,7 +329,7 @@ fn an_inlet_far_above_every_command_changes_nothing() {
     for dead_band in [0.0, 3e4] {
         fed.supplies[1].dead_band = dead_band;
         free.supplies[0].dead_band = dead_band;
-        let (with, without) = (Rig::new(fed.clone()).unwrap(), Rig::new(free.clone()).unwrap());
+        let (with, without) = (compiled(fed.clone()), compiled(free.clone()));
         let runs = [&with, &without]
             .map(|rig| run(rig, 400, &[("supply_command.regulator", &set)], 0.01, 1e-3));
         for name in ["supply_pressure.regulator", "muscle_pressure", "air_mass"] {
@@ -364,7 +362,7 @@ fn an_inlet_that_cannot_be_is_refused() {
 
 #[test]
 fn the_block_of_a_bottle_is_drawn_from_by_its_regulator() {
-    let rig = Rig::new(small_bottle()).unwrap();
+    let rig = compiled(small_bottle());
     let (rows, dt) = (400, 0.005);
     let set: Vec<f64> = (0..rows).map(|k| if k < 100 { 3e5 } else { 6e5 }).collect();
     let command: &[(&str, &[f64])] = &[("supply_command.regulator", &set)];
@@ -405,7 +403,7 @@ fn the_block_of_a_bottle_is_drawn_from_by_its_regulator() {
     let with = |factor: f64| {
         let mut spec = small_bottle();
         spec.supplies[0].volume *= factor;
-        predicted(&Rig::new(spec).unwrap(), "supply.bottle", outlet, "").unwrap().value
+        predicted(&compiled(spec), "supply.bottle", outlet, "").unwrap().value
     };
     let (more, less) = (with(1.0 + 1e-6), with(1.0 - 1e-6));
     assert_eq!(found.columns, found.jacobian.len() / rows);
@@ -425,7 +423,7 @@ fn fed_through_a_tube(inlet_volume: f64, length: f64) -> RigSpec {
 
 #[test]
 fn small_volumes_are_stable_at_a_millisecond_and_accurate() {
-    let rig = Rig::new(fed_through_a_tube(0.0, 1.0)).unwrap();
+    let rig = compiled(fed_through_a_tube(0.0, 1.0));
     assert!(rig.stable_step() < 2e-4, "{}", rig.stable_step());
     let u = wave(200, 0.0);
     let coarse = run(&rig, 200, &[("valve_command", &u)], 0.005, 1e-3);
@@ -446,7 +444,7 @@ fn two_joints_converge_with_order_four() {
     for (joint, link) in spec.joints.iter_mut().zip(&mut spec.arm.as_mut().unwrap().links) {
         (joint.stop_stiffness, joint.stop_damping, link.coulomb) = (0.0, 0.0, 0.0);
     }
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let (a, b) = (vec![5.6; 26], vec![5.3; 26]);
     let go = |substeps: usize| {
         let timing = Timing { sample_time: 0.02, substeps };
@@ -472,7 +470,7 @@ fn two_joints_converge_with_order_four() {
 
 #[test]
 fn stops_and_choking_are_recorded_with_their_times() {
-    let rig = Rig::new(shoulder()).unwrap();
+    let rig = compiled(shoulder());
     let u: Vec<f64> = (0..800).map(|k| if k < 400 { 9.0 } else { 2.0 }).collect();
     let out = run(&rig, 800, &[("valve_command", &u)], 0.005, 1e-3);
     let kinds: Vec<&str> = out.events.iter().map(|e| e.kind.name()).collect();
@@ -496,7 +494,7 @@ fn stops_and_choking_are_recorded_with_their_times() {
 
 #[test]
 fn a_rig_goes_on_from_its_numbers_bit_for_bit() {
-    let rig = Rig::new(two_joints()).unwrap();
+    let rig = compiled(two_joints());
     let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig).unwrap();
     let (a, b) = (wave(120, 0.0), wave(120, 1.0));
     let signals: [(&str, &[f64]); 2] = [("valve_command.elbow", &a), ("valve_command.wrist", &b)];
@@ -557,7 +555,7 @@ fn light_bodies_on_stiff_muscles_are_stable_at_a_millisecond() {
         (arm.payload, arm.first_moment, arm.viscous, arm.inertia) = (0.0, 0.0, 0.0, inertia);
         (spec.joints[0].stop_stiffness, spec.joints[0].stop_damping) = (10.0, 0.0);
         spec.chambers.iter_mut().for_each(|c| c.initial_pressure = 5e5);
-        let rig = Rig::new(spec).unwrap();
+        let rig = compiled(spec);
         let (a, b) = (vec![7.0; 60], vec![6.5; 60]);
         let signals: [(&str, &[f64]); 2] =
             [("valve_command.flexor", &a), ("valve_command.extensor", &b)];
@@ -587,7 +585,7 @@ fn fast_leaks_and_walls_are_stable() {
         &[("heat_transfer_coefficient", 1e3), ("initial_temperature_rise", 0.0), ("share", 1.0)],
     )];
     for spec in [leaking, warm] {
-        let rig = Rig::new(spec).unwrap();
+        let rig = compiled(spec);
         assert!(rig.stable_step() < 1e-2, "{}", rig.stable_step());
         let (coarse, fine) = (run(&rig, 50, &[], 1e-3, 1e-3), run(&rig, 50, &[], 1e-3, 1e-6));
         for (a, b) in coarse
@@ -622,7 +620,7 @@ fn air_that_goes_back_through_a_valve_empties_its_chamber() {
     let mut through_line = spec.clone();
     through_line.lines = vec![orifice("supply", "chamber", 8.4e-6)];
     spec.valves = shoulder().valves;
-    let (valve, line) = (Rig::new(spec).unwrap(), Rig::new(through_line).unwrap());
+    let (valve, line) = (compiled(spec), compiled(through_line));
     let open = vec![10.0; 40];
     let (a, b) =
         (run(&valve, 40, &[("valve_command", &open)], 0.01, 1e-3), run(&line, 40, &[], 0.01, 1e-3));
@@ -640,7 +638,7 @@ fn slopes(run: &Trajectory, rig: &Rig, name: &str, dt: f64) -> Vec<f64> {
 
 #[test]
 fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
-    let rig = Rig::new(fed_through_a_tube(5e-6, 2.0)).unwrap();
+    let rig = compiled(fed_through_a_tube(5e-6, 2.0));
     let (rows, dt) = (400, 0.005);
     let command = wave(rows, 0.0);
     let timing = Timing::new(dt, 0.001).unwrap().stable(&rig).unwrap();
@@ -662,7 +660,7 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
     };
     let mut narrower = fed_through_a_tube(5e-6, 2.0);
     narrower.valves[0].discharge_area_max *= 0.7;
-    let (own, other) = (missed(&rig), missed(&Rig::new(narrower).unwrap()));
+    let (own, other) = (missed(&rig), missed(&compiled(narrower)));
     assert!(own < 2e3 && other > 10.0 * own, "{own} Pa, {other} Pa");
     assert!(Block::from_name(&rig, "line.other").is_err());
 }
@@ -670,10 +668,10 @@ fn the_inlet_of_a_line_is_a_block_that_a_wrong_valve_shows_in() {
 /// A gauge that reads too much moves no gas; where its zero is known, what it drives is as it was.
 #[test]
 fn gauges_of_supplies_and_lines_have_zeros() {
-    let true_rig = Rig::new(fed_through_a_tube(5e-6, 2.0)).unwrap();
+    let true_rig = compiled(fed_through_a_tube(5e-6, 2.0));
     let mut spec = fed_through_a_tube(5e-6, 2.0);
     (spec.supplies[0].pressure_zero, spec.lines[0].pressure_zero) = (1500.0, -700.0);
-    let off = Rig::new(spec).unwrap();
+    let off = compiled(spec);
     let (rows, dt) = (400, 0.005);
     let command = wave(rows, 0.0);
     let commands: [(&str, &[f64]); 1] = [("valve_command", &command)];
@@ -716,7 +714,7 @@ fn gauges_of_supplies_and_lines_have_zeros() {
 fn a_regulator_without_a_gauge_begins_where_it_is_told() {
     let mut spec = gas(&[("", 1e-4, 0.0)], vec![tube("supply", "chamber", 2.0, 0.004)]);
     spec.supplies = vec![regulator(0.0)];
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let (rows, dt) = (200, 0.005);
     let (command, still, flat) = (vec![3e5; rows], vec![0.0; rows], vec![0.0; rows]);
     let timing = Timing::new(dt, 0.001).unwrap().stable(&rig).unwrap();
@@ -750,7 +748,7 @@ fn a_regulator_without_a_gauge_begins_where_it_is_told() {
 fn a_gas_beside_driven_pressures_takes_longer_steps() {
     let mut spec = gas(&[("", 1e-4, 0.0)], vec![orifice("supply", "chamber", 2e-6)]);
     spec.supplies = shoulder().supplies;
-    let rig = Rig::new(spec).unwrap();
+    let rig = compiled(spec);
     let (rows, dt) = (400, 0.001);
     let (full, still) = (vec![6e5; rows], vec![0.0; rows]);
     let begun: Vec<f64> = (0..rows).map(|k| if k == 0 { 5.9e5 } else { 6e5 }).collect();

@@ -1,5 +1,6 @@
 //! Laws of the composed plant: order, sensitivities against differences, typed errors, determinism.
 
+use super::rigs::compiled;
 use pam_core::cut_chain::{predict, Block};
 use pam_core::cut_chain::{Measured, Signal};
 use pam_core::description::EffectSpec;
@@ -34,7 +35,7 @@ fn run(rig: &Rig, n: usize, substeps: usize) -> Trajectory {
 
 #[test]
 fn converges_with_order_four() {
-    let rig = Rig::new(spec()).unwrap();
+    let rig = compiled(spec());
     let reference = run(&rig, 60, 320);
     let error = |substeps| {
         let t = run(&rig, 60, substeps);
@@ -47,7 +48,7 @@ fn converges_with_order_four() {
 
 #[test]
 fn a_run_repeats_bit_for_bit() {
-    let rig = Rig::new(spec()).unwrap();
+    let rig = compiled(spec());
     assert_eq!(run(&rig, 100, 10), run(&rig.clone(), 100, 10));
 }
 
@@ -162,7 +163,7 @@ fn sensitivities_agree_with_differences() {
             ],
         ),
     ];
-    let base = Rig::new(with_effects.clone()).unwrap();
+    let base = compiled(with_effects.clone());
     let n = 80;
     let truth = run(&base, n, 10);
     let dt = 0.01;
@@ -176,13 +177,13 @@ fn sensitivities_agree_with_differences() {
             .unwrap();
     let timing = Timing { sample_time: dt, substeps: 10 };
     for (spec, block, names) in cases {
-        let rig = Rig::new(spec.clone()).unwrap();
+        let rig = compiled(spec.clone());
         let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
         let exact = predict(&rig, block, &measured, timing, &[0, 40], &ids).unwrap();
         for (column, name) in names.iter().enumerate() {
             let size = if name.ends_with("zero") { 1e-3 } else { 1e-4 };
             let shifted = |sign: f64| {
-                let rig = Rig::new(nudged(spec, name, sign * size)).unwrap();
+                let rig = compiled(nudged(spec, name, sign * size));
                 predict(&rig, block, &measured, timing, &[0, 40], &[]).unwrap().value
             };
             let (up, down) = (shifted(1.0), shifted(-1.0));
@@ -209,7 +210,7 @@ fn kinked(spec: &RigSpec, angle: impl Fn(f64) -> f64) {
     let supply = vec![6e5; n];
     let u = vec![5.02; n];
     let predicted = |spec: &RigSpec, names: &[&str]| {
-        let rig = Rig::new(spec.clone()).unwrap();
+        let rig = compiled(spec.clone());
         let ids: Vec<_> = names.iter().map(|n| rig.parameters().find(n).unwrap()).collect();
         let signals = [
             ("joint_angle", Signal { value: &angle, slope: &rates[0] }),
@@ -264,7 +265,7 @@ fn sensitivities_hold_over_the_kinks_of_a_volume() {
 
 #[test]
 fn commands_within_a_sample_are_held_one_after_the_other() {
-    let rig = Rig::new(spec()).unwrap();
+    let rig = compiled(spec());
     let (n, dt, each) = (60, 0.01, 5);
     // five commands a sample in the first half, one in the second, where steps may be long again
     let fine: Vec<f64> = (0..n * each)
@@ -296,7 +297,7 @@ fn commands_within_a_sample_are_held_one_after_the_other() {
 
 #[test]
 fn sensitivities_do_not_depend_on_how_many_are_asked_for() {
-    let rig = Rig::new(spec()).unwrap();
+    let rig = compiled(spec());
     let n = 40;
     let truth = run(&rig, n, 10);
     let channel = |name: &str| truth.get(&rig, name).unwrap();
@@ -379,7 +380,7 @@ fn nudged(spec: &RigSpec, name: &str, signed: f64) -> RigSpec {
 
 #[test]
 fn bad_input_is_a_typed_error() {
-    let rig = Rig::new(spec()).unwrap();
+    let rig = compiled(spec());
     let timing = Timing::new(0.005, 1e-3).unwrap();
     let initial = Initial::rest(&rig);
     let named = |e: Error, name: &str| assert!(e.to_string().contains(name), "{e}");

@@ -1,7 +1,7 @@
 //! A gas with a thermometer: its temperature is predicted from the run of its pressure, and both
 //! begin at what the thermometer reads.
 
-use crate::rigs::{effect, shoulder, warm};
+use super::rigs::{compiled, effect, shoulder, warm};
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
 use pam_core::simulate::{simulate, Initial, Timing, Trajectory};
@@ -13,7 +13,7 @@ const CHANNELS: [&str; 4] = ["supply_pressure", "muscle_pressure", "joint_angle"
 
 /// The shoulder with an energy balance, its stop far away, and some effects.
 fn rig(effects: Vec<EffectSpec>) -> Rig {
-    Rig::new(RigSpec { effects, ..warm(shoulder()) }).unwrap()
+    compiled(RigSpec { effects, ..warm(shoulder()) })
 }
 
 fn lagging(time_constant: f64) -> Vec<EffectSpec> {
@@ -112,7 +112,7 @@ fn sensitivities_are_those_of_differences() {
     let of = |time_constant: f64, wall: f64| {
         let mut spec = RigSpec { effects: lagging(time_constant), ..warm(shoulder()) };
         spec.chambers[0].heat_transfer_coefficient = wall;
-        Rig::new(spec).unwrap()
+        compiled(spec)
     };
     let names = ["chamber.heat_transfer_coefficient", "thermometer_lag.time_constant"];
     let log = Log::of(&of(0.3, 50.0), 24);

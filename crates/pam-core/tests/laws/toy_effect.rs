@@ -2,8 +2,8 @@
 //! those of the catalogue do. The same file is an entry of the catalogue where the feature `toy` is
 //! on (tests/effects/test_toy.py).
 
-use crate::rigs::{effect_at, shoulder, two_joints};
-use crate::toy_spring::{INFO, RELAXING, SECANT};
+use super::rigs::{effect_at, shoulder, two_joints};
+use super::toy_spring::{INFO, RELAXING, SECANT};
 use pam_core::cut_chain::{predict, Block, Measured, Prediction, Signal};
 use pam_core::description::EffectSpec;
 use pam_core::effects::{EffectInfo, Role};

@@ -9,7 +9,7 @@ use pam_core::simulate::{drive::Drive, simulate, Initial, Progress, Timing, Traj
 use pam_core::{Rig, RigSpec};
 use std::f64::consts::PI;
 
-use crate::rigs::shoulder;
+use super::rigs::{compiled, shoulder};
 
 const RT: f64 = 287.05 * 293.15;
 const AMBIENT: f64 = 101_325.0;
@@ -131,7 +131,7 @@ fn a_closed_tube_rings_at_a_quarter_wave() {
     // the half segment at an end is gas of the chamber there
     let mut end = chamber("b", 1e-9, 5e5);
     (end.alpha_in, end.alpha_out) = (1.4, 1.4);
-    let rig = Rig::new(gas(vec![chamber("a", 10.0, 5e5), end], vec![line])).unwrap();
+    let rig = compiled(gas(vec![chamber("a", 10.0, 5e5), end], vec![line]));
     let quarter = (1.4 * RT).sqrt() / (4.0 * length);
     // its shape, as a standing wave
     let mut initial = Initial::rest(&rig);
@@ -174,7 +174,7 @@ fn a_steady_flow_is_that_of_a_tube_without_waves_whatever_the_segments() {
     {
         let flow = |segments: usize| {
             let line = LineSpec { diameter, ..tube("chamber.a", "ambient", length, segments) };
-            let rig = Rig::new(gas(vec![chamber("a", 1e3, from)], vec![line])).unwrap();
+            let rig = compiled(gas(vec![chamber("a", 1e3, from)], vec![line]));
             let out = run(&rig, 2000, &[], 1e-3, &Initial::rest(&rig));
             assert!(imbalance(&rig, &out) < 1e-12);
             (last(&rig, &out, "mass_vented") - out.get(&rig, "mass_vented").unwrap()[1000]) / 0.999
@@ -200,7 +200,7 @@ fn mass_stays_and_two_chambers_come_to_one_pressure() {
     }
     assert!(last(&rig, &out, "segment_flow.3").abs() < 1e-9);
 
-    let rig = Rig::new(fed(3.0, 6)).unwrap();
+    let rig = compiled(fed(3.0, 6));
     let u = wave(300);
     let out = run(&rig, 300, &[("valve_command", &u)], 0.005, &Initial::rest(&rig));
     assert!(last(&rig, &out, "mass_vented") > 1e-4, "it breathes");
@@ -210,7 +210,7 @@ fn mass_stays_and_two_chambers_come_to_one_pressure() {
     let mut warm = fed(3.0, 6);
     warm.chambers[0].gas = "energy_balance".into();
     warm.chambers[0].heat_transfer_coefficient = 50.0;
-    let rig = Rig::new(warm).unwrap();
+    let rig = compiled(warm);
     let out = run(&rig, 300, &[("valve_command", &u)], 0.005, &Initial::rest(&rig));
     assert!(imbalance(&rig, &out) < 1e-12, "{}", imbalance(&rig, &out));
     let energy = |row: usize| {
@@ -229,7 +229,7 @@ fn any_tube_is_stable_at_its_own_step_and_accurate() {
     {
         let mut spec = fed(length, segments);
         (spec.lines[0].diameter, spec.lines[0].inlet_volume) = (diameter, inlet_volume);
-        let rig = Rig::new(spec).unwrap();
+        let rig = compiled(spec);
         // thrown open and shut: fills at full opening, vents at full opening
         let u: Vec<f64> = (0..40).map(|k| if k / 10 % 2 == 0 { 10.0 } else { 0.0 }).collect();
         let at = |timing: Timing| {
@@ -251,7 +251,7 @@ fn any_tube_is_stable_at_its_own_step_and_accurate() {
 
 #[test]
 fn a_run_goes_on_from_its_numbers_bit_for_bit() {
-    let rig = Rig::new(fed(4.0, 5)).unwrap();
+    let rig = compiled(fed(4.0, 5));
     let timing = Timing::new(0.005, 1e-3).unwrap().stable(&rig).unwrap();
     let u = wave(120);
     let signals: [(&str, &[f64]); 1] = [("valve_command", &u)];
@@ -277,7 +277,7 @@ fn sensitivities_are_those_of_differences() {
     let make = |length: f64, diameter: f64, alpha: f64| {
         let mut line = LineSpec { diameter, alpha, ..tube("chamber.a", "chamber.b", length, 4) };
         line.name = "hose".into();
-        Rig::new(gas(vec![chamber("a", 1e-4, 4e5), chamber("b", 1e-4, 4e5)], vec![line])).unwrap()
+        compiled(gas(vec![chamber("a", 1e-4, 4e5), chamber("b", 1e-4, 4e5)], vec![line]))
     };
     let at = [3.0, 0.004, 1.4];
     let rig = make(at[0], at[1], at[2]);
@@ -350,7 +350,7 @@ fn a_block_is_predicted_through_the_tube_before_it() {
     };
     let mut at_once = rig.spec().clone();
     at_once.lines[0].segments = 0;
-    let (own, other) = (missed(&rig), missed(&Rig::new(at_once).unwrap()));
+    let (own, other) = (missed(&rig), missed(&compiled(at_once)));
     assert!(own < 1e3 && other > 10.0 * own, "{own} Pa, {other} Pa");
 }
 
@@ -371,7 +371,7 @@ fn what_cannot_be_is_named() {
         let error = Rig::new(spec).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
-    let rig = Rig::new(fed(4.0, 5)).unwrap();
+    let rig = compiled(fed(4.0, 5));
     let initial = Initial::rest(&rig);
     assert!(initial.clone().with(&rig, "segment_flow.5", 1e-3).is_ok());
     assert!(initial.clone().with(&rig, "segment_flow.6", 1e-3).is_err());

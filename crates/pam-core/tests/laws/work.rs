@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use crate::rigs::{
+use super::rigs::{
     antagonists, effect, lone_tank, regulated, rig_for, shoulder, two_joints, TYPICAL,
 };
 use pam_core::batch::Batch;

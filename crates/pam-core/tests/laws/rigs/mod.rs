@@ -4,7 +4,21 @@ use pam_core::description::{
     dotted, ArmSpec, ChamberSpec, EffectSpec, JointSpec, LineSpec, LinkSpec, TransmissionSpec,
     ValveSpec,
 };
-use pam_core::RigSpec;
+use pam_core::{Rig, RigSpec};
+use std::collections::BTreeMap;
+use std::sync::Mutex;
+
+/// A rig from its description. Tables take most of the time of a test: rigs with the same muscles
+/// share them.
+pub fn compiled(spec: RigSpec) -> Rig {
+    static MADE: Mutex<BTreeMap<String, Rig>> = Mutex::new(BTreeMap::new());
+    let muscles = format!("{:?}", spec.muscles);
+    let known = MADE.lock().unwrap().get(&muscles).cloned();
+    let rig = known.map_or_else(|| Rig::new(spec.clone()), |rig| rig.respecified(spec.clone()));
+    let rig = rig.unwrap();
+    MADE.lock().unwrap().entry(muscles).or_insert_with(|| rig.clone());
+    rig
+}
 
 /// One link, six muscles, a valve and a tank.
 pub fn shoulder() -> RigSpec {
