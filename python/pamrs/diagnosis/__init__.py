@@ -108,7 +108,7 @@ def _capped(group: BlockGroup, factor: float) -> BlockGroup:
 
 @contextmanager
 def _in_range(name: str) -> Iterator[None]:
-    """What leaves the model's range is said of the case."""
+    """Raise DiagnosisError, naming the case, when a simulation fails."""
     try:
         yield
     except SimulationError as error:

@@ -38,7 +38,8 @@ _COUNTED = 1e-6  # probability from which a hypothesis of one group is put besid
 _MOST_SETS = 8  # sets that a case lists
 # probability of parameters (none) in a group that keeps noise: the rest (decision 4)
 _QUIET_LIKELY = 0.83
-_QUIET_OTHER = 0.03  # probability of the other one of the two (decision 4)
+# probability of none where parameters moved, and the reverse (decision 4)
+_QUIET_OTHER = 0.03
 # probability of unlisted in such a group, too small to see: 24 of 171 groups (decision 4)
 _QUIET_UNLISTED = 0.14
 # parameters with one at its wall: explained, at a price the owner would mind (decision 4)

@@ -597,8 +597,8 @@ def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
 
 
 def lacks_drift(candidate: Candidate, seconds: float) -> bool:
-    """Whether a clock of a set does not drift: two free clocks do, and what is late by the same
-    time always is a lag or a delay.
+    """Whether a clock of a set does not drift: two free clocks drift, and a constant delay is a lag
+    or a dead time.
     """
 
     def at_rest(effect: Term, same: SameData) -> bool:

@@ -88,7 +88,7 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """Where a fitted model stands, and what its free parameters could still do.
+    """Residual and tangent space of a fitted model.
 
     Attributes
     ----------
@@ -279,7 +279,7 @@ class _Looking:
     inflation : dict of str to float
         As in :func:`pamrs.diagnosis.fit.fit`.
     tangent : Tangent
-        Where the model stands.
+        Of the model.
     strong : bool
         As in :func:`screen`.
     signatures : list of (effect, start, (n,) array)

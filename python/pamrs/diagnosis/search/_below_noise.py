@@ -284,7 +284,7 @@ def _group(
 def _matching_shifted(
     screened: Screen, found: Fit, trial: Attempts, autocorrelation: dict[str, float]
 ) -> dict[Term, Begun]:
-    """Effects that do what a parameter was moved far for."""
+    """Effects whose signature matches a strongly shifted parameter."""
     known = known_parameters(trial.nominal)
     _, jacobian = stacked(trial.inner, found.residuals, autocorrelation)
     best: dict[Term, tuple[float, Begun]] = {}
