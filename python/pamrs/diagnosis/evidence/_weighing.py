@@ -12,7 +12,7 @@ from scipy.stats import chi2
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
 from pamrs.diagnosis.evidence._predictive import bootstrapped
-from pamrs.diagnosis.fit import Problem, form_in, same_data_in
+from pamrs.diagnosis.fit import Problem, form_in, same_data_in, says_same
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
@@ -473,14 +473,19 @@ def _share_between_same_data(
     suspects: list[Block],
     seconds: float,
 ) -> None:
-    """Share probabilities out between sets that are the same data, by the odds before any data."""
+    """Share probabilities out between sets that are the same data, by the odds before any data: a
+    late clock and the dead time of a regulator, left out or wrong in the file.
+    """
     for one in named:
         for effect in one.effects:
             same = same_data_in(one.fit.rig, effect)
             if same is None or not same_recordings(one, effect, seconds):
                 continue
-            names = {Term(same.effect) if e == effect else e for e in one.effects}
-            other = next((c for c in named if set(c.effects) == names and not c.wrong), None)
+            shared = set(one.terms) - {effect}
+            others = (c for c in named if shared <= set(c.terms) and len(c.terms) == len(one.terms))
+            other = next(
+                (c for c in others if all(says_same(t, same) for t in set(c.terms) - shared)), None
+            )
             # what explains more than the other could is something else as well
             if other is None:
                 continue

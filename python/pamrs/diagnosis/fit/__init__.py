@@ -6,14 +6,22 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
 `with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
-`depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`, `without_passing`,
-`known_parameters`, `with_known` (effects that the nominal model holds, and what is known of all
-parameters); `spread_over_pieces` (standard deviations that hold for coloured residuals).
+`depends`, `fits`, `places_of`, `same_data_in`, `says_same` (where effects act); `holdable`,
+`without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
+is known of all parameters); `spread_over_pieces` (standard deviations of coloured residuals).
 """
 
 from __future__ import annotations
 
-from pamrs.diagnosis.fit._acting import acts_in, concerns, depends, fits, places_of, same_data_in
+from pamrs.diagnosis.fit._acting import (
+    acts_in,
+    concerns,
+    depends,
+    fits,
+    places_of,
+    same_data_in,
+    says_same,
+)
 from pamrs.diagnosis.fit._fitting import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
@@ -86,6 +94,7 @@ __all__ = [
     "predicted_with_doubt",
     "residuals",
     "same_data_in",
+    "says_same",
     "spread_over_pieces",
     "stacked",
     "starts_of",
