@@ -21,6 +21,7 @@ __all__ = [
     "checked_number",
     "checked_table",
     "finite",
+    "is_finite",
     "one_of",
     "positive",
     "rising",
@@ -111,10 +112,20 @@ def finite(name: str, value: Any) -> float:
     return number
 
 
-def _number(value: Any) -> float:
-    """A value as a number, NaN where it is none."""
+def is_finite(value: object) -> bool:
+    """Whether something is a number, and no flag."""
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
     try:
-        return float(value)
+        return math.isfinite(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return False
+
+
+def _number(value: Any) -> float:
+    """A value as a number, NaN where it is none; text is none, whatever it says."""
+    try:
+        return math.nan if isinstance(value, (str, bytes, bytearray)) else float(value)
     except (TypeError, ValueError, OverflowError):
         return math.nan
 
@@ -159,12 +170,12 @@ def rising(name: str, given: Any) -> tuple[float, float]:
         If they are not.
     """
     try:
-        low, high = (float(value) for value in given)
+        low, high = map(_number, given)
     except (TypeError, ValueError):
         low = high = math.nan
     if not (math.isfinite(low) and math.isfinite(high) and low < high):
         raise ParameterError(
-            f"{name} = {given} is not allowed: two rising finite numbers are needed"
+            f"{name} = {as_said(given)} is not allowed: two rising finite numbers are needed"
         )
     return low, high
 

@@ -17,6 +17,7 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
+from pamrs._checks import is_finite
 from pamrs.units import from_si, parse_unit, spellings
 
 __all__ = [
@@ -293,7 +294,7 @@ def accepts(schema: Mapping[str, Any], value: Any) -> bool:
     ):
         return False
     if kind in ("number", "integer"):
-        return bool(abs(value) < math.inf)
+        return is_finite(value)
     if kind == "string":
         return bool(schema.get("minLength", 0) <= len(value) <= schema.get("maxLength", math.inf))
     if kind == "array":

@@ -31,7 +31,7 @@ pub mod scalar;
 pub mod simulate;
 mod vector;
 
-// The laws see the crate as its users do.
+// The laws name the crate as its users do.
 #[cfg(test)]
 extern crate self as pam_core;
 #[cfg(test)]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Mapping
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["KEYS", "Calibration", "is_finite", "read_calibration"]
+from pamrs._checks import is_finite
+
+__all__ = ["KEYS", "Calibration", "read_calibration"]
 
 Array = NDArray[np.float64]
 
@@ -105,13 +106,3 @@ def _readings(problems: list[str], label: str, given: Any, stand_for: Any) -> Ca
         return Calibration(scale, stand_for[0] - scale * given[0])
     way = 1 if rises[0] else -1
     return Calibration(table=(tuple(map(float, given[::way])), tuple(map(float, stand_for[::way]))))
-
-
-def is_finite(value: object) -> bool:
-    """Whether something is a number, and no flag."""
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer of hundreds of digits
-        return False

@@ -167,7 +167,7 @@ class Conclusion:
 
     def hypotheses(self, problem: Problem) -> list[tuple[str, Rig, float]]:
         """The likely hypotheses that have a model: label, rig and probability."""
-        return _fit_hypotheses(self.judged, self.probabilities, self.models.nominal, problem)
+        return _models_of(self.judged, self.probabilities, self.models.nominal, problem)
 
 
 def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGroup]) -> Conclusion:
@@ -328,7 +328,7 @@ def _run(problem: Problem, rig: Rig, events: Events | None) -> dict[Key, Residua
     )
 
 
-def _fit_hypotheses(
+def _models_of(
     judged: list[Judged], probabilities: dict[Hypothesis, float], nominal: Rig, problem: Problem
 ) -> list[tuple[str, Rig, float]]:
     """The likely hypotheses that have a model, as fitted, the refitted baseline where nothing has a

@@ -28,6 +28,7 @@ _LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
 _STATED_FREEDOM = 4.0
 # share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
 _CURVE_REST = 0.02
+_MOST_EXPONENT = 700.0  # that a double's exponential bears
 
 
 Array = NDArray[np.float64]
@@ -326,7 +327,7 @@ def _pooled(
     pooled = math.sqrt(float(np.sum((shares * random) ** 2)))
     scatter = max(1e-6, pooled * math.sqrt(1.0 + 1.0 / settings.noise_replicates))
     chance = t(len(keys) * (settings.noise_replicates - 1))
-    beyond = float(chance.isf(settings.noise_chance)) * scatter
+    beyond = min(float(chance.isf(settings.noise_chance)) * scatter, _MOST_EXPONENT)
     # the model has one error, the same in all recordings, and its square is that of a few numbers
     stated = float(np.sum(shares * [noise_level[key].stated for key in keys]))
     larger = 1.0 + stated * (

@@ -238,7 +238,7 @@ class _Growing:
         return [best, *(c for c in tried if c is not None)]
 
     def widen(self, base: Candidate) -> list[Candidate]:
-        """A set with each of its likely partners, fitted from where both tangent."""
+        """A set with each of its likely partners, fitted from where both are."""
         begun = self.trial.starts_of(base)
         partners = []
         for partner in self._partners(base, begun):

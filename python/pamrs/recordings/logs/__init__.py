@@ -7,8 +7,6 @@ channel, and in what unit, is for those who call it.
 
 from __future__ import annotations
 
-import gc
-import sys
 from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
@@ -147,20 +145,13 @@ def read_log(path: Path, form: TextFormat | None = None) -> Log:
         If a package is missing; the message names the extra.
     """
     check_readable(path)
-    reason, hook = "", sys.unraisablehook
-    sys.unraisablehook = lambda _: None  # asammdf fails once more as its half-read file is freed
     try:
         log = _format(path).read(path, form or TextFormat())
     except PamrsError:
         raise
     except Exception as error:  # each library has its own kinds for a broken file
         reason = next(iter(str(error).strip().splitlines()), type(error).__name__)
-    finally:
-        if reason:
-            gc.collect()
-        sys.unraisablehook = hook
-    if reason:
-        raise RecordingError(f"{path}: cannot be read ({reason[:200]})")
+        raise RecordingError(f"{path}: cannot be read ({reason[:200]})") from error
     sizes = [series.values.size for series in log.series.values()]
     check_size(max(sizes, default=0), sum(sizes), str(path))
     return log

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import gc
+import sys
+import threading
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 
 __all__ = ["read_mdf", "read_tdms"]
+
+_SILENCE = threading.Lock()
+"""Only one file at a time is opened without what Python says of failing destructors."""
 
 
 def read_mdf(path: Path, form: TextFormat) -> Log:
@@ -35,7 +42,7 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
     unread: dict[str, str] = {}
     file: Any
     gate = Gate(path)
-    with MDF(path) as file:
+    with _opened(MDF, path) as file:
         for group in file.groups:
             gate.admit(group.channel_group.cycles_nr, len(group.channels))
         for number, group in enumerate(file.groups):
@@ -61,6 +68,24 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
                 prefix = f"{_group_name(group, number)}/" if several else ""
                 found.append(Series(prefix + channel.name, values, signal.unit or "", time))
     return collected(path, found, unread)
+
+
+def _opened(kind: Any, path: Path) -> Any:
+    """A measurement file. Of a broken one asammdf fails once more as its half-read object is freed,
+    with a traceback that nothing can catch: it is freed here, in silence.
+    """
+    reason = ""
+    with _SILENCE:
+        hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
+        try:
+            return kind(path)
+        except Exception as error:
+            reason = str(error) or type(error).__name__
+        finally:
+            if reason:
+                gc.collect()
+            sys.unraisablehook = hook
+    raise RecordingError(f"{path}: cannot be read ({reason.splitlines()[0][:200]})")
 
 
 def _group_name(group: Any, number: int) -> str:
