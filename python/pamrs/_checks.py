@@ -21,7 +21,6 @@ __all__ = [
     "checked_number",
     "checked_table",
     "finite",
-    "is_finite",
     "one_of",
     "positive",
     "rising",
@@ -110,16 +109,6 @@ def finite(name: str, value: Any) -> float:
     if not math.isfinite(number := _number(value)):
         raise ParameterError(f"{name} = {as_said(value)} is not allowed: a finite number is needed")
     return number
-
-
-def is_finite(value: object) -> bool:
-    """Whether something is a number, and no flag."""
-    if not isinstance(value, (int, float)) or isinstance(value, bool):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # an integer of hundreds of digits
-        return False
 
 
 def _number(value: Any) -> float:

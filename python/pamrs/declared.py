@@ -17,7 +17,6 @@ import typing
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, NamedTuple
 
-from pamrs._checks import is_finite
 from pamrs.units import from_si, parse_unit, spellings
 
 __all__ = [
@@ -29,6 +28,7 @@ __all__ = [
     "Rule",
     "accepts",
     "document",
+    "is_finite",
     "object_of",
     "problems_of",
     "quantity",
@@ -271,6 +271,16 @@ _TYPES: Final[dict[str, tuple[type, ...]]] = {
     "array": (list,),
     "object": (Mapping,),
 }
+
+
+def is_finite(value: object) -> bool:
+    """Whether something is a number, and no flag."""
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer of hundreds of digits
+        return False
 
 
 def accepts(schema: Mapping[str, Any], value: Any) -> bool:

@@ -178,7 +178,7 @@ def _muscle(
             raise FitError("; ".join([str(error), *inputs.data.notes])) from error
     command = _command(context)
     contents: Contents = {
-        json: _muscle_document(fit, comparison, rubbing, context),
+        json: _muscle_document(fit, comparison, rubbing, context) if json else "",
         rig: fit.to_rig(inputs.rig).to_toml_text() if rig else "",
         png: lambda path: pages.write_figure(fit, path, comparison),
         report: lambda path: pages.write_report(fit, path, comparison, command=command),
@@ -225,7 +225,7 @@ def _map(
     with progress(f"fitting {inputs.data.label}"):
         fit = fit_map(inputs.data, nodes=nodes)
     contents: Contents = {
-        json: _document(MAP_SCHEMA, inputs.data, context, fit=fit.to_dict()),
+        json: _document(MAP_SCHEMA, inputs.data, context, fit=fit.to_dict()) if json else "",
         rig: fit.to_rig(inputs.muscle, inputs.rig).to_toml_text() if rig else "",
     }
     write(contents, f"{inputs.data.label}: {fit.fit_report()}")
@@ -268,7 +268,9 @@ def _friction(
         fit = fit_friction(map_, floor=floor)
     rows = len(map_)
     contents: Contents = {
-        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit.to_dict()),
+        json: _document(FRICTION_SCHEMA, map_, context, rows=rows, fit=fit.to_dict())
+        if json
+        else "",
         png: lambda path: write_atomically(path, render_friction_png(fit, map_)),
     }
     write(contents, f"{map_.label}: {fit.fit_report()}")
@@ -385,7 +387,11 @@ def _inputs(context: typer.Context) -> _Inputs:
 
     given, data = context.params, context.params["data"]
     if data.suffix.lower() == ".toml":
-        beside = [key for key in ("muscle", *GEOMETRY, "where", "clipped") if given[key]]
+        beside = [
+            key
+            for key in ("muscle", *GEOMETRY, "where", "clipped")
+            if given[key] or given[key] == ""
+        ]
         if beside:
             raise ParameterError(
                 f"{', '.join(map(_option, beside))} cannot be given: {data} describes its table "

@@ -91,15 +91,18 @@ def size_command(
         result.table(),
         *_remarks(candidates),
     ]
-    written = document(
-        SCHEMA,
-        requirement={"position": requirement.position, "points": requirement.array.tolist()},
-        filling=asdict(filling),
-        core=free,
-        max_count=max_count,
-        **result.to_dict(),
-    )
-    write({json: written}, "\n".join(lines))
+
+    def written() -> str:
+        return document(
+            SCHEMA,
+            requirement={"position": requirement.position, "points": requirement.array.tolist()},
+            filling=asdict(filling),
+            core=free,
+            max_count=max_count,
+            **result.to_dict(),
+        )
+
+    write({json: written() if json else ""}, "\n".join(lines))
 
 
 # ------------------------------------------------------------------------- inputs

@@ -9,7 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import is_finite
+from pamrs.declared import is_finite
 
 __all__ = ["KEYS", "Calibration", "read_calibration"]
 

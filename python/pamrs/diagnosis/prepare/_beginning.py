@@ -88,7 +88,7 @@ def begun_alike(
     unsettled = {channel: count for channel, count in counts.items() if count > 0}
     prepared = replace(prepared, unsettled=unsettled) if unsettled else prepared
     began = {
-        block.channel: _began_at(block, block.warm[1], core, prepared)
+        block.channel: _began_at(block, core, prepared, tolerances or {})
         for block in blocks
         if block.warm is not None
     }
@@ -105,37 +105,48 @@ def _rests(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolera
     A joint on its stop that is given a speed, by the noise of a few samples, bounces, and what a
     window is freed of is linear in where it starts.
     """
-    names = [n for n in core.parameter_names if n in block.parameters and n in tolerances]
-    if not names:
-        return False
-    tol = np.array([tolerances[n] for n in names])
     left = []
     for channels in (frozenset[str](), frozenset({block.channel})):
         there = replace(prepared, at_rest=channels, _begun={})
-        try:
-            found = residual(block, core, there, names)
-        except SimulationError:
-            return False
-        if found.jacobian is None or not found.starts or found.starts[0][0] > 0:
-            return False
-        last = found.starts[0][1]
-        slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
-        rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
-        rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
-        left.append(float(rows @ rows))
+        left.append(_left_at_first(block, core, there, tolerances))
     seen, still = left
     return seen - still > _STILL_DEVIATIONS**2
 
 
-def _began_at(block: Block, rest: float, core: _core.Rig, prepared: Prepared) -> float:
+def _left_at_first(
+    block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances
+) -> float:
+    """Chi-square that the first window of a block keeps, its parameters free inside their
+    tolerances; NaN where nothing tells it.
+    """
+    names = [n for n in core.parameter_names if n in block.parameters and n in tolerances]
+    if not names:
+        return math.nan
+    tol = np.array([tolerances[n] for n in names])
+    try:
+        found = residual(block, core, prepared, names)
+    except SimulationError:
+        return math.nan
+    if found.jacobian is None or not found.starts or found.starts[0][0] > 0:
+        return math.nan
+    last = found.starts[0][1]
+    slopes = np.vstack([found.jacobian[:last] * tol / found.noise, np.eye(tol.size)])
+    rows = np.concatenate([found.value[:last] / found.noise, np.zeros(tol.size)])
+    rows = rows - slopes @ np.linalg.lstsq(slopes, rows)[0]
+    return float(rows @ rows)
+
+
+def _began_at(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tolerances) -> float:
     """Temperature at which a gas began [K], as a transient of its pressure tells by the nominal
-    model; that of the room where it stands still, or began about as warm.
+    model; that of the room where it stands still, began about as warm, or where values inside their
+    tolerances do as well.
 
     A log that begins in a transient has a gas that was compressed or let out before. What that does
     is not linear, so that the first windows begin where they tell, and are freed of the rest: a
     pressure stands still on warm gas too, behind an open valve.
     """
-    settings = prepared.settings
+    assert block.warm is not None
+    settings, rest = prepared.settings, block.warm[1]
     early = 2 * WINDOW_SAMPLES_PER_STATE
     rows = np.flatnonzero(prepared.recording.mask[block.channel][:early])
     if rows.size < WINDOW_SAMPLES_PER_STATE:
@@ -152,7 +163,13 @@ def _began_at(block: Block, rest: float, core: _core.Rig, prepared: Prepared) ->
         if not first.begun or first.starts[0][0] > 0 or first.begun[0].size < 2:
             return rest  # nothing of it is seen
         found = float(np.clip(found + first.begun[0][-1], 0.5 * rest, 2.0 * rest))
-    return found if abs(found - rest) > settings.begun_temperature_error else rest
+    if abs(found - rest) <= settings.begun_temperature_error:
+        return rest
+    known = ({}, {block.channel: found})
+    cold, warm = (
+        _left_at_first(block, core, replace(prepared, temperatures=t), tolerances) for t in known
+    )
+    return rest if cold - warm <= _STILL_DEVIATIONS**2 else found
 
 
 def _trend(prepared: Prepared, channel: str, rows: NDArray[np.intp]) -> float:
