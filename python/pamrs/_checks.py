@@ -169,14 +169,14 @@ def rising(name: str, given: Any) -> tuple[float, float]:
     return low, high
 
 
-def one_of(name: str, value: Any, allowed: Iterable[Any]) -> Any:
-    """The value, if it is one of those that are allowed; an error names them otherwise."""
+def one_of(name: str, value: Any, allowed: Iterable[Any], *, also: str = "") -> Any:
+    """The value, if it is one of those that are allowed; an error names them otherwise, and says
+    ``also`` behind them: what else would be right, or for what they are.
+    """
     known = list(allowed)
     if value not in known:
-        raise ParameterError(
-            f"{name} = {as_said(value)} is not allowed: one of {', '.join(map(repr, known))} is "
-            "needed"
-        )
+        each = f"{'one of ' * (len(known) > 1)}{', '.join(map(repr, known))}"
+        raise ParameterError(f"{name} = {as_said(value)} is not allowed: {each} is needed{also}")
     return value
 
 

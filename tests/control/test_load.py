@@ -2,6 +2,7 @@
 error is known.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -210,7 +211,9 @@ def test_what_cannot_be_is_named():
         ArmModel.from_rig(RIG)
     with pytest.raises(ParameterError, match="'simplified'.*where a mass hangs"):
         RigModel(RIG, torque="simplified")
-    with pytest.raises(ParameterError, match="kind = 'neural'.*'adaptive' is needed"):
+    with pytest.raises(
+        ParameterError, match="kind = 'neural'.*'adaptive' is needed for a hanging mass"
+    ):
         MODEL.law("neural")
     with pytest.raises(ParameterError, match=r"^length = 0.3 .* from 0.18 to 0.28 m$"):
         whole.holding(0.3)
@@ -220,6 +223,10 @@ def test_what_cannot_be_is_named():
         whole.update(0.0, {"muscle_pressure": 0.0}, Reference(0.25))
     with pytest.raises(ParameterError, match="rest_length = -1"):
         ARM.replace(rest_length=-1.0)
+    parts = {f.name: getattr(ARM, f.name) for f in dataclasses.fields(ARM)}
+    parts.pop("rest_length")
+    with pytest.raises(TypeError, match="rest_length"):
+        LoadModel(**parts)
     assert math.isfinite(ARM.replace(inertia=3.0).inertia)
 
 

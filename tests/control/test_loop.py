@@ -62,6 +62,8 @@ def test_it_follows_and_its_metrics_are_those_of_its_rows(rig):
     assert found.squared_error == pytest.approx(np.sum(run.error**2) * 1e-3, rel=1e-2)
     slower = closed_loop(rig, SmallPid(kp=1.0, ki=0.5), run.trajectory).metrics()
     assert slower.lag > found.lag > 0.1
+    with pytest.raises(ParameterError, match="unit = ''.*'rad', 'deg' is needed"):
+        run.metrics(unit="")
 
 
 def test_a_restarted_loop_with_noise_and_delay_is_the_whole_one(rig):

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 import pamrs
 from pamrs.control import PID, FilteredDerivative, Fuzzy, Integrator, LowPass, PIDLaw, sweep
+from pamrs.control._values import greater, lesser
 from pamrs.control.trajectories import step
 from pamrs.errors import ParameterError
 
@@ -147,3 +148,10 @@ def test_a_low_pass_of_no_time_constant_passes_its_input_to_the_last_bit():
         assert (passed[[0, 2]] == row[[0, 2]]).all()
         assert single.update(float(row[0])) == row[0]
         assert passed[1] == other.update(float(row[1]))
+
+
+def test_the_greater_and_the_lesser_of_numbers_and_of_rows():
+    assert (greater(1.0, 2.0), lesser(1.0, 2.0), lesser(2.0, 1.0)) == (2.0, 1.0, 1.0)
+    rows = np.array([1.0, 3.0])
+    assert greater(rows, 2.0).tolist() == [2.0, 3.0]
+    assert lesser(rows, 2.0).tolist() == [1.0, 2.0]

@@ -1,5 +1,6 @@
 """PID and fuzzy control against hand computation, scipy and the text."""
 
+import inspect
 import math
 
 import numpy as np
@@ -135,8 +136,21 @@ def test_the_rule_that_the_text_quotes():
         assert np.diff(rules, axis=1).min() >= 0.0
     with pytest.raises(ParameterError, match="7 x 7"):
         fuzzy_rules(np.zeros((6, 7)))
-    with pytest.raises(ParameterError, match="table"):
+    with pytest.raises(
+        ParameterError, match="table = 'other'.*'quoted' is needed, or 7 x 7 numbers"
+    ):
         fuzzy_rules("other")
+
+
+@pytest.mark.parametrize(
+    ("kind", "arguments"),
+    [(PID, (1.0,)), (Fuzzy, (1.0, 1.0, 1.0)), (Feedforward, (FULL, AIR))],
+)
+def test_options_of_the_sensor_are_those_of_the_controller(kind, arguments):
+    options = {"rate_filter", "angle_filter", "measured_rate"}
+    assert options <= set(inspect.signature(kind).parameters)
+    with pytest.raises(TypeError, match=rf"^{kind.__name__}\..*kpp"):
+        kind(*arguments, kpp=3)
 
 
 def test_surface_at_the_centres_is_the_table_and_by_hand_between():

@@ -13,6 +13,7 @@ import pytest
 
 import pamrs
 from pamrs.simulation import core_rig
+from pamrs.simulation._plants import thread_count
 from tests.scripts import script
 
 DT = 0.002
@@ -475,3 +476,11 @@ def test_a_reset_is_a_new_batch_and_keeps_its_threads():
     assert new.observe()["joint_angle"] == pytest.approx([0.5, 0.5])
     new.step(5.0)
     assert new.reset()["joint_angle"] == pytest.approx([0.5, 0.5])
+
+
+def test_threads_are_those_that_the_process_may_use(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {1, 4, 5}, raising=False)
+    assert thread_count(None) == 3
+    monkeypatch.delattr(os, "sched_getaffinity")
+    monkeypatch.setattr(os, "cpu_count", lambda: 7)
+    assert thread_count(None) == 7

@@ -87,6 +87,16 @@ def test_what_a_frame_cannot_do_is_named(arguments: dict[str, object], message: 
         pamrs.simulate(pamrs.rigs.bench(muscle()), sample_time=0.01, **arguments)  # type: ignore[arg-type]
 
 
+def test_the_row_whose_initial_length_is_not_that_of_the_frame_is_named() -> None:
+    with pytest.raises(pamrs.PamrsError, match=r"= 0\.25 does .* length\[0\] = 0\.27 of row 1"):
+        pamrs.simulate_batch(
+            pamrs.rigs.bench(muscle()),
+            sample_time=0.01,
+            length=[0.27, 0.26],
+            initial={"length": [0.27, 0.25]},
+        )
+
+
 def test_only_a_frame_takes_a_length_and_no_valve_a_pressure() -> None:
     with pytest.raises(pamrs.PamrsError, match="only a rig with a load frame"):
         pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, length=[0.1, 0.1])

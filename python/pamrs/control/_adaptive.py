@@ -220,7 +220,7 @@ def _bounds(
         return None
     parameters = arm.parameters
     if isinstance(bounds, str):
-        one_of("bounds", bounds, ("default", None))
+        one_of("bounds", bounds, ("default", None), also=", or three pairs")
         # an arm of which nothing is known: what its muscles could move at all
         lowest, highest = arm.angle_range
         places = np.linspace(lowest, highest, 33)  # of each joint, along the first axis

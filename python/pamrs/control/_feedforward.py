@@ -4,7 +4,7 @@ feedback.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -103,9 +103,8 @@ class Feedforward(SampledController):
         below zero: (4.7) in the place of (4.4). By default the arm's own torque, both ways.
     pressure_filter : float or ndarray, shape (n,)
         Time constant of the low-pass on the pressure [s].
-    **sensor
-        Of the :class:`pamrs.control.JointSensor`, with the measured motion only: ``rate_filter``,
-        ``angle_filter`` and ``measured_rate``.
+    rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.JointSensor`, with the measured motion only.
 
     Notes
     -----
@@ -136,7 +135,9 @@ class Feedforward(SampledController):
         motion: str = "commanded",
         lengthening: TorqueModel | None = None,
         pressure_filter: Value = 0.0,
-        **sensor: Any,
+        rate_filter: Value = 0.02,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
     ) -> None:
         one_of("motion", motion, ("commanded", "measured"))
         self.arm, self.air, self.motion, self.lengthening = arm, air, motion, lengthening
@@ -147,7 +148,9 @@ class Feedforward(SampledController):
             else (self._km > 0.0).astype(float)
         )
         self._friction = bool(friction)
-        self.sensor = JointSensor(period, **sensor)
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
         self.low_pass = LowPass(pressure_filter, period)
         filters = self.low_pass.time_constant, *self.sensor.gains
         super().__init__(period, (self._km, *arm.gains, *filters))

@@ -5,7 +5,7 @@ Control, 1998).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -56,7 +56,7 @@ def fuzzy_rules(table: str | ArrayLike = "anti_diagonal") -> NDArray[np.float64]
     """
     i, j = np.meshgrid(np.arange(-_HALF, _HALF + 1), np.arange(-_HALF, _HALF + 1), indexing="ij")
     if isinstance(table, str):
-        one_of("table", table, ("anti_diagonal", "quoted"))
+        one_of("table", table, ("anti_diagonal", "quoted"), also=", or 7 x 7 numbers")
         index = (i + j + (np.sign(j) * (i + j == 0) if table == "quoted" else 0)).astype(np.float64)
         return np.clip(index, -_HALF, _HALF) / _HALF
     given = np.asarray(table, dtype=np.float64)
@@ -170,9 +170,8 @@ class Fuzzy(OutputFeedback):
         Output for no error [V].
     output_filter : float or ndarray, shape (n,)
         Time constant of the low-pass on the output [s].
-    **sensor
-        Of the :class:`pamrs.control.JointSensor`: ``rate_filter``, ``angle_filter`` and
-        ``measured_rate``.
+    rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.PID`.
 
     Raises
     ------
@@ -204,7 +203,9 @@ class Fuzzy(OutputFeedback):
         limits: tuple[float, float] = (0.0, 10.0),
         null: float = 5.0,
         output_filter: Value = 0.05,
-        **sensor: Any,
+        rate_filter: Value = 0.02,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
     ) -> None:
         self._g1, self._g2 = positive_gain("g1", g1), positive_gain("g2", g2)
         self._h = as_value("h", h, lower=0.0)
@@ -217,7 +218,9 @@ class Fuzzy(OutputFeedback):
             unit=unit,
             limits=limits,
             null=null,
-            **sensor,
+            rate_filter=rate_filter,
+            angle_filter=angle_filter,
+            measured_rate=measured_rate,
         )
         self._error_scale, self._rate_scale = self._scale / self._g1, self._scale / self._g2
         self.reset()

@@ -8,7 +8,6 @@ torque is. So every law of one joint holds, with metres and newtons for radians 
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
@@ -47,7 +46,7 @@ class LoadModel(ArmModel):
         ``L0`` of the muscles [m].
     """
 
-    rest_length: float = math.nan
+    rest_length: float = dataclasses.field(kw_only=True)
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -111,14 +111,14 @@ class ClosedLoop:
             trajectory = trajectory.of_joint[name]
         own = unit_of(channel)
         allowed = ("rad", "deg") if own == "rad" else (own,)
-        one_of("unit", unit or own, allowed)
+        chosen: str = one_of("unit", own if unit is None else unit, allowed)
         return evaluate(
             self.time,
             wanted,
             self.channels[channel],
             rate=self.channels.get(rate_of(channel)),
             parts=trajectory.phases,
-            unit=unit or own,
+            unit=chosen,
         )
 
     def to_pandas(self) -> pd.DataFrame:

@@ -24,7 +24,7 @@ class OutputFeedback(SampledController):
         Time between two updates [s].
     gains : iterable of float or ndarray
         Everything that may be an array, but for the sensor's.
-    unit, limits, null, **sensor
+    unit, limits, null, rate_filter, angle_filter, measured_rate
         As for :class:`pamrs.control.PID`.
 
     Raises
@@ -46,12 +46,16 @@ class OutputFeedback(SampledController):
         unit: str,
         limits: tuple[float, float],
         null: float,
-        **sensor: Any,
+        rate_filter: Value,
+        angle_filter: Value,
+        measured_rate: bool,
     ) -> None:
         self._unit, self._scale = unit, angle_factor(unit)
         low, high, self._null = limits_around(limits, null)
         self._limits = low, high
-        self.sensor = JointSensor(period, **sensor)
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
         super().__init__(period, (*gains, *self.sensor.gains))
 
     @classmethod

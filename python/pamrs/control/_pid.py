@@ -5,7 +5,7 @@ joint angle.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 from pamrs.control._output_feedback import OutputFeedback
 from pamrs.control._parts import Integrator, LowPass
@@ -142,9 +142,8 @@ class PID(OutputFeedback):
         Of the back-calculation [s].
     output_filter : float or ndarray, shape (n,)
         Time constant of the low-pass on the output [s].
-    **sensor
-        Of the :class:`pamrs.control.JointSensor`: ``rate_filter``, ``angle_filter`` and
-        ``measured_rate``.
+    rate_filter, angle_filter, measured_rate
+        As for :class:`pamrs.control.JointSensor`.
 
     Raises
     ------
@@ -178,7 +177,9 @@ class PID(OutputFeedback):
         anti_windup: str = "clamping",
         tracking_time: Value = 0.5,
         output_filter: Value = 0.05,
-        **sensor: Any,
+        rate_filter: Value = 0.02,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
     ) -> None:
         self.law = PIDLaw(
             kp,
@@ -191,7 +192,16 @@ class PID(OutputFeedback):
             tracking_time=tracking_time,
             output_filter=output_filter,
         )
-        super().__init__(period, self.law.gains, unit=unit, limits=limits, null=null, **sensor)
+        super().__init__(
+            period,
+            self.law.gains,
+            unit=unit,
+            limits=limits,
+            null=null,
+            rate_filter=rate_filter,
+            angle_filter=angle_filter,
+            measured_rate=measured_rate,
+        )
         self._simple = not self.law.derives and self.sensor._through
         self.reset()
 

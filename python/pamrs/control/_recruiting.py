@@ -24,7 +24,7 @@ from pamrs.control._parts import FilteredDerivative
 from pamrs.control._protocol import Value
 from pamrs.control._sharing import Demand, Share
 from pamrs.control._torque import GroupTorque
-from pamrs.control._values import clip, greater, positive_number, sin, where
+from pamrs.control._values import clip, greater, lesser, positive_number, sin, where
 from pamrs.errors import ParameterError
 
 _FILL = 0.3  # of the ramp: how long a group is filled before it pulls
@@ -160,7 +160,7 @@ class Recruitment(Share):
         drive = clip(self._drive(torque, lines, weights), 0.0, limit)
         supply = demand.supplies[0]
         for other in demand.supplies[1:]:
-            supply = -greater(-supply, -other)
+            supply = lesser(supply, other)
         self._move(supply, self._choose(torque, angle, lines, supply))
         answers: list[Value] = []
         for share, weight, (c1, c2) in zip(self.shares, weights, lines, strict=True):

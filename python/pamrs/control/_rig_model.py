@@ -178,6 +178,7 @@ class RigModel:
         light = float(inertia.min()) / _SHOULDER[0]
         if len(self.joints) == 1:
             ease = float(ease[0])
+        also = ""
         usual: dict[str, dict[str, Any]] = {
             "feedforward": {},
             "sliding": {"switching": 2e4 * ease},
@@ -196,7 +197,8 @@ class RigModel:
             surface = {"switching": 6e4 * ease * reach, "boundary_layer": 0.2 * reach}
             gains = (light / reach**2, 5.0 * light / reach**2, 300.0 * light)
             usual = {"feedforward": {}, "sliding": surface, "adaptive": {**surface, "gains": gains}}
-        one_of("kind", kind, usual)
+            also = " for a hanging mass"
+        one_of("kind", kind, usual, also=also)
         return _LAWS[kind](self.arm, period=period, **{**usual[kind], **changes})
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from pamrs.control._protocol import Value
 from pamrs.control._sampled import Stateful
 from pamrs.control._torque import GroupTorque
-from pamrs.control._values import as_value, clip, greater
+from pamrs.control._values import as_value, clip, greater, lesser
 from pamrs.errors import ParameterError
 
 #: A number for all time, or a function of time [s].
@@ -149,7 +149,7 @@ class CoContraction(Share):
         # tau = a p + b q + a0 + b0 with b < 0: a line of pairs, of which the limits cut a piece
         left = demand.torque - a0 - b0
         first = greater(down, (a * up - left) / -b)
-        last = -greater(-high, (left - a * high) / -b)
+        last = lesser(high, (left - a * high) / b)
         q = first
         if wanted is not None:
             gain = kb - ka * b / a

@@ -62,7 +62,7 @@ class SlidingController(SampledController):
         Width of the boundary layer, in s [rad/s]; 0: the plain signum.
     period : float
         Time between two updates [s].
-    **sensor
+    rate_filter, angle_filter, measured_rate
         As for :class:`pamrs.control.PID`, but ``rate_filter`` is 0.01 s by default.
     """
 
@@ -80,7 +80,9 @@ class SlidingController(SampledController):
         boundary_layer: Value = 0.2,
         period: float = 1e-3,
         gains: tuple[Any, ...] = (),
-        **sensor: Any,
+        rate_filter: Value = 0.01,
+        angle_filter: Value = 0.0,
+        measured_rate: bool = False,
     ) -> None:
         self.arm = arm
         self._slope = positive_gain("slope", slope)
@@ -89,7 +91,9 @@ class SlidingController(SampledController):
         # a layer of a billionth of a rad/s is the signum, and needs no case of its own in a batch
         self._layer = clip(self._boundary_layer, 1e-12, 1e300)
         self._sharp = isinstance(self._boundary_layer, float) and self._boundary_layer == 0.0
-        self.sensor = JointSensor(period, **{"rate_filter": 0.01, **sensor})
+        self.sensor = JointSensor(
+            period, angle_filter=angle_filter, rate_filter=rate_filter, measured_rate=measured_rate
+        )
         self._several = arm.joints > 1
         own = (self._slope, self._switching, self._boundary_layer, *gains)
         super().__init__(

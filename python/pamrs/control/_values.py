@@ -116,6 +116,13 @@ def greater(a: Value, b: Value) -> Value:
     return np.maximum(a, b)
 
 
+def lesser(a: Value, b: Value) -> Value:
+    """The smaller one of two."""
+    if a.__class__ is float and b.__class__ is float:
+        return a if a < b else b
+    return np.minimum(a, b)
+
+
 def sign(value: Value) -> Value:
     """-1, 0 or 1."""
     if value.__class__ is float:

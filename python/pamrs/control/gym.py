@@ -102,16 +102,15 @@ class _Task:
         self,
         rig: Rig | None,
         trajectory: Any,
-        *,
-        targets: Any = None,
-        sample_time: float = 0.02,
-        effort: float = 0.01,
-        penalty: float = 100.0,
-        pressure_limit: float | None = None,
-        render_mode: str | None = None,
+        targets: Any,
+        sample_time: float,
+        effort: float,
+        penalty: float,
+        pressure_limit: float | None,
+        render_mode: str | None,
     ) -> None:
-        # what gymnasium.make passes on: Simulation.animate draws an arm
-        one_of("render_mode", render_mode, [None])
+        # what gymnasium.make passes on
+        one_of("render_mode", render_mode, [None], also="; Simulation.animate draws an arm")
         from pamrs import rigs
 
         self.rig = rigs.shoulder() if rig is None else rig
@@ -313,15 +312,13 @@ class RigEnv(gymnasium.Env[Array32, Array32]):
     trajectory : Trajectory, JointTrajectories, or mapping of str to Trajectory, optional
         What to follow, of several joints one for each; by default lifts of 15 s to an angle that is
         drawn from ``targets``.
-    **task
-        The following ones, by name.
     targets : (float, float), or mapping of str to that, optional
         Range of that angle [rad], one for all joints or one for each; a fifth to three fifths of
         the way between the stops by default.
     sample_time : float
-        Time that an action is held [s]; 0.02 by default.
+        Time that an action is held [s].
     effort, penalty : float
-        Of the reward; 0.01 and 100 by default.
+        Of the reward.
     pressure_limit : float, optional
         Largest set pressure of a regulator [Pa]; by default ``max_pressure`` of ``[limits]``.
 
@@ -336,8 +333,21 @@ class RigEnv(gymnasium.Env[Array32, Array32]):
 
     metadata = {"render_modes": []}
 
-    def __init__(self, rig: Rig | None = None, trajectory: Any = None, **task: Any) -> None:
-        self._task = _Task(rig, trajectory, **task)
+    def __init__(
+        self,
+        rig: Rig | None = None,
+        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
+        *,
+        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
+        sample_time: float = 0.02,
+        effort: float = 0.01,
+        penalty: float = 100.0,
+        pressure_limit: float | None = None,
+        render_mode: str | None = None,
+    ) -> None:
+        self._task = _Task(
+            rig, trajectory, targets, sample_time, effort, penalty, pressure_limit, render_mode
+        )
         self.render_mode = None
         self.observation_space, self.action_space = self._task.observed, self._task.acted
         self._simulator = Simulator(self._task.rig, sample_time=self._task.sample_time)
@@ -438,7 +448,7 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
     ----------
     num_envs : int
         How many rigs.
-    rig, trajectory, **task
+    rig, trajectory, targets, sample_time, effort, penalty, pressure_limit
         As for :class:`RigEnv`.
 
     Raises
@@ -453,11 +463,23 @@ class RigVectorEnv(gymnasium.vector.VectorEnv[Array32, Array32, Any]):
         self,
         num_envs: int = 1,
         rig: Rig | None = None,
-        trajectory: Any = None,
-        **task: Any,
+        trajectory: Trajectory | Mapping[str, Trajectory] | JointTrajectories | None = None,
+        *,
+        targets: tuple[float, float] | Mapping[str, tuple[float, float]] | None = None,
+        sample_time: float = 0.02,
+        effort: float = 0.01,
+        penalty: float = 100.0,
+        pressure_limit: float | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.num_envs = whole("num_envs", num_envs, 1)
-        self._task = _Task(rig, trajectory, **task)
+        try:
+            self.num_envs = whole("num_envs", num_envs, 1)
+        except ParameterError as error:
+            told = f"{error}; the rig comes behind it, RigVectorEnv(64, rig)"
+            raise ParameterError(told) from None
+        self._task = _Task(
+            rig, trajectory, targets, sample_time, effort, penalty, pressure_limit, render_mode
+        )
         self.render_mode = None
         self._batch = Batch(self._task.rig, n=num_envs, sample_time=self._task.sample_time)
         self.single_observation_space = self._task.observed

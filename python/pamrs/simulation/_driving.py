@@ -281,10 +281,12 @@ def prescribed(
         first: Any = float(signal[0]) if plants is None else signal[..., 0]
         if plants is not None:
             first = np.ascontiguousarray(np.broadcast_to(first, (plants,)))
-        if not np.array_equal(start.setdefault(channel, first), first):
-            told = f" = {start[channel]:g}" if plants is None else ""
+        begun, values = np.atleast_1d(start.setdefault(channel, first)), np.atleast_1d(first)
+        for k in np.flatnonzero(begun != values):
+            of = "" if plants is None else f" of row {k}"
             raise ParameterError(
-                f"initial {channel}{told} does not go with the first value of {name}: leave one out"
+                f"initial {channel} = {begun[k]:g} does not go with {name}[0] = {values[k]:g}{of}: "
+                "leave one out"
             )
         # the last one is not run
         driven[name] = np.ascontiguousarray(

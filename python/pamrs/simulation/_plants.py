@@ -61,6 +61,7 @@ def rowwise(name: str, values: ArrayLike, n: int, *, finite: bool = True) -> Arr
 def thread_count(threads: int | None) -> int:
     """How many threads may work."""
     if threads is None:
-        allowed = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
-        return min(len(allowed), _MOST_THREADS)
+        if hasattr(os, "sched_getaffinity"):
+            return min(len(os.sched_getaffinity(0)), _MOST_THREADS)
+        return min(os.cpu_count() or 1, _MOST_THREADS)
     return whole("threads", threads, 1, _MOST_THREADS)
