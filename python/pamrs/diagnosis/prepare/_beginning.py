@@ -165,7 +165,7 @@ def _began_at(block: Block, core: _core.Rig, prepared: Prepared, tolerances: Tol
         found = float(np.clip(found + first.begun[0][-1], 0.5 * rest, 2.0 * rest))
     if abs(found - rest) <= settings.begun_temperature_error:
         return rest
-    known = ({}, {block.channel: found})
+    known: tuple[dict[str, float], ...] = ({}, {block.channel: found})
     cold, warm = (
         _left_at_first(block, core, replace(prepared, temperatures=t), tolerances) for t in known
     )
