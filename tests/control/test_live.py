@@ -175,6 +175,13 @@ def test_a_lost_sensor_is_a_safe_stop(rig, safe):
         assert moved > math.radians(25)
 
 
+def test_no_reading_at_all_commands_nothing_but_the_safe_value(rig):
+    run, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, most_missed=5, safe=5.0)
+    assert run.reason == "lost_sensor"
+    assert run.time.size == 6
+    assert [command for _, command in device.written] == [5.0, 5.0]
+
+
 def test_the_safe_command_is_written_before_the_first_reading(rig):
     _, device = live(rig, device={"lost_from": 0.0, "faults": ("none",)}, safe=0.0)
     assert device.written[0] == (0.0, 0.0)
@@ -588,6 +595,21 @@ def test_a_driver_that_uses_up_its_commands_gets_all_of_them_again():
     assert run.reason == "lost_sensor"
     assert device.failures == 0
     assert device.written[-1][1] == run.safe_command == dict.fromkeys(VALVES, 5.0)
+
+
+def test_a_driver_that_never_writes_is_told_with_every_command():
+    class Popping(SimulatedDevice):
+        def write(self, command):
+            if self.clock.now() >= 1.0:
+                command.popitem()
+                raise OSError("bus")
+            super().write(command)
+
+    clock = VirtualClock()
+    device = Popping(PAIR.rig, clock, lost_from=1.0)
+    controller = RigController(PAIR, PAIR.law("sliding", period=0.01))
+    with pytest.raises(LiveError, match=r"safe commands {.*flexor': 5.0, .*extensor': 5.0} could"):
+        run_live(device, controller, TURN, clock=clock, stamp="time", most_missed=3)
 
 
 def test_each_command_is_kept_within_its_own_limits():

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pamrs import cli, load_rig
+from pamrs import cli, load_rig, rigs
 from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
@@ -285,6 +285,12 @@ def test_command_predicts_left_out_pressures_and_compares(capsys, table):
         assert model in out
 
 
+def test_command_per_level(capsys, table):
+    code, out, _ = run(capsys, table, *SIZES, "--model", "kothera", "--order", 2, "--per-level")
+    assert code == 0
+    assert "free at each level" in out
+
+
 def write(path, data):
     """A table of a map."""
     columns = [
@@ -392,6 +398,29 @@ def test_friction_that_cannot_be_fitted_is_said_or_refused(capsys, loops, tmp_pa
     assert "--friction" in err
 
 
+def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):
+    shoulder = rigs.shoulder()
+    source = shoulder.to_toml(tmp_path / "shoulder.toml")
+    real = shoulder.muscle
+    e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), LEVELS))
+    stiffer = real.replace(
+        modulus_offset=[1.1 * value for value in real.parameters["modulus_offset"]]
+    )
+    path = write(
+        tmp_path / "map.csv",
+        ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276),
+    )
+    code, _, err = run(capsys, path, "--muscle", source, "--rig", tmp_path / "fitted.toml")
+    assert code == 0
+    assert "cannot be simulated" not in err
+    fitted = load_rig(tmp_path / "fitted.toml")
+    assert fitted.blocks == shoulder.blocks
+    for block in ("joint", "arm"):
+        assert fitted.model[block] == pytest.approx(shoulder.model[block])
+    assert fitted.model["muscle"]["count"] == 6
+    np.testing.assert_allclose(fitted.muscle.force(p, e), stiffer.force(p, e), rtol=1e-6, atol=1e-3)
+
+
 def test_a_tolerance_of_what_is_not_free_is_named(capsys, table, tmp_path):
     options = ["--model", "kothera", "--order", 2]
     note = "tolerance of braid_angle is not used: not free (--free braid_angle)"
@@ -441,6 +470,24 @@ def test_wrong_input_is_one_line(capsys, table, tmp_path, words, parts):
     assert "Traceback" not in err
     for part in parts:
         assert part in line
+
+
+def test_nothing_is_written_when_the_fit_fails(capsys, table, tmp_path):
+    assert (
+        run(
+            capsys,
+            table,
+            *SIZES,
+            "--order",
+            2,
+            "--levels",
+            "100kPa",
+            "--report",
+            tmp_path / "x.html",
+        )[0]
+        == 2
+    )
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_description_needs_no_geometry(capsys, table):

@@ -5,6 +5,7 @@ closed forms.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from scipy.integrate import quad
 
 import pamrs
 from tests.property.strategies import GEOMETRIES, both, muscle_arguments, reference_of, stroke
-from tests.reference import GeometryReference, Shape
+from tests.reference import GeometryReference, MuscleReference, Shape
 
 FEW = settings(max_examples=10, deadline=None, derandomize=True)
 MORE = settings(max_examples=25, deadline=None, derandomize=True)
@@ -219,3 +220,53 @@ def test_slender_muscle_is_a_cylinder(arguments: dict[str, Any], e: float) -> No
 
 # --- The reference against closed forms (pamrs plays no
 # part) ----------------------------------------------------
+
+
+@MORE
+@given(muscle_arguments(), st.sampled_from(GEOMETRIES))
+def test_reference_gas_areas_are_the_closed_forms(arguments: dict[str, Any], kind: str) -> None:
+    reference = reference_of({**arguments, "geometry": kind})
+    geometry, wall = reference.geometry, arguments["wall_thickness"]
+    for e in stroke(reference):
+        shape = geometry.solve(float(e))
+        length, radius, turns = shape.length, shape.radius, geometry.turns
+        gaylord = (3.0 * length**2 - geometry.fibre_length**2) / (4.0 * math.pi * turns**2)
+        thick = (
+            2.0 * math.pi * radius * wall
+            - math.pi * wall**2
+            - length**2 * wall / (2.0 * math.pi * turns**2 * radius)
+        )
+        scale = length**2 / turns**2
+        got = replace(reference, model="gaylord").gas_area(float(e))
+        assert got == pytest.approx(gaylord, rel=0.0, abs=1e-13 * scale)
+        got = replace(reference, model="chou_hannaford").gas_area(float(e))
+        assert got == pytest.approx(gaylord + thick, rel=0.0, abs=1e-13 * scale)
+
+
+@MORE
+@given(muscle_arguments(), st.sampled_from(GEOMETRIES))
+def test_reference_rubber_follows_principal_stresses(arguments: dict[str, Any], kind: str) -> None:
+    """dW/dL = s1 / L - s2 L / (2 pi N R)^2 with the plane stresses s_i = 2 (l_i^2 - l_3^2) (C10 +
+    C01 l_j^2).
+    """
+    reference: MuscleReference = replace(
+        reference_of({**arguments, "geometry": kind}), model="mooney_rivlin"
+    )
+    geometry = reference.geometry
+    for e in stroke(reference):
+        shape = geometry.solve(float(e))
+        one, two = shape.length / geometry.rest_length, shape.radius / geometry.rest_radius
+        thin = 1.0 / (one * two) ** 2
+        for column, (c10, c01) in enumerate(((1.0, 0.0), (0.0, 1.0))):
+            axial = 2.0 * (one**2 - thin) * (c10 + c01 * two**2)
+            hoop = 2.0 * (two**2 - thin) * (c10 + c01 * one**2)
+            turn = shape.length / (2.0 * math.pi * geometry.turns * shape.radius) ** 2
+            want = geometry.rubber_volume * (axial / shape.length - hoop * turn)
+            scale = (
+                geometry.rubber_volume
+                / shape.length
+                * (1.0 + abs(axial) + abs(hoop) * turn * shape.length)
+            )
+            assert reference.elastic_basis(float(e))[column] == pytest.approx(
+                want, rel=0.0, abs=1e-13 * scale
+            )

@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, Phase, assume, given, settings
 from numpy.polynomial.legendre import leggauss
 
 import pamrs
+from tests.golden.generate import NETWORKS
 from tests.property.networks import GAS, Blocks, networks, rig_of, valve
 from tests.reference.network import muscle_of
 from tests.runs import RUNS, Run, misses
@@ -46,9 +47,14 @@ def test_every_packaged_rig_is_compared() -> None:
     assert {*RUNS, "bench"} == set(pamrs.rigs.names())
 
 
+#: Only the beginning of these is run here: the golden vectors hold the whole, with muscles that
+#: push. The hanging mass has a golden vector, too, but moves less than 3 % in its beginning.
+BEGUN = set(NETWORKS) - {"hanging_mass"}
+
+
 @pytest.mark.parametrize("name", RUNS)
 def test_packaged_rigs(name: str) -> None:
-    run = RUNS[name].lasting(61)  # the whole is among the golden vectors
+    run = RUNS[name].lasting(61) if name in BEGUN else RUNS[name]
     want, got = run.reference(1e-10), run.core(2e-5)
     assert not stops(got)
     assert set(BOOKS) < set(want)
@@ -58,7 +64,7 @@ def test_packaged_rigs(name: str) -> None:
         if channel.partition(".")[0] in ("joint_angle", "length", "muscle_pressure")
     ]
     if name != "sealed_chamber":
-        assert all(np.ptp(want[channel]) > 0.01 * np.abs(want[channel]).max() for channel in moved)
+        assert all(np.ptp(want[channel]) > 0.03 * np.abs(want[channel]).max() for channel in moved)
     assert not beyond(misses(got, want), SMOOTH)
 
 

@@ -97,6 +97,23 @@ def test_corners_match_reference(
 
 
 @FEW
+@given(rig_overrides(), commands(ROWS))
+def test_the_future_of_a_command_cannot_change_the_past(
+    overrides: dict[str, float], command: list[float]
+) -> None:
+    rig = pamrs.rigs.shoulder().with_parameters(overrides)
+    run, changed = (
+        pamrs.simulate(rig, valve_command=volts, sample_time=SAMPLE_TIME, step=1e-3, initial=START)
+        for volts in (command, [*command[:20], *(9.0 - u / 2.0 for u in command[20:])])
+    )
+    for name in CHANNELS:
+        np.testing.assert_array_equal(run[name][:21], changed[name][:21])
+    assert abs(command[20] - 6.0) < 0.5 or not np.array_equal(
+        run["muscle_pressure"], changed["muscle_pressure"]
+    )
+
+
+@FEW
 @given(st.floats(5.1, 8.0), st.floats(1e5, 3e5))
 def test_isothermal_filling_keeps_the_gas(u: float, pressure: float) -> None:
     """With every exponent 1 the products p V of tank and chamber add up to a constant while
