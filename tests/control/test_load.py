@@ -92,7 +92,7 @@ def test_every_law_follows_a_length(kind):
     found = run.metrics()
     assert found.rms == pytest.approx(float(np.sqrt(np.mean(run.error**2))), rel=0.01)
     assert found.unit == "m"
-    with pytest.raises(ParameterError, match="'deg' is not allowed: one of 'm'"):
+    with pytest.raises(ParameterError, match="'deg' is not allowed: 'm' is needed"):
         run.metrics(unit="deg")
 
 
