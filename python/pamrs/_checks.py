@@ -72,6 +72,7 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
 
 
 _MOST_SAID = 60
+_NO_NUMBER = (TypeError, ValueError, OverflowError)
 
 
 def positive(name: str, value: float, *, zero: bool = False) -> float:
@@ -111,11 +112,20 @@ def finite(name: str, value: Any) -> float:
     return number
 
 
+def _parsed(value: Any) -> float:
+    """A value as a number; one of `_NO_NUMBER` is raised where it is none. Text is none, whatever
+    it says.
+    """
+    if isinstance(value, (str, bytes, bytearray)):
+        raise TypeError
+    return float(value)
+
+
 def _number(value: Any) -> float:
-    """A value as a number, NaN where it is none; text is none, whatever it says."""
+    """A value as a number, NaN where it is none."""
     try:
-        return math.nan if isinstance(value, (str, bytes, bytearray)) else float(value)
-    except (TypeError, ValueError, OverflowError):
+        return _parsed(value)
+    except _NO_NUMBER:
         return math.nan
 
 
@@ -213,10 +223,8 @@ def checked_number(
     if math.isinf(upper):
         allowed = f"a {kind} number of {lower:g}{last} or more"
     try:
-        if isinstance(value, (str, bytes, bytearray)):
-            raise TypeError
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
+        number = _parsed(value)
+    except _NO_NUMBER:
         raise ParameterError(
             f"{name} = {as_said(value)} is not allowed: "
             f"{'' if whole else 'a number is needed, '}{allowed}"

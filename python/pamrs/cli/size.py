@@ -91,18 +91,14 @@ def size_command(
         result.table(),
         *_remarks(candidates),
     ]
-
-    def written() -> str:
-        return document(
-            SCHEMA,
-            requirement={"position": requirement.position, "points": requirement.array.tolist()},
-            filling=asdict(filling),
-            core=free,
-            max_count=max_count,
-            **result.to_dict(),
-        )
-
-    write({json: written() if json else ""}, "\n".join(lines))
+    found = {
+        "requirement": {"position": requirement.position, "points": requirement.array.tolist()},
+        "filling": asdict(filling),
+        "core": free,
+        "max_count": max_count,
+        **result.to_dict(),
+    }
+    write({json: document(SCHEMA, **found) if json else ""}, "\n".join(lines))
 
 
 # ------------------------------------------------------------------------- inputs

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from pamrs.errors import RecordingError
 from pamrs.recordings._gate import Gate
 from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected, numbers_of
 
@@ -36,13 +35,11 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
         Physical values with their units; those of one group share a clock. Samples marked invalid
         are NaN. A channel that is in several groups is called ``group/channel``.
     """
-    from asammdf import MDF
-
     found: list[Series] = []
     unread: dict[str, str] = {}
     file: Any
     gate = Gate(path)
-    with _opened(MDF, path) as file:
+    with _opened(path) as file:
         for group in file.groups:
             gate.admit(group.channel_group.cycles_nr, len(group.channels))
         for number, group in enumerate(file.groups):
@@ -70,22 +67,24 @@ def read_mdf(path: Path, form: TextFormat) -> Log:
     return collected(path, found, unread)
 
 
-def _opened(kind: Any, path: Path) -> Any:
+def _opened(path: Path) -> Any:
     """A measurement file. Of a broken one asammdf fails once more as its half-read object is freed,
     with a traceback that nothing can catch: it is freed here, in silence.
     """
+    from asammdf import MDF
+
     reason = ""
     with _SILENCE:
         hook, sys.unraisablehook = sys.unraisablehook, lambda _: None
         try:
-            return kind(path)
+            return MDF(path)
         except Exception as error:
             reason = str(error) or type(error).__name__
         finally:
             if reason:
                 gc.collect()
             sys.unraisablehook = hook
-    raise RecordingError(f"{path}: cannot be read ({reason.splitlines()[0][:200]})")
+    raise ValueError(reason)  # the reader of every format says of which file
 
 
 def _group_name(group: Any, number: int) -> str:
