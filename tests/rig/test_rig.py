@@ -233,6 +233,17 @@ def test_unknown_names_are_refused(name: str) -> None:
         pamrs.rigs.shoulder().parameter(name)
 
 
+def test_a_changed_table_of_parameters_leaves_the_rig_alone() -> None:
+    rig = pamrs.rigs.shoulder()
+    before = rig.parameters
+    taken = rig.parameters
+    taken.clear()
+    assert rig.parameters == before
+    other = rig.with_parameters({"arm.payload": 3.0})
+    assert other.parameters["arm.payload"].value == 3.0
+    assert rig.parameters["arm.payload"] == before["arm.payload"]
+
+
 def test_parameters_of_absent_blocks_are_not_there() -> None:
     with pytest.raises(ParameterError, match=r"arm\.payload"):
         pamrs.rigs.sealed_chamber().with_parameters({"arm.payload": 1.0})

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 #: By the core and from the ports when they are needed; what a rig differs from by numbers only, and
 #: what was made of it.
-_MADE_AGAIN = ("_compiled", "_connected", "_inputs", "_origin", "_grown")
+_MADE_AGAIN = ("_compiled", "_connected", "_inputs", "_known", "_origin", "_grown")
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +173,11 @@ class Rig:
     @property
     def parameters(self) -> dict[str, Parameter]:
         """All scalar parameters by dotted name, in the order of the blocks."""
-        return {name: self.parameter(name) for name, _ in self._scalars()}
+        known: dict[str, Parameter] | None = self.__dict__.get("_known")
+        if known is None:
+            known = {name: self.parameter(name) for name, _ in self._scalars()}
+            object.__setattr__(self, "_known", known)
+        return dict(known)
 
     @property
     def effects(self) -> list[dict[str, Any]]:
