@@ -14,6 +14,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,8 +31,8 @@ from pamrs.rig.schema import BLOCKS, Key, keys_of, qualified, split_name, tables
 if TYPE_CHECKING:
     from pamrs.rig._muscle import Muscle
 
-#: By the core and from the ports when they are needed; what a rig differs from by numbers only, and
-#: what was made of it.
+#: By the core, from the ports and from the tables when they are needed; what a rig differs from by
+#: numbers only, and what was made of it.
 _MADE_AGAIN = ("_compiled", "_connected", "_inputs", "_known", "_origin", "_grown")
 
 
@@ -144,14 +145,14 @@ class Rig:
             If the blocks do not fit together, which only a rig made by hand can show.
         """
         names = self.tables(block)
-        return copy.deepcopy(self._ports().get(block, {name: {} for name in names}))
+        return copy.deepcopy(self._connected.get(block, {name: {} for name in names}))
 
     @property
     def wiring(self) -> list[str]:
         """The ways of the air and of the force in words, one line each:
         ``"air: supply -> valve -> chamber -> ambient"``.
         """
-        return wiring(self._model, self._ports())
+        return wiring(self._model, self._connected)
 
     @property
     def cautions(self) -> list[str]:
@@ -161,23 +162,21 @@ class Rig:
         """
         return cautions_of(self._model)
 
-    def _ports(self) -> Ports:
-        cached: Ports | None = self.__dict__.get("_connected")
-        if cached is None:
-            cached, problems = connect(self._model)
-            if problems:
-                raise RigError(joined(f"rig {self.name!r}", problems))
-            object.__setattr__(self, "_connected", cached)
-        return cached
+    @cached_property
+    def _connected(self) -> Ports:
+        ports, problems = connect(self._model)
+        if problems:
+            raise RigError(joined(f"rig {self.name!r}", problems))
+        return ports
 
     @property
     def parameters(self) -> dict[str, Parameter]:
         """All scalar parameters by dotted name, in the order of the blocks."""
-        known: dict[str, Parameter] | None = self.__dict__.get("_known")
-        if known is None:
-            known = {name: self.parameter(name) for name, _ in self._scalars()}
-            object.__setattr__(self, "_known", known)
-        return dict(known)
+        return dict(self._known)
+
+    @cached_property
+    def _known(self) -> dict[str, Parameter]:
+        return {name: self.parameter(name) for name, _ in self._scalars()}
 
     @property
     def effects(self) -> list[dict[str, Any]]:
@@ -521,7 +520,7 @@ class Rig:
         RigError
             As :meth:`ports`.
         """
-        return core_json(self._model, self._ports())
+        return core_json(self._model, self._connected)
 
     def to_toml_text(self, *, comments: bool = True) -> str:
         """The rig as TOML; reading it gives the same numbers to the last bit, the same names and
