@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Iterable
 
 _MOST_TOLD = 20
@@ -68,33 +67,10 @@ def missing_package(error: ImportError, extra: str) -> MissingPackageError:
     """
     name = error.name or "a package"
     if isinstance(error, ModuleNotFoundError):
-        why = f"which is not installed: pip install pamrs[{extra}]"
+        why = f"which is not installed: pip install 'pamrs[{extra}]'"
     else:
-        why = f"which cannot be loaded ({error}); to install it anew: pip install pamrs[{extra}]"
+        why = f"which cannot be loaded ({error}); to install it anew: pip install 'pamrs[{extra}]'"
     return MissingPackageError(f"this needs {name}, {why}", name=error.name)
-
-
-def check_packages(extra: str, *packages: str) -> None:
-    """Refuse, before any long work starts, what needs a package that cannot be imported.
-
-    Parameters
-    ----------
-    extra : str
-        The extra of pamrs that installs them.
-    *packages : str
-        What is imported.
-
-    Raises
-    ------
-    MissingPackageError
-        If one is missing, or cannot be loaded; names it and the extra.
-    """
-    for package in packages:
-        try:
-            importlib.import_module(package)
-        except ImportError as error:
-            error.name = error.name or package
-            raise missing_package(error, extra) from error
 
 
 def meant(given: str, allowed: Iterable[str]) -> str:

@@ -11,7 +11,7 @@ import pytest
 import pamrs
 import pamrs.diagnosis
 import pamrs.recordings
-from pamrs import _writing, cli, report
+from pamrs import _writing, cli
 from pamrs._writing import check_writable, write_atomically
 from pamrs.errors import ParameterError
 
@@ -105,20 +105,6 @@ def test_a_check_leaves_nothing_behind(tmp_path):
         check_writable(tmp_path / "a", f"{tmp_path}/./a")
 
 
-@pytest.mark.parametrize(
-    ("option", "package"),
-    [("--report", "jinja2"), ("--report", "matplotlib"), ("--png", "matplotlib")],
-)
-def test_a_missing_package_is_told_before_the_work(
-    capsys, tmp_path, monkeypatch, diagnosed, option, package
-):
-    monkeypatch.setitem(sys.modules, package, None)
-    code, out, err = run(capsys, "diagnose", tmp_path, option, tmp_path / "out")
-    assert (code, out, diagnosed) == (2, "", [])
-    assert package in err
-    assert "pip install pamrs[report]" in err
-
-
 def test_what_is_done_is_told_although_a_file_cannot_be_written(
     capsys, tmp_path, monkeypatch, diagnosed
 ):
@@ -200,15 +186,6 @@ def test_a_file_that_was_there_keeps_its_mode(tmp_path):
     assert file.stat().st_mode & 0o777 == 0o600
 
 
-def test_a_package_that_is_broken_is_named(capsys, tmp_path, monkeypatch, diagnosed):
-    (tmp_path / "jinja2.py").write_text("raise ImportError('half of it')", encoding="utf-8")
-    monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.delitem(sys.modules, "jinja2", raising=False)
-    code, out, err = run(capsys, "diagnose", tmp_path, "--report", tmp_path / "out")
-    assert (code, out, diagnosed) == (2, "", [])
-    assert "this needs jinja2, which cannot be loaded (half of it)" in err
-
-
 def test_a_file_is_whole_or_as_before(tmp_path, monkeypatch):
     file = tmp_path / "a"
     file.write_text("before", encoding="utf-8")
@@ -222,10 +199,3 @@ def test_a_file_is_whole_or_as_before(tmp_path, monkeypatch):
     assert [(p.name, p.read_text(encoding="utf-8")) for p in tmp_path.iterdir()] == [
         ("a", "before")
     ]
-
-
-def test_a_package_that_cannot_be_loaded_is_not_called_missing(tmp_path, monkeypatch):
-    (tmp_path / "half_installed.py").write_text("from math import no_such_name\n")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    with pytest.raises(ImportError, match=r"cannot be loaded \(cannot import name 'no_such_name'"):
-        report.require("half_installed")

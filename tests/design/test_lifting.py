@@ -3,7 +3,6 @@
 import json
 import math
 import re
-import sys
 
 import numpy as np
 import pytest
@@ -317,16 +316,3 @@ def test_command_refuses_what_it_cannot_use(capsys, words, message):
     code, out, err = run(capsys, *words)
     assert (code, out) == (2, "")
     assert message in err
-
-
-def test_missing_plot_package_is_named(capsys, tmp_path, monkeypatch):
-    for name in [
-        name
-        for name in sys.modules
-        if name.startswith(("matplotlib", "pamrs.design._lifting_figure", "pamrs.report.fig"))
-    ]:
-        monkeypatch.delitem(sys.modules, name)
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    code, _, err = run(capsys, "elbow", "--png", tmp_path / "a.png")
-    assert code == 2
-    assert "pip install pamrs[plot]" in err

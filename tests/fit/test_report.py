@@ -2,7 +2,6 @@
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -171,28 +170,6 @@ def test_png_has_the_promised_size(fit, tmp_path):
 
 
 # ------------------------------------------------------------------------- words
-
-
-@pytest.mark.parametrize("package", ["jinja2", "matplotlib"])
-def test_a_missing_package_of_the_page_is_named(fit, monkeypatch, package):
-    monkeypatch.setitem(sys.modules, package, None)
-    with pytest.raises(
-        ImportError,
-        match=rf"this needs {package}, which is not installed: pip install pamrs\[report\]",
-    ):
-        pages.render_html(fit)
-
-
-@pytest.mark.parametrize(
-    "draw", [pages.render_png, lambda fit: pages.render_friction_png(fit, fit.data)]
-)
-def test_a_missing_package_of_the_pictures_is_named(fit, monkeypatch, draw):
-    monkeypatch.setitem(sys.modules, "matplotlib", None)
-    with pytest.raises(
-        ImportError,
-        match=r"this needs matplotlib, which is not installed: pip install pamrs\[report\]",
-    ):
-        draw(fit)
 
 
 def test_structure_of_the_residual_is_told_from_noise(data, muscle, fit):

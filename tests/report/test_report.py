@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import struct
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -156,12 +155,6 @@ def test_empty_map_is_left_out() -> None:
         "z_after": None,
     }
     assert figures.map_svg(synthetic.diagnosis(condition_map=empty)) is None
-
-
-def test_missing_library_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "jinja2", None)
-    with pytest.raises(ImportError, match=r"pamrs\[report\]"):
-        render_html(synthetic.diagnosis())
 
 
 def test_a_budget_is_drawn_with_all_its_terms_inside() -> None:

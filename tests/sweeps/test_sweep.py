@@ -322,5 +322,5 @@ def test_a_damaged_store_says_so(tmp_path):
 @pytest.mark.parametrize("name", ["zarr", "xarray"])
 def test_a_missing_package_is_named_with_its_extra(tmp_path, store, monkeypatch, name):
     monkeypatch.setitem(sys.modules, name, None)
-    with pytest.raises(ImportError, match=rf"needs {name}, .* pip install pamrs\[sweep\]"):
+    with pytest.raises(ImportError, match=rf"needs {name}, .* pip install 'pamrs\[sweep\]'"):
         pamrs.sweeps.open_sweep(store)

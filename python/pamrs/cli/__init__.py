@@ -21,6 +21,7 @@ from pamrs.cli._streams import guarded
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
+from pamrs.cli.example import example_command
 from pamrs.cli.fit import fit_app
 from pamrs.cli.import_logs import import_command
 from pamrs.cli.library import library_command
@@ -60,6 +61,7 @@ app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
 app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
+app.command("example")(example_command)
 app.command("import")(import_command)
 app.command("library")(library_command)
 app.command("lift")(lift_command)

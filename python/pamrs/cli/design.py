@@ -13,7 +13,6 @@ import typer
 
 from pamrs.cli._shared import Contents, check_writable, document, exact, named_muscle, write
 from pamrs.cli._streams import terminal
-from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.design import (
@@ -98,7 +97,6 @@ def _joint(
     from pamrs._writing import write_atomically
     from pamrs.units import bar_and_psi
 
-    check_packages("plot", *(["matplotlib"] if png else []))
     problem = _problem(
         muscle, count, torque, (min_angle, max_angle), pressure, bounds or [], max_stroke
     )

@@ -17,7 +17,6 @@ from pamrs.cli._shared import (
     rig_named,
     write,
 )
-from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
@@ -126,9 +125,6 @@ def diagnose_command(
     from pamrs._writing import write_atomically
     from pamrs.recordings import load_case
 
-    check_packages(
-        "report", *(["jinja2"] if report else []), *(["matplotlib"] if report or png else [])
-    )
     loaded = load_case(case, allow_outside=allow_outside)
     if rig is not None:
         from pamrs.rig import load_rig

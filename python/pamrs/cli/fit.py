@@ -22,7 +22,6 @@ from pamrs.cli._shared import (
     quantity,
     write,
 )
-from pamrs.errors import check_packages
 
 if TYPE_CHECKING:
     from pamrs.fit import ForceMap, FrictionFit, ModelComparison, MuscleFit
@@ -156,8 +155,6 @@ def _muscle(
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
     check_writable(report, rig, json, png)
-    drawn = ["matplotlib"] if report or png else []
-    check_packages("report", *(["jinja2", "markupsafe"] if report else []), *drawn)
     if per_level and rig is not None:
         raise typer.BadParameter(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
@@ -258,7 +255,6 @@ def _friction(
     geometry, the rest length is enough.
     """
     check_writable(json, png)
-    check_packages("report", *(["matplotlib"] if png else []))
     map_ = _loops(context).with_directions()
     from pamrs._writing import write_atomically
     from pamrs.fit import fit_friction

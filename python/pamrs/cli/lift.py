@@ -8,7 +8,6 @@ from typing import Annotated, Final
 import typer
 
 from pamrs.cli._shared import as_given, check_writable, document, exact, rig_named, write
-from pamrs.errors import check_packages
 
 __all__ = ["lift_command"]
 
@@ -39,7 +38,6 @@ def lift_command(
     at most.
     """
     check_writable(png, json)
-    check_packages("plot", *(["matplotlib"] if png else []))
     from pamrs.design import lift
     from pamrs.errors import ParameterError
 

@@ -15,7 +15,6 @@ from pamrs.cli._shared import (
     usable_samples,
     write,
 )
-from pamrs.errors import check_packages
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -55,7 +54,6 @@ def replay_command(
     sample on. With a diagnosed model its errors are printed with those of the case's own rig.
     """
     check_writable(plot)
-    check_packages("plot", *(["matplotlib"] if plot else []))
     found, model = _loaded(case, rig, allow_outside)
     chosen = _chosen(found, recording)
     shown = next((r for r in chosen if r.role == "held_out"), chosen[0])

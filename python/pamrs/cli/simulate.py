@@ -19,7 +19,6 @@ from pamrs.cli._shared import (
     usable_samples,
     write,
 )
-from pamrs.errors import check_packages
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -92,7 +91,6 @@ def simulate_command(
     if input is not None and (hold or initial):
         raise typer.BadParameter("--hold and --initial do not go with --input, which says both")
     check_writable(output, plot, animation)
-    check_packages("plot", *(["matplotlib"] if plot or animation else []))
     loaded = rig_named(rig)
     recorded: dict[str, tuple[Any, Any]] = {}
     recording = None

@@ -12,8 +12,7 @@ pressure. :mod:`pamrs.design.sizing` counts the muscles that a force over a stro
 >>> optimise(problem, "de", evaluations=200).met()
 True
 
-Searches need ``pip install pamrs[search]``, figures ``pamrs[plot]``; both are imported when they
-are used.
+Searches need ``pip install 'pamrs[search]'``, which is imported when it is used.
 """
 
 from __future__ import annotations

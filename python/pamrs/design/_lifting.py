@@ -204,20 +204,10 @@ class Lift:
         -------
         Path
             The file written.
-
-        Raises
-        ------
-        MissingPackageError
-            If matplotlib is missing; names the extra to install.
         """
         from pamrs._writing import write_atomically
+        from pamrs.design._lifting_figure import lift_png
 
-        try:
-            from pamrs.design._lifting_figure import lift_png
-        except ImportError as error:
-            from pamrs.errors import missing_package
-
-            raise missing_package(error, "plot") from error
         return write_atomically(path, lift_png(self))
 
 

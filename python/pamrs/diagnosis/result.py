@@ -202,11 +202,6 @@ class Diagnosis(Findings):
         ----------
         path : path-like
             The file.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib or jinja2 is missing; names the extra to install.
         """
         return report.write_report(self, path)
 
@@ -217,11 +212,6 @@ class Diagnosis(Findings):
         ----------
         path : path-like
             The file.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is missing; names the extra to install.
         """
         return report.write_figure(self, path)
 

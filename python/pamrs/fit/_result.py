@@ -350,11 +350,6 @@ class MuscleFit(FitStatistics):
         -------
         Path
             The file written.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib or jinja2 is missing; names the extra to install.
         """
         from pamrs.fit.report import write_report
 

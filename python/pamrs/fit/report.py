@@ -1,6 +1,4 @@
-"""The report of a muscle fit: one offline HTML page, one PNG. Needs
-``pip install pamrs[report]``.
-"""
+"""The report of a muscle fit: one offline HTML page, one PNG."""
 
 from __future__ import annotations
 
@@ -10,7 +8,6 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit import remarks
-from pamrs.report import require
 from pamrs.report.text import format_number, format_uncertain
 
 if TYPE_CHECKING:
@@ -255,13 +252,7 @@ def render_html(
     -------
     str
         HTML text.
-
-    Raises
-    ------
-    ImportError
-        If matplotlib or jinja2 is missing; names the extra to install.
     """
-    require("jinja2", "matplotlib", "markupsafe")
     from markupsafe import Markup
 
     from pamrs.fit import _figures as figures
@@ -320,14 +311,7 @@ def write_report(
 
 
 def render_png(fit: MuscleFit, comparison: ModelComparison | None = None) -> bytes:
-    """The one-picture summary, a PNG of 1600 x 1000 pixels.
-
-    Raises
-    ------
-    ImportError
-        If matplotlib is missing; names the extra to install.
-    """
-    require("matplotlib")
+    """The one-picture summary, a PNG of 1600 x 1000 pixels."""
     from pamrs.fit._figures import summary_png
 
     return summary_png(fit, error_curves(fit, comparison), remarks.headline(fit))
@@ -347,13 +331,7 @@ def render_friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
     Returns
     -------
     bytes
-
-    Raises
-    ------
-    ImportError
-        If matplotlib is missing; names the extra to install.
     """
-    require("matplotlib")
     from pamrs.fit._friction_figure import friction_png
 
     return friction_png(fit, data)

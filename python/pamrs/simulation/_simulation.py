@@ -475,11 +475,6 @@ class Simulation(Mapping[str, Array]):
         -------
         Path
             The file written.
-
-        Raises
-        ------
-        ImportError
-            If matplotlib is missing; names the extra to install.
         """
         from pamrs._writing import write_atomically
 
@@ -502,8 +497,6 @@ class Simulation(Mapping[str, Array]):
 
         Raises
         ------
-        ImportError
-            If matplotlib is missing; names the extra to install.
         ParameterError
             If the rig has no arm, there are fewer than two samples, or the speed is not a finite
             number above zero.
@@ -516,11 +509,8 @@ class Simulation(Mapping[str, Array]):
 
 
 def _motion() -> ModuleType:
-    """The module that draws; an ImportError names the extra where matplotlib is missing."""
-    try:
-        return importlib.import_module("pamrs.report.motion")
-    except ImportError as error:
-        raise ImportError("pictures need matplotlib: pip install 'pamrs[plot]'") from error
+    """The module that draws."""
+    return importlib.import_module("pamrs.report.motion")
 
 
 def core_rig(rig: Rig, like: _core.Rig | None = None) -> _core.Rig:

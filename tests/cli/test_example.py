@@ -1,0 +1,83 @@
+"""``pamrs example``: what it copies, and how those files were made."""
+
+import json
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pamrs import cli
+from pamrs.recordings import load_case
+
+ROOT = Path(__file__).parents[2]
+FILES = ROOT / "python" / "pamrs" / "cli" / "example_files"
+MOST_BYTES = 600_000
+
+
+def files_of(folder):
+    return {p.relative_to(folder).as_posix(): p for p in folder.rglob("*") if p.is_file()}
+
+
+@pytest.mark.parametrize("made_before", [False, True])
+def test_every_file_is_copied_and_the_next_words_name_them(tmp_path, capsys, made_before):
+    folder = tmp_path / "my example"
+    if made_before:
+        folder.mkdir()
+    assert cli.main(["example", str(folder)]) == 0
+    copied = {name: path.read_bytes() for name, path in files_of(folder).items()}
+    assert copied == {name: path.read_bytes() for name, path in files_of(FILES).items()}
+    assert sum(map(len, copied.values())) < MOST_BYTES
+    out = capsys.readouterr().out
+    assert f"cd '{folder}'" in out
+    for word in re.findall(r"[\w/]*(?:shoulder|bench)[\w/.]*", out):
+        assert (folder / word).exists() or word == "bench.html", word
+    assert len(load_case(folder / "shoulder").recordings) == 3
+
+
+def test_without_a_name_the_folder_is_pamrs_example(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert cli.main(["example"]) == 0
+    assert (tmp_path / "pamrs-example" / "example.ipynb").exists()
+    assert "cd pamrs-example" in capsys.readouterr().out
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tmp_path, capsys):
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    assert cli.main(["example", str(tmp_path)]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err == (
+        f"pamrs: error: {tmp_path}: the folder is not empty; give another one "
+        "(pamrs example FOLDER)\n"
+    )
+    assert list(files_of(tmp_path)) == ["mine.txt"]
+
+
+def test_a_file_is_no_folder(tmp_path, capsys):
+    (tmp_path / "mine.txt").write_text("mine", encoding="utf-8")
+    assert cli.main(["example", str(tmp_path / "mine.txt")]) == 2
+    assert "mine.txt" in capsys.readouterr().err
+    assert (tmp_path / "mine.txt").read_text(encoding="utf-8") == "mine"
+
+
+def numbers(path):
+    return np.array(re.findall(r"-?\d+(?:\.\d+)?", path.read_text("latin-1").replace(",", ".")))
+
+
+def test_the_files_are_those_that_the_script_makes(tmp_path):
+    subprocess.run([sys.executable, "-m", "demo.example", tmp_path], cwd=ROOT, check=True)
+    kept = files_of(FILES)
+    notebook = json.loads(kept.pop("example.ipynb").read_text(encoding="utf-8"))
+    assert [cell["outputs"] for cell in notebook["cells"] if "outputs" in cell] == [[]] * 4
+    made = files_of(tmp_path)
+    assert set(made) == set(kept)
+    for name, path in kept.items():
+        if path.suffix == ".csv":
+            got, want = numbers(made[name]).astype(float), numbers(path).astype(float)
+            assert len(got) == len(want)
+            assert np.mean(np.abs(got - want) > 2e-3 * np.maximum(1.0, np.abs(want))) < 0.01
+        elif path.suffix == ".toml":
+            assert made[name].read_text(encoding="utf-8") == path.read_text(encoding="utf-8")
