@@ -1,4 +1,4 @@
-# Every verb sets up what it needs by itself: .venv from requirements-dev.lock, the extension from crates/.
+# Every verb sets up what it needs by itself: .venv with versions of requirements-dev.lock, the extension from crates/.
 # `make` alone lists the verbs.
 
 SHELL := bash
@@ -19,7 +19,7 @@ RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
 CARGO := env -u MAKEFLAGS -u MFLAGS cargo
 # One by one, since cargo fmt does not see modules that a macro declares.
 RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
-PYTHON_SOURCES := python tests trial demo benchmarks fingerprints reproduction cases
+PYTHON_SOURCES := .ci python tests trial demo benchmarks fingerprints reproduction cases
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
@@ -47,7 +47,8 @@ export MPLBACKEND := Agg
 export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
-        test-python-all snapshots hostile logs fuzz deny format bench convergence recruitment effects reproduce golden lock clean
+        test-python-all wheel wheel-test snapshots hostile logs fuzz deny format bench convergence recruitment \
+        effects reproduce example golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -58,7 +59,12 @@ $(VENV)/.created:
 	@"$(PYTHON)" -m venv $(VENV)
 	@touch $@
 
-$(VENV)/.installed: requirements-dev.lock $(VENV)/.created
+$(VENV)/.tools: requirements-dev.lock $(VENV)/.created
+	@$(PIP_INSTALL) --constraint requirements-dev.lock maturin
+	@touch $@
+
+# What the package does not need, but its tests and checks do.
+$(VENV)/.installed: requirements-dev.lock | $(VENV)/.built
 	@echo "installing what requirements-dev.lock pins into $(VENV): some minutes the first time"
 	@$(PIP_INSTALL) --requirement requirements-dev.lock
 	@touch $@
@@ -73,17 +79,17 @@ $(VENV)/.bench: requirements-bench.lock $(VENV)/.installed
 $(VENV)/.flags: $(VENV)/.created FORCE
 	@printf '%s\n' '$(RUSTFLAGS)' | cmp -s - $@ || printf '%s\n' '$(RUSTFLAGS)' > $@
 
-$(VENV)/.built: $(VENV)/.installed $(VENV)/.flags pyproject.toml $(RUST_SOURCES)
+$(VENV)/.built: $(VENV)/.tools $(VENV)/.flags pyproject.toml $(RUST_SOURCES)
 	@echo "compiling the Rust core: some minutes the first time"
-	@env -u MAKEFLAGS -u MFLAGS PIP_QUIET=1 PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
+	@env -u MAKEFLAGS -u MFLAGS PIP_QUIET=1 PIP_CONSTRAINT=requirements-dev.lock PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV="$(CURDIR)/$(VENV)" \
 	    $(BIN)/maturin develop --release --quiet $(LOCKED)
 	@touch $@
 
-setup: $(VENV)/.installed  ## .venv with the pinned tools
+setup: $(VENV)/.built  ## the package and what it needs in .venv, its Rust core compiled
 
-build: $(VENV)/.built  ## the package, its Rust core compiled, in .venv
+build: $(VENV)/.built $(VENV)/.installed  ## the same with what tests and checks need
 
-demo: build  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
+demo: setup  ## conceal an effect, diagnose it, open the key (KIND=leak_muscle SEED=7 to choose)
 	@$(BIN)/python demo/run.py $(CASE_KIND) $(CASE_SEED)
 
 # Each stage goes on where it was stopped. Exit code 3: some case could not be diagnosed, which the page says.
@@ -108,6 +114,15 @@ test-all: export PROPTEST_CASES = 256
 test-all:  ## the same with the long trials, the core's tests with checks of overflow
 	@$(MAKE) --jobs=2 --output-sync=target checks
 	@$(MAKE) test-python-all
+
+wheel: $(VENV)/.tools  ## dist/: a wheel that needs neither Rust nor a compiler, and the sources
+	@$(PIP_INSTALL) ziglang==0.17.1
+	@rm -rf dist
+	@env -u MAKEFLAGS -u MFLAGS -u RUSTFLAGS -u PYO3_PYTHON PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python .ci/wheel.py dist
+	@ls dist
+
+wheel-test: wheel  ## install the wheel where nothing can be compiled, and diagnose the example
+	$(BIN)/python tests/wheel.py dist
 
 lint: lint-rust lint-python  ## formatting, clippy, ruff, mypy, the stub against the compiled module
 
@@ -173,6 +188,9 @@ effects: build  ## a page of every effect of the catalogue, its fingerprint draw
 reproduce: build  ## the dissertation beside pamrs, to docs/reproduction; finished chapters are kept (CHAPTER=ch3 for one)
 	$(BIN)/python -m reproduction docs/reproduction $(if $(CHAPTER),--only $(CHAPTER))
 
+example: build  ## the files that `pamrs example` copies, but for its notebook
+	$(BIN)/python -m demo.example python/pamrs/cli/example_files
+
 golden: build  ## the published golden values against this build
 	$(BIN)/python -m pytest -q tests/golden
 
@@ -189,6 +207,6 @@ lock:  ## pin the newest versions that pyproject.toml allows
 	rm -rf $(VENV)/lock
 
 clean:  ## remove everything that was built
-	rm -rf $(VENV) target out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) target dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python trial tests benchmarks demo fingerprints reproduction -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 	rm -f python/pamrs/_core*.so

@@ -10,6 +10,8 @@ import importlib
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from pamrs import fit, library, rigs, sweeps
     from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
@@ -108,9 +110,33 @@ def _version() -> str:
         return "0+unknown"
 
 
+def _compiled() -> ModuleType:
+    """The compiled core: the one for processors since 2013 where a wheel has it and this processor
+    runs it.
+    """
+    import os
+    import sys
+    from importlib import util
+
+    core = importlib.import_module("pamrs._core")
+    folder, name = os.path.split(str(core.__file__))
+    second = os.path.join(folder, name.replace("_core", "_core_v3", 1))
+    if not (os.path.exists(second) and core.x86_64_v3()):
+        return core
+    spec = util.spec_from_file_location("pamrs._core", second)
+    assert spec is not None
+    assert spec.loader is not None
+    faster = util.module_from_spec(spec)
+    spec.loader.exec_module(faster)
+    sys.modules["pamrs._core"] = faster
+    return faster
+
+
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         value: Any = _version()
+    elif name == "_core":
+        value = _compiled()
     elif name in _MODULES:
         value = importlib.import_module(_MODULES[name])
     elif name in _HOMES:

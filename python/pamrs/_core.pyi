@@ -17,6 +17,7 @@ __all__ = [
     "blocks",
     "effects",
     "side_by_side",
+    "x86_64_v3",
 ]
 
 __version__: str
@@ -198,3 +199,4 @@ def side_by_side(
     reduce: list[tuple[str, str, list[float]]],
     threads: int,
 ) -> tuple[list[_Array], list[_Array], list[tuple[float, str] | None]]: ...
+def x86_64_v3() -> bool: ...
