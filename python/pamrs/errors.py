@@ -116,3 +116,7 @@ def joined(head: str, problems: Iterable[str]) -> str:
     told = [f"  - {line}" for line in found[:_MOST_TOLD]]
     more = [f"  - and {len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
     return "\n".join([f"{head}: {len(found)} problems", *told, *more])
+
+
+class UnitWarning(UserWarning):
+    """A value that is possible and most likely meant in another unit than SI."""

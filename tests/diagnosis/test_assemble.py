@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,9 @@ from pamrs.findings import ChannelError
 from pamrs.recordings import Recording
 from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
+from tests.diagnosis.healthy import healthy_case
 from tests.diagnosis.noisy import whole
+from tests.diagnosis.terms import terms
 
 SETTINGS = DiagnosisSettings()
 
@@ -192,3 +195,28 @@ def test_parameters_that_are_all_at_their_walls_explain_nothing() -> None:
     assert free.basis.shape[1] > 0
     assert held.basis.shape == (held.rows.size, 0)
     np.testing.assert_array_equal(held.left, held.rows)
+
+
+def without_damping() -> pamrs.Rig:
+    """A hanging mass whose file does not say how its guide is damped."""
+    text = (Path(pamrs.rigs.__file__).parent / "hanging_mass.toml").read_text(encoding="utf-8")
+    text, count = re.subn(r"^viscous *=.*$", "", text, flags=re.MULTILINE)
+    assert count == 1
+    return parse_rig(text)
+
+
+def test_a_value_that_the_file_leaves_out_is_offered_beside_the_effect_with_its_law() -> None:
+    case, named = SimpleNamespace(rig=without_damping()), SimpleNamespace(named=())
+    assert words.left_out(case, [named]) == []
+    named.named = terms("muscle_rate_damping", "leak_muscle")
+    (told,) = words.left_out(case, [named])
+    assert told.startswith("load.viscous is exactly 0 in the rig file")
+    assert words.left_out(SimpleNamespace(rig=pamrs.rigs.hanging_mass()), [named]) == []
+
+
+@pytest.mark.slow
+def test_damping_that_the_file_leaves_out_is_said_with_the_verdict() -> None:
+    case = replace(healthy_case("hanging_mass", 1, 200, sharp=False), rig=without_damping())
+    found = pamrs.diagnose(case)
+    assert found.effects[0].id == "muscle_rate_damping"
+    assert any(told.startswith("load.viscous is exactly 0") for told in found.warnings)

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import math
 import pickle
+import re
 from pathlib import Path
 from typing import Any
 
@@ -462,6 +463,44 @@ def test_comments_on_coefficients_go_with_them(name: str) -> None:
     assert with_them.count(said) > without.replace("# keeps mass", "").count(said) == 0
 
 
+def told_of(name: str, old: str, new: str) -> list[str]:
+    """Cautions about a packaged rig in whose file something is replaced."""
+    text, count = re.subn(
+        old,
+        new,
+        (Path(rigs.__file__).parent / f"{name}.toml").read_text(encoding="utf-8"),
+        flags=re.M | re.S,
+    )
+    assert count
+    return parse_rig(text).cautions
+
+
+def test_a_regulator_without_a_line_feeds_nothing() -> None:
+    (told,) = told_of("regulated_joint", r"^\[line\].*?(?=^\[)", "")
+    assert told.startswith("no air goes from supply to chamber")
+    assert "[line]" in told
+
+
+def test_friction_of_exactly_nothing_is_told_with_a_usual_size() -> None:
+    (told,) = told_of("hanging_mass", r"^viscous *=.*?$", "")
+    assert told.startswith("load.viscous = 0 N s/m, exactly")
+    mass = rigs.hanging_mass().parameters["load.mass"].value
+    assert f"value = {0.1 * mass * 9.80665:.2g}, " in told
+    (zero,) = told_of("hanging_mass", r"^viscous *=.*?$", 'viscous = { value = 0, unit = "N s/m" }')
+    assert zero == told
+    known = 'viscous = { value = 0, unit = "N s/m", tol = 5 }'
+    assert told_of("hanging_mass", r"^viscous *=.*?$", known) == []
+
+
+def test_measured_values_without_a_tolerance_are_told_together() -> None:
+    (told,) = told_of("shoulder", r"^((?:inertia|dead_volume) *=.*?), *tol *= *[-0-9.e]+", r"\1")
+    assert told.startswith("known exactly, as no laboratory knows it: ")
+    assert "arm.inertia (tol = 0.032 kg m2)" in told
+    assert "chamber.dead_volume (tol = 1.5e-05 m3)" in told
+    (none,) = told_of("shoulder", r", *tol *= *[-0-9.e]+", "")
+    assert none.startswith("no value has a tolerance")
+
+
 def pulsed(valve: str) -> Rig:
     """A chamber behind one valve that switches, with some keys of the valve in other words."""
     keys = {
@@ -491,8 +530,9 @@ def test_valves_that_never_act_are_told(
     valve: str, said: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     rig = pulsed(valve)
-    assert len(rig.cautions) == bool(said)
-    assert all(part in rig.cautions[0] for part in said)
+    of_valve = [caution for caution in rig.cautions if "tolerance" not in caution]
+    assert len(of_valve) == bool(said)
+    assert all(part in of_valve[0] for part in said)
     file = rig.to_toml(tmp_path / "rig.toml")
     assert cli.main(["rig", "check", str(file)]) == 0  # possible, and told
     out = capsys.readouterr().out.splitlines()

@@ -1,40 +1,137 @@
-"""What a rig file may say, and hardly means: valves that never act, muscles that push."""
+"""What a rig file may say, and hardly means: valves that never act, chambers that no air reaches,
+friction of nothing, values that are known exactly.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from pamrs.rig._ports import Ports
 from pamrs.rig.schema import qualified, tables_of
+
+if TYPE_CHECKING:
+    from pamrs.rig._rig import Parameter
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
 
+_MEASURED: Final = {
+    ("valve", "discharge_area_max"): 0.05,
+    ("line", "discharge_area"): 0.05,
+    ("chamber", "dead_volume"): 0.1,
+    ("muscle", "modulus_scale"): 0.03,
+    ("arm", "inertia"): 0.05,
+    ("arm", "first_moment"): 0.04,
+    ("arm", "payload"): 0.02,
+    ("load", "mass"): 0.01,
+    ("link", "inertia"): 0.05,
+    ("link", "mass"): 0.02,
+}
+"""Values that a laboratory measures, by block and key, with a usual tolerance as a share."""
+
 _STIFFEST: Final = 5e6  # modulus of the stiffest rubber that bladders are made of [Pa]
 
 
-def cautions_of(model: Mapping[str, Any]) -> list[str]:
+def cautions_of(
+    model: Mapping[str, Any], ports: Ports, parameters: Mapping[str, Parameter]
+) -> list[str]:
     """What of a model is possible, and most likely a mistake.
 
     Parameters
     ----------
     model : mapping
         As :attr:`pamrs.Rig.model`.
+    ports : mapping
+        What its blocks are connected to.
+    parameters : mapping of str to Parameter
+        Its parameters by dotted name.
 
     Returns
     -------
     list of str
         One sentence each, with the block, the value and what follows from it.
     """
-    found: list[str] = []
+    found = _unfed(model, ports)
     for name, valve in tables_of(model, "valve").items():
         label = qualified("valve", name)
         found += _shut(label, valve)
         found += _late(label, valve)
     for name, muscle in tables_of(model, "muscle").items():
         found += _strut(qualified("muscle", name), muscle)
+    return [*found, *_frictionless(parameters), *_exact(parameters)]
+
+
+def _unfed(model: Mapping[str, Any], ports: Ports) -> list[str]:
+    """Chambers that no air reaches, beside a tank or regulator that feeds nothing."""
+    lines, valves = ports["line"].values(), ports["valve"].values()
+    fed = {ends["to"] for ends in (*lines, *valves)}
+    used = {ends["from"] for ends in (*lines, *valves)}
+    used |= {ends["inlet"] for ends in ports["supply"].values() if ends}
+    idle = [
+        n for name in tables_of(model, "supply") if (n := qualified("supply", name)) not in used
+    ]
+    shut = [
+        n for name in tables_of(model, "chamber") if (n := qualified("chamber", name)) not in fed
+    ]
+    if not idle or not shut:
+        return []
+    return [
+        f"no air goes from {' or '.join(idle)} to {' or '.join(shut)}: what is between them is "
+        'missing, a [valve], or a [line] of kind = "tube" or "orifice" behind a regulator'
+    ]
+
+
+def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
+    """Friction and damping that are nothing, exactly: effects with the same law would be named in
+    their place.
+    """
+    found = []
+    for name, usual in _usual_friction(parameters).items():
+        known = parameters[name]
+        if known.value == 0.0 and known.known and not known.tol:
+            size = f"{usual:.2g}"
+            found.append(
+                f"{name} = 0 {known.unit}, exactly: no laboratory knows that, and a diagnosis "
+                "would call it missing physics; write what is known of it, such as "
+                f'{{ value = {size}, unit = "{known.unit}", tol = {size} }}'
+            )
     return found
+
+
+def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
+    """Friction of a good bearing by the name of its parameter: a hundredth of the weight, and as
+    much more at 1 rad/s or 0.1 m/s.
+    """
+
+    def value(name: str) -> float:
+        known = parameters.get(name)
+        return known.value if known is not None and known.known else 0.0
+
+    arm = value("arm.first_moment") + value("arm.payload") * value("arm.length")
+    torque, force = arm * value("arm.gravity"), value("load.mass") * value("load.gravity")
+    usual = {"arm.coulomb": 0.01 * torque, "arm.viscous": 0.01 * torque}
+    usual |= {"load.coulomb": 0.01 * force, "load.viscous": 0.1 * force}
+    return {name: size for name, size in usual.items() if name in parameters and size > 0.0}
+
+
+def _exact(parameters: Mapping[str, Parameter]) -> list[str]:
+    """Measured values without a tolerance, where others have one."""
+    if not any(known.tol for known in parameters.values()):
+        return ["no value has a tolerance (tol): a diagnosis would take all of them as exact"]
+    found = {}
+    for name, known in parameters.items():
+        share = _MEASURED.get((name.partition(".")[0], name.rpartition(".")[2]))
+        if share and known.known and known.value and not known.tol:
+            found[name] = share * abs(known.value), known.unit
+    if not found:
+        return []
+    told = [f"{name} (tol = {tol:.2g} {unit})" for name, (tol, unit) in found.items()]
+    return [
+        f"known exactly, as no laboratory knows it: {', '.join(told)} would be usual; what a "
+        "diagnosis may not move it explains with effects"
+    ]
 
 
 def _shut(label: str, valve: Mapping[str, Any]) -> list[str]:

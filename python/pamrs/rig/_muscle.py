@@ -13,6 +13,7 @@ from pamrs import _core
 from pamrs._checks import finite
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
+from pamrs.units import doubt_pascals
 
 Array = NDArray[np.float64]
 _FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")
@@ -535,6 +536,7 @@ class Muscle:
         given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
         arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
+        doubt_pascals("pressure", flat[0], inside=2)
         return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(
             arrays[0].shape
         )

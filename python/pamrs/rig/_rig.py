@@ -156,11 +156,12 @@ class Rig:
 
     @property
     def cautions(self) -> list[str]:
-        """What of the rig is possible, and most likely a mistake, one sentence each: valves that
-        never pass air, delays as long as the period of the pulses, muscles that push more than
-        rubber bears. Empty where nothing is.
+        """What of the rig is possible, and most likely a mistake, one sentence each: chambers that
+        no air reaches, valves that never pass air, delays as long as the period of the pulses,
+        muscles that push more than rubber bears, friction of exactly nothing, measured values
+        without a tolerance. Empty where nothing is.
         """
-        return cautions_of(self._model)
+        return cautions_of(self._model, self._connected, self._known)
 
     @cached_property
     def _connected(self) -> Ports:

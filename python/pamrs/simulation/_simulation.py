@@ -27,6 +27,7 @@ from pamrs.simulation._driving import (
     sensor_zero,
     signals_of,
 )
+from pamrs.units import doubt_pascals
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -638,6 +639,9 @@ def simulate(
         )
     if count != rows:
         check_rows(kept, count)
+    for name, signal in signals.items():
+        if channel_of(name) in ("supply_command", "pressure"):
+            doubt_pascals(name, signal)
     start = initial_values(initial, rig)
     held = {
         name: signal

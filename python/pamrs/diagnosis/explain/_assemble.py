@@ -206,6 +206,7 @@ def _warnings(
     named = any(j.named or j.wrong for j in models.judged)
     return [
         *words.absolute(case),
+        *words.left_out(case, models.judged),
         *(words.reservations(models.judged, models.chosen, table) if named else []),
         *(words.worse(table) if models.added else []),
         *words.warnings(case, models.judged, same),
