@@ -307,3 +307,16 @@ def test_the_package_offers_what_it_says() -> None:
     assert isinstance(pamrs.__version__, str)
     with pytest.raises(AttributeError, match="nonsense"):
         _ = pamrs.nonsense
+
+
+def test_equal_rigs_compare_equal_and_others_do_not() -> None:
+    rig = pamrs.rigs.shoulder()
+    assert rig == pamrs.rigs.shoulder()
+    assert hash(rig) == hash(pamrs.rigs.shoulder())
+    assert rig == parse_rig(SHOULDER)
+    heavier = rig.with_parameters({"arm.payload": 10.0})
+    assert heavier != rig
+    assert heavier.with_parameters({"arm.payload": rig.parameters["arm.payload"].value}) == rig
+    assert rig.with_effect("leak_muscle", {"conductance": 1e-10}) != rig
+    assert rig != "shoulder"
+    assert len({rig, pamrs.rigs.shoulder(), heavier}) == 2

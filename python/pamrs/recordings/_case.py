@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
-from pamrs.channels import channel_of
+from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
 from pamrs.effects import find_parameter
 from pamrs.errors import CaseError, ParameterError, RecordingError, RigError, joined
@@ -30,7 +31,7 @@ from pamrs.recordings._doubts import ambient_of, limits_of
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._recording import Issue, OwnValue, Recording
-from pamrs.recordings.logs import Log, TextFormat, check_readable, read_log
+from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
 
@@ -95,6 +96,82 @@ class Case:
             name for name in first if all(name in other.channels for other in self.recordings)
         )
 
+    @classmethod
+    def from_arrays(
+        cls,
+        rig: Rig,
+        recordings: Mapping[str, Mapping[str, ArrayLike]],
+        *,
+        sample_time: float | None = None,
+        units: Mapping[str, str] | None = None,
+        held_out: Sequence[str] = (),
+        name: str = "case",
+    ) -> Case:
+        """A case out of arrays, DataFrames or other tables that are in memory.
+
+        Recordings are checked and laid on a uniform grid as those of files are.
+
+        Parameters
+        ----------
+        rig : Rig
+            The nominal model.
+        recordings : mapping of str to mapping of str to array_like, shape (n,)
+            By name of the recording its channels by theirs (``muscle_pressure.flexor``), as a dict
+            of arrays, a DataFrame or a Dataset; NaN where nothing was measured. A channel ``time``
+            [s] has the times of all others.
+        sample_time : float, optional
+            Spacing of samples [s]: of the recordings without ``time``, and of the grid of all.
+        units : mapping of str to str, optional
+            Units of channels that are not in SI units: ``{"muscle_pressure": "bar"}``.
+        held_out : sequence of str, optional
+            Names of the recordings that are kept for the proof.
+        name : str, optional
+            Of the case.
+
+        Returns
+        -------
+        Case
+
+        Raises
+        ------
+        CaseError
+            If there is no recording, a name in `held_out` or `units` is that of none, or arrays
+            differ in length.
+        RecordingError
+            If a channel is unknown, its unit is wrong, or times cannot be understood.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> import pamrs
+        >>> command = 5.0 + np.sin(np.arange(400) * 0.05)
+        >>> run = pamrs.simulate(pamrs.rigs.shoulder(), command, sample_time=0.005)
+        >>> arrays = {"valve_command": command, "muscle_pressure": run["muscle_pressure"]}
+        >>> rig = pamrs.rigs.shoulder()
+        >>> pamrs.Case.from_arrays(rig, {"run": arrays}, sample_time=0.005).channels
+        ('valve_command', 'muscle_pressure')
+        """
+        tables = {
+            called: {key: np.asarray(values, dtype=np.float64) for key, values in table.items()}
+            for called, table in recordings.items()
+        }
+        _check_tables(tables, held_out, units or {})
+        made = list[Recording]()
+        for called, table in tables.items():
+            written = {key: (units or {}).get(key, unit_of(key)) for key in table if key != "time"}
+            log = Log(Path(called), {key: Series(key, values) for key, values in table.items()})
+            made += load_recordings(
+                called,
+                channels={key: {"column": key, "unit": unit} for key, unit in written.items()},
+                time={"column": "time", "unit": "s"} if "time" in table else None,
+                sample_time=sample_time,
+                name=called,
+                role="held_out" if called in held_out else "fit",
+                log=log,
+                ambient_pressure=ambient_of(rig),
+            )
+        return cls(name, rig, made, Path())
+
     def with_rig(self, rig: Rig) -> Case:
         """The same recordings with another rig.
 
@@ -108,6 +185,29 @@ class Case:
         Case
         """
         return replace(self, rig=rig)
+
+
+def _check_tables(
+    tables: Mapping[str, Mapping[str, NDArray[np.float64]]],
+    held_out: Sequence[str],
+    units: Mapping[str, str],
+) -> None:
+    """Refuse tables without rows, of several lengths, and names of none of them."""
+    problems = [] if tables else ["recordings = {} is not allowed: one at least is needed"]
+    for called, table in tables.items():
+        sizes = {key: values.shape for key, values in table.items()}
+        if len(set(sizes.values())) != 1 or len(next(iter(sizes.values()))) != 1:
+            told = ", ".join(f"{key} {shape}" for key, shape in sizes.items()) or "no channel"
+            problems.append(f"recording {called!r}: arrays of one length are needed, not {told}")
+    wrong = [called for called in held_out if called not in tables]
+    if wrong:
+        problems.append(f"held_out = {wrong}: recordings are {', '.join(map(repr, tables))}")
+    channels = {key for table in tables.values() for key in table}
+    problems += [
+        f"units[{key!r}]: no recording has that channel" for key in units if key not in channels
+    ]
+    if problems:
+        raise CaseError(joined("case", problems))
 
 
 def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) -> Case:

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from pamrs._checks import checked_number, checked_table, one_of
 from pamrs._files import read_toml
@@ -67,6 +67,10 @@ class Parameter:
     known: bool = True
 
 
+_COMPARED: Final = ("name", "_model", "_tolerances", "_effect_std")
+"""What rigs that are equal have alike; where they were read from, and comments, may differ."""
+
+
 @dataclass(frozen=True, eq=False)
 class Rig:
     """The model of a test bench; made by :func:`load_rig`, changed only by making another.
@@ -85,6 +89,14 @@ class Rig:
     _effect_std: dict[str, dict[str, float]] = field(default_factory=dict, repr=False)
     source: str = field(default="", repr=False)
     _text: str = field(default="", repr=False)  # the file, as its author wrote it
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Rig):
+            return NotImplemented
+        return all(getattr(self, name) == getattr(other, name) for name in _COMPARED)
+
+    def __hash__(self) -> int:
+        return hash(self.name)
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: value for name, value in self.__dict__.items() if name not in _MADE_AGAIN}
