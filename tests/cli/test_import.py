@@ -49,6 +49,49 @@ def test_a_rig_file_is_pointed_at(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert found.recordings[0].name == "run_bag"
 
 
+@pytest.mark.parametrize("kind", ["mf4", "bag"])
+def test_copies_make_the_case_complete(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, _, _ = written(tmp_path, kind)
+    pamrs.rigs.shoulder().to_toml(tmp_path / "mine.toml")
+    words = [file, "--rig", tmp_path / "mine.toml", "--out", tmp_path / "case", "--copy"]
+    code, out, err = run(capsys, *words)
+    assert code == 0, err
+    assert "--allow-outside" not in out + err
+    assert file.exists()
+    moved = tmp_path / "elsewhere"
+    (tmp_path / "case").rename(moved)
+    names = {path.name for path in moved.iterdir()}
+    assert names == {"case.toml", "rig.toml", file.name}
+    found = load_case(moved)
+    assert found.rig.name == "shoulder"
+    assert "muscle_pressure" in found.channels
+
+
+def test_a_case_that_is_printed_minds_no_rig_file_here(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file, _, _ = written(tmp_path, "mf4")
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "rig.toml").write_text("mine")
+    code, out, err = run(capsys, file, "--rig", "shoulder")
+    assert code == 0, err
+    assert 'rig = "rig.toml"' in out
+
+
+def test_a_copy_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file, _, _ = written(tmp_path, "mf4")
+    (tmp_path / "case").mkdir()
+    (tmp_path / "case" / file.name).write_text("mine")
+    code, _, err = run(capsys, file, "--rig", "shoulder", "--out", tmp_path / "case", "--copy")
+    assert (code, "not overwritten" in err) == (2, True)
+    assert (tmp_path / "case" / file.name).read_text() == "mine"
+    assert not (tmp_path / "case" / "case.toml").exists()
+    code, _, err = run(capsys, file, "--rig", "shoulder", "--copy")
+    assert (code, "--out" in err) == (2, True)
+
+
 LAYOUTS = [
     ("my logs/run 1.csv", "my rig.toml", "new case"),
     ("my logs/run 1.csv", "shoulder", "."),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import os
 import shlex
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -40,6 +42,13 @@ def import_command(
         Path | None,
         typer.Option(help="Folder that gets case.toml; without it, it is printed."),
     ] = None,
+    copy: Annotated[
+        bool,
+        typer.Option(
+            "--copy",
+            help="Copy logs and rig file into that folder, which is then complete by itself.",
+        ),
+    ] = False,
     sample_time: Annotated[
         str | None,
         typer.Option(help='For logs without any clock: the spacing of the samples, "1 ms".'),
@@ -58,53 +67,112 @@ def import_command(
     from pamrs.recordings import propose
     from pamrs.recordings.logs import TextFormat, check_readable
 
+    copies = _copies(log, out) if copy else {}
     for path in log:
         check_readable(path)
     form = None
     if columns is not None:
         form = TextFormat(columns=tuple(name.strip() for name in columns.split(",")))
     model = None if rig is None else rig_named(rig)
-    step = None if sample_time is None else exact("sample_time", sample_time, "time")
-    if step is not None and not 0.0 < step <= _MOST_STEP:
-        from pamrs.errors import ParameterError
-
-        raise ParameterError(
-            f"{as_given('sample_time', sample_time or '')} is not allowed: above zero, a day at "
-            "most"
-        )
+    step = None if sample_time is None else _spacing(sample_time)
     with progress(f"reading {len(log)} log{'s' if len(log) > 1 else ''}"):
         proposal = propose(log, model, sample_time=step, form=form)
     for item in proposal.logs:
         _show(item)
     folder = out or Path()
-    contents: Contents = {}
-    named = "rig.toml"
-    if rig is not None and rig.exists():
-        named = Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix()
+    named, contents = _rig_beside(rig, folder, copy=copy, written=out is not None)
+    if copies:
+        moved = [
+            replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
+            for item in proposal.logs
+        ]
+        proposal = replace(proposal, logs=moved)
     text = proposal.case_toml(folder, named)
     if file is None:
         typer.echo(text)
         return
     file.parent.mkdir(parents=True, exist_ok=True)
     used = [*log, *([rig] if rig is not None and rig.exists() else [])]
-    beside = file.parent / "rig.toml"
-    if rig is not None and not rig.exists():
-        from pamrs import rigs
-
-        template = rigs.template(str(rig), str(rig), "coefficients")
-        if beside.exists() and beside.read_text(encoding="utf-8", errors="replace") != template:
-            raise FileExistsError(
-                f"{beside}: is there already, and is not {rig}; it is not overwritten: give it as "
-                "--rig, or another --out"
-            )
-        contents[beside] = template
     contents[file] = text
+    for path, target in copies.items():
+        _copy(path, target)
     write(contents)
-    outside = any(not is_inside(file.parent, path) for path in used)
+    outside = not copy and any(not is_inside(file.parent, path) for path in used)
     allowed = " --allow-outside" if outside else ""
+    beside = file.parent / "rig.toml"
     missing = "" if rig is not None or beside.exists() else f", put the rig file there as {beside}"
     folder_name = shlex.quote(str(file.parent))
     typer.echo(f"look at {file}{missing}, then: pamrs diagnose {folder_name}{allowed}")
+
+
+def _spacing(text: str) -> float:
+    """The spacing of samples [s]."""
+    step = exact("sample_time", text, "time")
+    if not 0.0 < step <= _MOST_STEP:
+        from pamrs.errors import ParameterError
+
+        raise ParameterError(
+            f"{as_given('sample_time', text)} is not allowed: above zero, a day at most"
+        )
+    return step
+
+
+def _rig_beside(
+    rig: Path | None, folder: Path, *, copy: bool, written: bool
+) -> tuple[str, Contents]:
+    """What case.toml calls the rig file, and the file that it needs beside it."""
+    beside = folder / "rig.toml"
+    if rig is None:
+        return beside.name, {}
+    if rig.exists() and (not copy or is_inside(folder, rig)):
+        return Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix(), {}
+    if rig.exists():
+        _check_new(beside)
+        return beside.name, {beside: rig.read_text(encoding="utf-8")}
+    from pamrs import rigs
+
+    template = rigs.template(str(rig), str(rig), "coefficients")
+    if (
+        written
+        and beside.exists()
+        and beside.read_text(encoding="utf-8", errors="replace") != template
+    ):
+        raise FileExistsError(
+            f"{beside}: is there already, and is not {rig}; it is not overwritten: give it as "
+            "--rig, or another --out"
+        )
+    return beside.name, {beside: template}
+
+
+def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
+    """Where logs that lie outside a folder are copied to; nothing is overwritten."""
+    if folder is None:
+        from pamrs.errors import ParameterError
+
+        raise ParameterError("copy needs a folder: give it as --out")
+    targets = {path: folder / path.name for path in logs if not is_inside(folder, path)}
+    for target in targets.values():
+        _check_new(target)
+    names = [target.name for target in targets.values()]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise FileExistsError(f"{folder / twice[0]}: two of the logs have this name; rename one")
+    return targets
+
+
+def _check_new(target: Path) -> None:
+    if target.exists():
+        raise FileExistsError(f"{target}: is there already; it is not overwritten")
+
+
+def _copy(path: Path, target: Path) -> None:
+    """Copy a log, a file or the folder of a bag, beside and then in its place."""
+    beside = target.with_name(f"{target.name}.part")
+    if path.is_dir():
+        shutil.copytree(path, beside)
+    else:
+        shutil.copyfile(path, beside)
+    beside.rename(target)
 
 
 def _show(item: LogProposal) -> None:
