@@ -76,6 +76,7 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         at_rest=tuple((act, *change) for one in told["at_rest"] for act, change in one.items()),
         rivals=tuple(words.get("rivals", ())),
         stated_by=tuple(words.get("stated_by", ())),
+        like_values=tuple(words.get("like_values", ())),
         **{key: told[key] for key in _TOLD},
         **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},
         **{key: words.get(key, "") for key in ("label", "experiment")},

@@ -253,6 +253,9 @@ class EffectInfo:
     stated_by : tuple of str
         Parameters of the rig that say the same: where the file gives one of them a tolerance, it is
         fitted, and the effect is not looked for.
+    like_values : tuple of str
+        Parameters of the rig with nearly the same law: one that the file has as exactly zero may be
+        what is missing.
     acts_in : tuple of str
         Kinds of block of the cut chain in which it acts (``supply``, ``chamber``, ``arm``), where
         these are others than those of its block.
@@ -295,6 +298,7 @@ class EffectInfo:
     terms: tuple[ClosureTerm, ...] = ()
     label: str = ""
     stated_by: tuple[str, ...] = ()
+    like_values: tuple[str, ...] = ()
     acts_in: tuple[str, ...] = ()
     experiment: str = ""
     excitation: tuple[tuple[str, str | int | float | tuple[float, ...]], ...] = ()

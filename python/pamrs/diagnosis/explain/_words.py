@@ -34,13 +34,6 @@ _NO_MISMATCH_PROBABILITY = 0.1
 # share of the excess over share of the time from which a condition is told
 TELLING_CONDITION = 1.15
 
-_SAME_LAW = {
-    "muscle_rate_damping": ("arm.viscous", "load.viscous"),
-    "muscle_hysteresis": ("arm.coulomb", "load.coulomb"),
-    "joint_coulomb_stribeck": ("arm.coulomb", "load.coulomb"),
-}
-"""Parameters of the rig file with nearly the law of an effect, by its id."""
-
 
 def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> Where:
     """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
@@ -118,7 +111,7 @@ def left_out(case: Case, judged: list[Judged]) -> list[str]:
         f"{name} is exactly 0 in the rig file and would do nearly what {effect} does: write what "
         "is known of it, a value and a tolerance (tol), and diagnose again"
         for effect in named
-        for name in _SAME_LAW.get(effect.id, ())
+        for name in effect.info.like_values
         if (known := case.rig.parameters.get(name)) is not None
         and known.known
         and known.value == 0.0
