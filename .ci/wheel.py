@@ -29,21 +29,21 @@ def build(out: Path, flags: str = "") -> Path:
 
 def main(dist: Path) -> None:
     """The wheel with its second core where there is one, and the sources."""
-    second = None
-    if platform.machine().lower() in ("x86_64", "amd64"):
-        with tempfile.TemporaryDirectory() as place:
-            wheel = build(Path(place), "-C target-cpu=x86-64-v3")
-            with zipfile.ZipFile(wheel) as files:
-                names = files.namelist()
-                (name,) = (n for n in names if n in ("pamrs/_core.abi3.so", "pamrs/_core.pyd"))
-                second = PACKAGE / Path(name).name.replace("_core", "_core_v3", 1)
-                second.write_bytes(files.read(name))
-    subprocess.run([sys.executable, "-m", "maturin", "sdist", "--out", dist], cwd=ROOT, check=True)
+    second = PACKAGE / "_core_v3.none"
     try:
+        if platform.machine().lower() in ("x86_64", "amd64"):
+            with tempfile.TemporaryDirectory() as place:
+                wheel = build(Path(place), "-C target-cpu=x86-64-v3")
+                with zipfile.ZipFile(wheel) as files:
+                    names = files.namelist()
+                    (name,) = (n for n in names if n in ("pamrs/_core.abi3.so", "pamrs/_core.pyd"))
+                    second = PACKAGE / Path(name).name.replace("_core", "_core_v3", 1)
+                    second.write_bytes(files.read(name))
+        sdist = [sys.executable, "-m", "maturin", "sdist", "--out", dist]
+        subprocess.run(sdist, cwd=ROOT, check=True)
         build(dist)
     finally:
-        if second is not None:
-            second.unlink()
+        second.unlink(missing_ok=True)
 
 
 if __name__ == "__main__":

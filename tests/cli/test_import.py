@@ -92,6 +92,32 @@ def test_a_copy_overwrites_nothing(tmp_path: Path, capsys: pytest.CaptureFixture
     assert (code, "--out" in err) == (2, True)
 
 
+def test_a_copy_follows_no_link_and_leaves_nothing_half_done(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, _, _ = written(tmp_path, "mf4")
+    case, precious = tmp_path / "case", tmp_path / "precious"
+    case.mkdir()
+    precious.write_text("mine")
+    (case / f"{file.name}.part").symlink_to(precious)
+    (tmp_path / "b").mkdir()
+    other = tmp_path / "b" / file.name.upper()
+    other.write_bytes(file.read_bytes())
+    words = ["--rig", "shoulder", "--out", case, "--copy"]
+    code, _, err = run(capsys, file, other, *words)
+    assert (code, "rename one" in err) == (2, True)
+    code, _, err = run(capsys, file, tmp_path / "b" / ".." / file.name, *words)
+    assert (code, "the same log twice" in err) == (2, True)
+    assert {path.name for path in case.iterdir()} == {f"{file.name}.part"}
+    assert run(capsys, file, *words)[0] == 0
+    assert precious.read_text() == "mine"
+    assert not (case / file.name).is_symlink()
+    bag, _, _ = written(tmp_path, "bag")
+    code, _, err = run(capsys, bag, "--rig", "shoulder", "--out", bag / "case", "--copy")
+    assert (code, "which is to be copied there" in err) == (2, True)
+    assert not (bag / "case").exists()
+
+
 LAYOUTS = [
     ("my logs/run 1.csv", "my rig.toml", "new case"),
     ("my logs/run 1.csv", "shoulder", "."),

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import pamrs
-from pamrs.errors import CaseError, RecordingError
+from pamrs.errors import CaseError, ParameterError, RecordingError
 
 RIG = pamrs.rigs.shoulder()
 TIME = 0.005 * np.arange(400)
@@ -73,24 +73,64 @@ def test_a_case_of_arrays_is_diagnosed() -> None:
     assert found.verdict in ("none", "parameters")
 
 
+def test_times_are_dates_an_index_a_coordinate_or_in_another_unit() -> None:
+    frame = pd.DataFrame(ARRAYS)
+    dated = frame.assign(time=pd.to_datetime("2026-11-27 09:00") + pd.to_timedelta(TIME, unit="s"))
+    indexed = frame.set_index(pd.Index(TIME, name="time"))
+    tables = {"dated": dated, "indexed": indexed, "run": RUN.to_pandas()[list(ARRAYS)[1:]]}
+    for recording in pamrs.Case.from_arrays(RIG, tables).recordings:
+        assert recording.sample_time == pytest.approx(0.005)
+        assert recording.duration == pytest.approx(TIME[-1])
+    counted = {"run": frame.assign(time=1e3 * TIME)}
+    (own,) = pamrs.Case.from_arrays(RIG, counted, units={"time": "ms"}).recordings
+    assert own.sample_time == pytest.approx(0.005)
+    xarray = pytest.importorskip("xarray")
+    data = xarray.Dataset({n: ("time", v) for n, v in ARRAYS.items()}, coords={"time": TIME})
+    (own,) = pamrs.Case.from_arrays(RIG, {"run": data}).recordings
+    assert own.sample_time == pytest.approx(0.005)
+
+
+def test_masked_values_are_missing_and_turns_are_moved_as_in_a_folder() -> None:
+    masked = np.ma.masked_array(ARRAYS["joint_angle"] + 2.0 * np.pi, TIME < 0.1)
+    case = pamrs.Case.from_arrays(RIG, {"run": ARRAYS | {"joint_angle": masked}}, sample_time=0.005)
+    (own,) = case.recordings
+    assert not own.mask["joint_angle"][:20].any()
+    kept = own.mask["joint_angle"]
+    assert np.allclose(own.channels["joint_angle"][kept], ARRAYS["joint_angle"][kept])
+
+
 @pytest.mark.parametrize(
     ("tables", "options", "error", "said"),
     [
-        ({}, {}, CaseError, "one at least is needed"),
-        ({"run": {}}, {}, CaseError, "recording 'run': arrays of one length are needed"),
-        (
-            {"run": ARRAYS | {"joint_angle": TIME[:9]}},
-            {},
-            CaseError,
-            r"joint_angle \(9,\)",
-        ),
+        ({}, {}, CaseError, "one at least, is needed"),
+        ([ARRAYS], {}, CaseError, "a mapping from names to tables"),
+        ({"run": TIME}, {}, CaseError, "a dict of arrays, DataFrame or Dataset is needed"),
+        ({3: ARRAYS}, {}, CaseError, "recording 3: a name is needed that is a text"),
+        ({"run": {}}, {}, CaseError, "recording 'run' has no channel but time"),
+        ({"run": {"time": TIME}}, {}, CaseError, "recording 'run' has no channel but time"),
+        ({"run": ARRAYS | {"joint_angle": TIME[:9]}}, {}, CaseError, "joint_angle 9"),
+        ({"run": ARRAYS | {"joint_angle": ["a"] * 400}}, {}, CaseError, "'joint_angle' has the ty"),
+        ({"run": ARRAYS | {"joint_angle": 1j * TIME}}, {}, CaseError, "the type complex128"),
+        ({"run": ARRAYS | {"joint_angle": TIME[:, None]}}, {}, CaseError, r"shape \(400, 1\)"),
         ({"run": ARRAYS}, {"held_out": ["other"]}, CaseError, r"held_out = \['other'\]"),
+        ({"run": ARRAYS}, {"held_out": "run"}, CaseError, "a list of names is needed"),
+        ({"run": ARRAYS}, {"held_out": ["run"]}, CaseError, "one recording is needed that is fit"),
         ({"run": ARRAYS}, {"units": {"force": "N"}}, CaseError, "no recording has that channel"),
         ({"run": ARRAYS}, {"units": {"joint_angle": "bar"}}, RecordingError, "bar"),
         ({"run": ARRAYS | {"jont_angle": TIME}}, {}, RecordingError, "did you mean 'joint_angle'"),
-        ({"run": ARRAYS}, {"sample_time": None}, RecordingError, "sample_time"),
+        ({"run": ARRAYS}, {"sample_time": None}, CaseError, "give it a channel time"),
+        ({"run": ARRAYS}, {"sample_time": -1.0}, ParameterError, "sample_time = -1"),
     ],
 )
 def test_what_cannot_be_a_case_is_named(tables, options, error, said) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(error, match=said):
         pamrs.Case.from_arrays(RIG, tables, **{"sample_time": 0.005} | options)
+
+
+def test_a_column_that_is_there_twice_is_named() -> None:
+    frame = pd.DataFrame(ARRAYS)
+    twice = pd.concat([frame, frame[["joint_angle"]]], axis=1)
+    with pytest.raises(CaseError, match="recording 'run' has 'joint_angle' twice"):
+        pamrs.Case.from_arrays(RIG, {"run": twice}, sample_time=0.005)
+    with pytest.raises(CaseError, match="a Rig is needed"):
+        pamrs.Case.from_arrays("shoulder", {"run": frame}, sample_time=0.005)  # type: ignore[arg-type]

@@ -492,6 +492,17 @@ def test_friction_of_exactly_nothing_is_told_with_a_usual_size() -> None:
     assert told_of("hanging_mass", r"^viscous *=.*?$", known) == []
 
 
+def test_friction_of_nothing_is_told_of_every_link() -> None:
+    told = told_of("two_joint_arm", r"^(?:viscous|coulomb) *=[^\n]*\n", "")
+    words = (
+        "link.forearm.viscous",
+        "link.forearm.coulomb",
+        "link.hand.viscous",
+        "link.hand.coulomb",
+    )
+    assert [caution.split(" = ")[0] for caution in told] == list(words)
+
+
 def test_measured_values_without_a_tolerance_are_told_together() -> None:
     (told,) = told_of("shoulder", r"^((?:inertia|dead_volume) *=.*?), *tol *= *[-0-9.e]+", r"\1")
     assert told.startswith("known exactly, as no laboratory knows it: ")

@@ -6,6 +6,7 @@ import math
 import os
 import shlex
 import shutil
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -94,8 +95,7 @@ def import_command(
     file.parent.mkdir(parents=True, exist_ok=True)
     used = [*log, *([rig] if rig is not None and rig.exists() else [])]
     contents[file] = text
-    for path, target in copies.items():
-        _copy(path, target)
+    _copy(copies, file.parent)
     write(contents)
     outside = not copy and any(not is_inside(file.parent, path) for path in used)
     allowed = " --allow-outside" if outside else ""
@@ -146,33 +146,40 @@ def _rig_beside(
 
 def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
     """Where logs that lie outside a folder are copied to; nothing is overwritten."""
-    if folder is None:
-        from pamrs.errors import ParameterError
+    from pamrs.errors import ParameterError
 
+    if folder is None:
         raise ParameterError("copy needs a folder: give it as --out")
     targets = {path: folder / path.name for path in logs if not is_inside(folder, path)}
-    for target in targets.values():
+    seen: dict[str, Path] = {}
+    for path, target in targets.items():
+        if path.is_dir() and is_inside(path, folder):
+            raise ParameterError(f"out = {folder}: lies in {path}, which is to be copied there")
         _check_new(target)
-    names = [target.name for target in targets.values()]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise FileExistsError(f"{folder / twice[0]}: two of the logs have this name; rename one")
+        other = seen.setdefault(target.name.casefold(), path)
+        if other is not path:
+            same = resolved(other) == resolved(path)
+            why = "the same log twice" if same else f"{other} has that name too; rename one"
+            raise FileExistsError(f"{path}: {why}")
     return targets
 
 
 def _check_new(target: Path) -> None:
-    if target.exists():
+    if os.path.lexists(target):
         raise FileExistsError(f"{target}: is there already; it is not overwritten")
 
 
-def _copy(path: Path, target: Path) -> None:
-    """Copy a log, a file or the folder of a bag, beside and then in its place."""
-    beside = target.with_name(f"{target.name}.part")
-    if path.is_dir():
-        shutil.copytree(path, beside)
-    else:
-        shutil.copyfile(path, beside)
-    beside.rename(target)
+def _copy(copies: dict[Path, Path], folder: Path) -> None:
+    """Copy logs, files or the folders of bags: all beside, then each in its place."""
+    with tempfile.TemporaryDirectory(prefix=".copies-", dir=folder) as place:
+        made = {Path(place) / str(number): pair for number, pair in enumerate(copies.items())}
+        for beside, (path, _) in made.items():
+            if path.is_dir():
+                shutil.copytree(path, beside)
+            else:
+                shutil.copyfile(path, beside)
+        for beside, (_, target) in made.items():
+            beside.rename(target)
 
 
 def _show(item: LogProposal) -> None:

@@ -254,8 +254,8 @@ class EffectInfo:
         Parameters of the rig that say the same: where the file gives one of them a tolerance, it is
         fitted, and the effect is not looked for.
     like_values : tuple of str
-        Parameters of the rig with nearly the same law: one that the file has as exactly zero may be
-        what is missing.
+        Parameters of the rig with nearly the same law, by block and key, whatever the block is
+        called: one that the file has as exactly zero may be what is missing.
     acts_in : tuple of str
         Kinds of block of the cut chain in which it acts (``supply``, ``chamber``, ``arm``), where
         these are others than those of its block.

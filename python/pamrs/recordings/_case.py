@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from pamrs._checks import positive
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
@@ -30,6 +31,7 @@ from pamrs.recordings._case_keys import (
 from pamrs.recordings._doubts import ambient_of, limits_of
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
+from pamrs.recordings._in_memory import arrays_of
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
@@ -109,7 +111,7 @@ class Case:
     ) -> Case:
         """A case out of arrays, DataFrames or other tables that are in memory.
 
-        Recordings are checked and laid on a uniform grid as those of files are.
+        Recordings are checked and laid on a uniform grid as those of a case folder are.
 
         Parameters
         ----------
@@ -117,8 +119,8 @@ class Case:
             The nominal model.
         recordings : mapping of str to mapping of str to array_like, shape (n,)
             By name of the recording its channels by theirs (``muscle_pressure.flexor``), as a dict
-            of arrays, a DataFrame or a Dataset; NaN where nothing was measured. A channel ``time``
-            [s] has the times of all others.
+            of arrays, a DataFrame or a Dataset; NaN where nothing was measured. A channel, index or
+            coordinate ``time`` has the times of all others, in seconds or as dates.
         sample_time : float, optional
             Spacing of samples [s]: of the recordings without ``time``, and of the grid of all.
         units : mapping of str to str, optional
@@ -135,8 +137,8 @@ class Case:
         Raises
         ------
         CaseError
-            If there is no recording, a name in `held_out` or `units` is that of none, or arrays
-            differ in length.
+            If there is no recording or none to fit, a name in `held_out` or `units` is that of
+            none, a recording has no times, or arrays are no numbers or differ in length.
         RecordingError
             If a channel is unknown, its unit is wrong, or times cannot be understood.
 
@@ -151,25 +153,26 @@ class Case:
         >>> pamrs.Case.from_arrays(rig, {"run": arrays}, sample_time=0.005).channels
         ('valve_command', 'muscle_pressure')
         """
-        tables = {
-            called: {key: np.asarray(values, dtype=np.float64) for key, values in table.items()}
-            for called, table in recordings.items()
-        }
-        _check_tables(tables, held_out, units or {})
+        if not isinstance(rig, Rig):
+            raise CaseError(f"rig = {rig!r} is not allowed: a Rig is needed, as of pamrs.load_rig")
+        written = dict(units or {})
+        tables = arrays_of(recordings, held_out, written, sample_time)
+        spacing = None if sample_time is None else positive("sample_time", sample_time)
         made = list[Recording]()
         for called, table in tables.items():
-            written = {key: (units or {}).get(key, unit_of(key)) for key in table if key != "time"}
-            log = Log(Path(called), {key: Series(key, values) for key, values in table.items()})
-            made += load_recordings(
+            channels = {key: written.get(key, unit_of(key)) for key in table if key != "time"}
+            clock = {"column": "time", "unit": written.get("time", "s")}
+            found = load_recordings(
                 called,
-                channels={key: {"column": key, "unit": unit} for key, unit in written.items()},
-                time={"column": "time", "unit": "s"} if "time" in table else None,
-                sample_time=sample_time,
+                channels={key: {"column": key, "unit": unit} for key, unit in channels.items()},
+                time=clock if "time" in table else None,
+                sample_time=spacing,
                 name=called,
                 role="held_out" if called in held_out else "fit",
-                log=log,
+                log=Log(Path(called), {key: Series(key, own) for key, own in table.items()}),
                 ambient_pressure=ambient_of(rig),
             )
+            made += [_on_its_turn(each, rig) for each in found]
         return cls(name, rig, made, Path())
 
     def with_rig(self, rig: Rig) -> Case:
@@ -185,29 +188,6 @@ class Case:
         Case
         """
         return replace(self, rig=rig)
-
-
-def _check_tables(
-    tables: Mapping[str, Mapping[str, NDArray[np.float64]]],
-    held_out: Sequence[str],
-    units: Mapping[str, str],
-) -> None:
-    """Refuse tables without rows, of several lengths, and names of none of them."""
-    problems = [] if tables else ["recordings = {} is not allowed: one at least is needed"]
-    for called, table in tables.items():
-        sizes = {key: values.shape for key, values in table.items()}
-        if len(set(sizes.values())) != 1 or len(next(iter(sizes.values()))) != 1:
-            told = ", ".join(f"{key} {shape}" for key, shape in sizes.items()) or "no channel"
-            problems.append(f"recording {called!r}: arrays of one length are needed, not {told}")
-    wrong = [called for called in held_out if called not in tables]
-    if wrong:
-        problems.append(f"held_out = {wrong}: recordings are {', '.join(map(repr, tables))}")
-    channels = {key for table in tables.values() for key in table}
-    problems += [
-        f"units[{key!r}]: no recording has that channel" for key in units if key not in channels
-    ]
-    if problems:
-        raise CaseError(joined("case", problems))
 
 
 def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) -> Case:

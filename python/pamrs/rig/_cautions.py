@@ -10,12 +10,17 @@ from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.rig._ports import Ports
 from pamrs.rig.schema import qualified, tables_of
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.rig._rig import Parameter
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
+
+_GRAVITY: Final = 9.80665  # [m/s2]
+_WEIGHTS: Final = {"arm": ("", ""), "link": ("mass", "centre"), "load": ("mass", "")}
+"""Mass and its lever by the block that friction holds; a load has no lever."""
 
 _MEASURED: Final = {
     ("valve", "discharge_area_max"): 0.05,
@@ -91,7 +96,7 @@ def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
     for name, usual in _usual_friction(parameters).items():
         known = parameters[name]
         if known.value == 0.0 and known.known and not known.tol:
-            size = f"{usual:.2g}"
+            size = f"{usual:.2g}" if usual else "..."
             found.append(
                 f"{name} = 0 {known.unit}, exactly: no laboratory knows that, and a diagnosis "
                 "would call it missing physics; write what is known of it, such as "
@@ -102,18 +107,25 @@ def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
 
 def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
     """Friction of a good bearing by the name of its parameter: a hundredth of the weight, and as
-    much more at 1 rad/s or 0.1 m/s.
+    much more at 1 rad/s or 0.1 m/s; zero where no weight is known.
     """
 
     def value(name: str) -> float:
         known = parameters.get(name)
         return known.value if known is not None and known.known else 0.0
 
-    arm = value("arm.first_moment") + value("arm.payload") * value("arm.length")
-    torque, force = arm * value("arm.gravity"), value("load.mass") * value("load.gravity")
-    usual = {"arm.coulomb": 0.01 * torque, "arm.viscous": 0.01 * torque}
-    usual |= {"load.coulomb": 0.01 * force, "load.viscous": 0.1 * force}
-    return {name: size for name, size in usual.items() if name in parameters and size > 0.0}
+    found = {}
+    for name in parameters:
+        table, _, word = name.rpartition(".")
+        if word not in ("viscous", "coulomb") or table.partition(".")[0] not in _WEIGHTS:
+            continue
+        mass, lever = (value(f"{table}.{key}") for key in _WEIGHTS[table.partition(".")[0]])
+        lever = 1.0 if table == "load" else lever
+        weight = abs(mass * lever + value(f"{table}.payload") * value(f"{table}.length"))
+        weight += abs(value(f"{table}.first_moment"))
+        speed = 10.0 if table == "load" and word == "viscous" else 1.0
+        found[name] = 0.01 * speed * weight * _GRAVITY
+    return found
 
 
 def _exact(parameters: Mapping[str, Parameter]) -> list[str]:
@@ -127,7 +139,9 @@ def _exact(parameters: Mapping[str, Parameter]) -> list[str]:
             found[name] = share * abs(known.value), known.unit
     if not found:
         return []
-    told = [f"{name} (tol = {tol:.2g} {unit})" for name, (tol, unit) in found.items()]
+    told = [
+        f"{name} (tol = {with_unit(f'{tol:.2g}', unit)})" for name, (tol, unit) in found.items()
+    ]
     return [
         f"known exactly, as no laboratory knows it: {', '.join(told)} would be usual; what a "
         "diagnosis may not move it explains with effects"

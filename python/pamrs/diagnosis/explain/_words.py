@@ -111,8 +111,8 @@ def left_out(case: Case, judged: list[Judged]) -> list[str]:
         f"{name} is exactly 0 in the rig file and would do nearly what {effect} does: write what "
         "is known of it, a value and a tolerance (tol), and diagnose again"
         for effect in named
-        for name in effect.info.like_values
-        if (known := case.rig.parameters.get(name)) is not None
+        for name, known in case.rig.parameters.items()
+        if f"{name.partition('.')[0]}.{name.rpartition('.')[2]}" in effect.info.like_values
         and known.known
         and known.value == 0.0
         and not known.tol

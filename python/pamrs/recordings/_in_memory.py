@@ -1,0 +1,147 @@
+"""Tables that are in memory, as arrays by the channel's name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pamrs.errors import CaseError, joined
+
+__all__ = ["arrays_of"]
+
+Array = NDArray[np.float64]
+_NUMBERS = "biuf"  # kinds of arrays that are numbers
+_DATES = "mM"  # kinds that are times
+
+
+def arrays_of(
+    recordings: Mapping[str, Any],
+    held_out: Sequence[str],
+    units: Mapping[str, str],
+    sample_time: float | None,
+) -> dict[str, dict[str, Array]]:
+    """Arrays by recording and channel, ``time`` among them [s] where a table has one, as a channel,
+    an index or a coordinate.
+
+    Parameters
+    ----------
+    recordings : mapping of str to mapping
+        Dicts of arrays, DataFrames or Datasets.
+    held_out : sequence of str
+        Recordings that are not fitted.
+    units : mapping of str to str
+        Units by channel.
+    sample_time : float, optional
+        Spacing of the recordings without times.
+
+    Raises
+    ------
+    CaseError
+        Naming every recording or channel that is wrong, and what is allowed.
+    """
+    if not isinstance(recordings, Mapping) or not recordings:
+        raise CaseError(
+            f"recordings = {_said(recordings)} is not allowed: a mapping from names to tables, one "
+            "at least, is needed"
+        )
+    problems = list[str]()
+    tables = {name: _table(problems, name, table) for name, table in recordings.items()}
+    problems += [
+        f"recording {name!r} has no times: give it a channel time [s], or sample_time"
+        for name, table in tables.items()
+        if table and "time" not in table and sample_time is None
+    ]
+    problems += _names(tables, held_out, units)
+    if problems:
+        raise CaseError(joined("case", problems))
+    return tables
+
+
+def _said(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 40 else f"{type(value).__name__} {text[:40]}..."
+
+
+def _table(problems: list[str], name: Any, table: Any) -> dict[str, Array]:
+    """The channels of one recording; what is wrong is added to `problems`."""
+    if not isinstance(name, str):
+        problems.append(f"recording {name!r}: a name is needed that is a text")
+    items = getattr(table, "items", None)
+    if items is None:
+        problems.append(
+            f"recording {name!r} = {_said(table)}: a dict of arrays, DataFrame or Dataset is needed"
+        )
+        return {}
+    pairs = list(items())
+    if "time" not in [key for key, _ in pairs]:
+        pairs += [("time", found) for found in [_times(table)] if found is not None]
+    keys = [key for key, _ in pairs]
+    problems += [
+        f"recording {name!r} has {key!r} twice"
+        for key in dict.fromkeys(keys)
+        if keys.count(key) > 1
+    ]
+    found = dict[str, Array]()
+    for key, values in pairs:
+        array = _array(problems, f"recording {name!r}, {key!r}", values, dates=key == "time")
+        if array is not None:
+            found[key] = array
+    if len(found) == len(pairs) and len({values.size for values in found.values()}) > 1:
+        told = ", ".join(f"{key} {values.size}" for key, values in found.items())
+        problems.append(f"recording {name!r}: arrays of one length are needed, not {told}")
+    if not set(found) - {"time"}:
+        problems.append(f"recording {name!r} has no channel but time")
+    return found
+
+
+def _times(table: Any) -> Any:
+    """Times of a table that are an index or a coordinate called ``time``."""
+    if "time" in getattr(table, "coords", ()):
+        return table.coords["time"]
+    index = getattr(table, "index", None)
+    return index if getattr(index, "name", None) == "time" else None
+
+
+def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Array | None:
+    """One channel; times since the first where they are dates."""
+    masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
+    array = np.asarray(values)
+    if dates and array.dtype.kind in _DATES and array.size:
+        since = array - array[0] if array.dtype.kind == "M" else array
+        array = since / np.timedelta64(1, "s")
+    if array.dtype.kind == "O":
+        try:
+            array = array.astype(np.float64)
+        except (TypeError, ValueError):
+            problems.append(f"{label} has values that are no numbers, such as {_said(array[0])}")
+            return None
+    if array.dtype.kind not in _NUMBERS or array.ndim != 1 or array.size == 0:
+        problems.append(
+            f"{label} has the type {array.dtype} and the shape {array.shape}: numbers in one row, "
+            "one at least, are needed"
+        )
+        return None
+    found = array.astype(np.float64)
+    if masked is not None:
+        found[masked] = np.nan
+    return found
+
+
+def _names(
+    tables: Mapping[str, Mapping[str, Array]], held_out: Sequence[str], units: Mapping[str, str]
+) -> list[str]:
+    """Names in `held_out` and `units` that are those of nothing."""
+    known = ", ".join(map(repr, tables))
+    channels = {key for table in tables.values() for key in table}
+    problems = [f"units[{k!r}]: no recording has that channel" for k in units if k not in channels]
+    if isinstance(held_out, str):
+        return [*problems, f"held_out = {held_out!r}: a list of names is needed"]
+    wrong = [name for name in held_out if name not in tables]
+    if wrong:
+        problems.append(f"held_out = {wrong}: recordings are {known}")
+    elif set(held_out) == set(tables):
+        problems.append(f"held_out = {list(held_out)}: one recording is needed that is fitted")
+    return problems
