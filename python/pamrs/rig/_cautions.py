@@ -19,8 +19,6 @@ _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill",
 """Paths that are open in each position of a spool that switches."""
 
 _GRAVITY: Final = 9.80665  # [m/s2]
-_WEIGHTS: Final = {"arm": ("", ""), "link": ("mass", "centre"), "load": ("mass", "")}
-"""Mass and its lever by the block that friction holds; a load has no lever."""
 
 _MEASURED: Final = {
     ("valve", "discharge_area_max"): 0.05,
@@ -117,14 +115,15 @@ def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
     found = {}
     for name in parameters:
         table, _, word = name.rpartition(".")
-        if word not in ("viscous", "coulomb") or table.partition(".")[0] not in _WEIGHTS:
+        block = table.partition(".")[0]
+        if block not in ("arm", "link", "load") or word not in ("viscous", "coulomb"):
             continue
-        mass, lever = (value(f"{table}.{key}") for key in _WEIGHTS[table.partition(".")[0]])
-        lever = 1.0 if table == "load" else lever
-        weight = abs(mass * lever + value(f"{table}.payload") * value(f"{table}.length"))
-        weight += abs(value(f"{table}.first_moment"))
-        speed = 10.0 if table == "load" and word == "viscous" else 1.0
-        found[name] = 0.01 * speed * weight * _GRAVITY
+        mass = value(f"{table}.mass")
+        own = {"arm": value("arm.first_moment"), "load": mass}
+        moment = own.get(block, mass * value(f"{table}.centre"))
+        moment += value(f"{table}.payload") * value(f"{table}.length")
+        per_speed = 10.0 if block == "load" and word == "viscous" else 1.0
+        found[name] = 0.01 * per_speed * _GRAVITY * abs(moment)
     return found
 
 
