@@ -12,7 +12,7 @@ from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     import numpy as np
-    from numpy.typing import NDArray
+    from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "as_numbers",
@@ -20,12 +20,15 @@ __all__ = [
     "check_column",
     "checked_number",
     "checked_table",
+    "doubt_pascals",
     "finite",
     "one_of",
     "positive",
     "rising",
     "whole",
 ]
+
+_LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
 
 
 def as_said(value: object) -> str:
@@ -293,3 +296,35 @@ def checked_table(name: str, values: Any) -> dict[str, Any]:
         if not isinstance(key, str):
             raise ParameterError(f"{name} has the key {key!r}, which is not allowed: a name is one")
     return dict(values)
+
+
+def doubt_pascals(name: str, pressure: ArrayLike, *, inside: int = 1) -> None:
+    """Warn of gauge pressures [Pa] that are all so small that bar or MPa are meant.
+
+    Parameters
+    ----------
+    name : str
+        What the caller calls them.
+    pressure : array_like
+        Gauge pressures [Pa].
+    inside : int, optional
+        How many functions inside the one that a user calls asks.
+
+    Warns
+    -----
+    UnitWarning
+        If the largest is more than nothing and less than a muscle notices.
+    """
+    import numpy as np
+
+    largest = float(np.max(np.abs(pressure), initial=0.0))
+    if 0.0 < largest < _LEAST_PRESSURE:
+        import warnings
+
+        from pamrs.errors import UnitWarning
+
+        warnings.warn(
+            f"{name} never exceeds {largest:.4g} Pa (gauge): pascals are wanted, 1 bar is 1e5",
+            UnitWarning,
+            stacklevel=2 + inside,
+        )

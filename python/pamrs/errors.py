@@ -50,6 +50,10 @@ class MissingPackageError(PamrsError, ImportError):
     """A package that only some commands need is not installed, or cannot be loaded."""
 
 
+class UnitWarning(UserWarning):
+    """A value that is possible and most likely meant in another unit than SI."""
+
+
 def missing_package(error: ImportError, extra: str) -> MissingPackageError:
     """The error that says what to install for a package that could not be imported, or that it is
     there and cannot be loaded.
@@ -116,7 +120,3 @@ def joined(head: str, problems: Iterable[str]) -> str:
     told = [f"  - {line}" for line in found[:_MOST_TOLD]]
     more = [f"  - and {len(found) - _MOST_TOLD} more"] if len(found) > _MOST_TOLD else []
     return "\n".join([f"{head}: {len(found)} problems", *told, *more])
-
-
-class UnitWarning(UserWarning):
-    """A value that is possible and most likely meant in another unit than SI."""

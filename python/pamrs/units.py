@@ -15,20 +15,15 @@ from __future__ import annotations
 import difflib
 import math
 import re
-import warnings
 from functools import lru_cache
 from typing import Final, NamedTuple
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from pamrs.errors import ParameterError, UnitWarning
+from pamrs.errors import ParameterError
 
 __all__ = [
     "DIMENSIONS",
     "Unit",
     "bar_and_psi",
-    "doubt_pascals",
     "from_si",
     "measured_from",
     "parse_unit",
@@ -81,7 +76,6 @@ _HZ: Final[_Vector] = (0, 0, -1, 0, 0, 0, 0)
 _POUND: Final = 0.45359237
 _INCH: Final = 0.0254
 _G: Final = 9.80665
-_LEAST_PRESSURE: Final = 50.0  # [Pa] below which no muscle notices a pressure
 _LONGEST: Final = 64  # letters of a unit
 _MOST_POWER: Final = 9  # of a symbol; no unit has more, and more overflows
 _MERCURY: Final = 133322.387415  # pressure of a metre of mercury; water has 1000 kg/m3 [Pa]
@@ -427,29 +421,3 @@ def bar_and_psi(pressure: float) -> str:
     '1 bar (14.5 psi)'
     """
     return f"{pressure / 1e5:.4g} bar ({from_si(pressure, 'psi', 'pressure'):.4g} psi)"
-
-
-def doubt_pascals(name: str, pressure: ArrayLike, *, inside: int = 1) -> None:
-    """Warn of gauge pressures [Pa] that are all so small that bar or MPa are meant.
-
-    Parameters
-    ----------
-    name : str
-        What the caller calls them.
-    pressure : array_like
-        Gauge pressures [Pa].
-    inside : int, optional
-        How many functions inside the one that a user calls asks.
-
-    Warns
-    -----
-    UnitWarning
-        If the largest is more than nothing and less than a muscle notices.
-    """
-    largest = float(np.max(np.abs(pressure), initial=0.0))
-    if 0.0 < largest < _LEAST_PRESSURE:
-        warnings.warn(
-            f"{name} never exceeds {largest:.4g} Pa (gauge): pascals are wanted, 1 bar is 1e5",
-            UnitWarning,
-            stacklevel=2 + inside,
-        )

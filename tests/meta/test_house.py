@@ -98,6 +98,11 @@ def test_import_is_light():
     assert done.returncode == 0, f"import pamrs also imports {done.stderr}"
 
 
+def test_the_commands_start_without_numpy():
+    code = "import sys, pamrs.cli; sys.exit('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
+
+
 def test_public_names_exist():
     assert pamrs.__all__
     for name in pamrs.__all__:

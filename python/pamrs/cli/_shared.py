@@ -4,6 +4,7 @@ progress.
 
 from __future__ import annotations
 
+import os
 import re
 import sys
 import time
@@ -30,6 +31,7 @@ __all__ = [
     "QUANTITY",
     "Contents",
     "as_given",
+    "check_new",
     "check_writable",
     "document",
     "exact",
@@ -54,6 +56,12 @@ GEOMETRY: Final = {
     "braid_angle": "angle",
     "wall_thickness": "length",
 }
+
+
+def check_new(path: Path) -> None:
+    """Refuse to write where something is: a file, a folder or a link."""
+    if os.path.lexists(path):
+        raise FileExistsError(f"{path}: is there already; it is not overwritten")
 
 
 def as_given(name: str, text: str) -> str:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shlex
-import shutil
-import tempfile
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -14,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 import typer
 
 from pamrs._files import is_inside, resolved
-from pamrs.cli._shared import Contents, as_given, exact, progress, rig_named, write
+from pamrs.cli._shared import Contents, as_given, check_new, exact, progress, rig_named, write
 
 if TYPE_CHECKING:
-    from pamrs.recordings import LogProposal
+    from pamrs.recordings import LogProposal, Proposal
 
 __all__ = ["import_command"]
 
@@ -63,8 +61,8 @@ def import_command(
 ) -> None:
     """List the channels of logs, and propose which of them is which channel of the rig."""
     file = None if out is None else out / "case.toml"
-    if file is not None and file.exists():
-        raise FileExistsError(f"{file}: is there already; it is not overwritten")
+    if file is not None:
+        check_new(file)
     from pamrs.recordings import propose
     from pamrs.recordings.logs import TextFormat, check_readable
 
@@ -83,11 +81,7 @@ def import_command(
     folder = out or Path()
     named, contents = _rig_beside(rig, folder, copy=copy, written=out is not None)
     if copies:
-        moved = [
-            replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
-            for item in proposal.logs
-        ]
-        proposal = replace(proposal, logs=moved)
+        proposal = _moved(proposal, copies)
     text = proposal.case_toml(folder, named)
     if file is None:
         typer.echo(text)
@@ -95,7 +89,8 @@ def import_command(
     file.parent.mkdir(parents=True, exist_ok=True)
     used = [*log, *([rig] if rig is not None and rig.exists() else [])]
     contents[file] = text
-    _copy(copies, file.parent)
+    if copies:
+        _copy(copies, file.parent)
     write(contents)
     outside = not copy and any(not is_inside(file.parent, path) for path in used)
     allowed = " --allow-outside" if outside else ""
@@ -127,7 +122,7 @@ def _rig_beside(
     if rig.exists() and (not copy or is_inside(folder, rig)):
         return Path(os.path.relpath(resolved(rig), resolved(folder))).as_posix(), {}
     if rig.exists():
-        _check_new(beside)
+        check_new(beside)
         return beside.name, {beside: rig.read_text(encoding="utf-8")}
     from pamrs import rigs
 
@@ -155,7 +150,7 @@ def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
     for path, target in targets.items():
         if path.is_dir() and is_inside(path, folder):
             raise ParameterError(f"out = {folder}: lies in {path}, which is to be copied there")
-        _check_new(target)
+        check_new(target)
         other = seen.setdefault(target.name.casefold(), path)
         if other is not path:
             same = resolved(other) == resolved(path)
@@ -164,13 +159,20 @@ def _copies(logs: list[Path], folder: Path | None) -> dict[Path, Path]:
     return targets
 
 
-def _check_new(target: Path) -> None:
-    if os.path.lexists(target):
-        raise FileExistsError(f"{target}: is there already; it is not overwritten")
+def _moved(proposal: Proposal, copies: dict[Path, Path]) -> Proposal:
+    """The same for logs at the places of their copies."""
+    logs = [
+        replace(item, log=replace(item.log, path=copies.get(item.log.path, item.log.path)))
+        for item in proposal.logs
+    ]
+    return replace(proposal, logs=logs)
 
 
 def _copy(copies: dict[Path, Path], folder: Path) -> None:
     """Copy logs, files or the folders of bags: all beside, then each in its place."""
+    import shutil
+    import tempfile
+
     with tempfile.TemporaryDirectory(prefix=".copies-", dir=folder) as place:
         made = {Path(place) / str(number): pair for number, pair in enumerate(copies.items())}
         for beside, (path, _) in made.items():

@@ -9,7 +9,7 @@ import typer
 
 from pamrs import rigs
 from pamrs._files import resolved
-from pamrs.cli._shared import rig_named
+from pamrs.cli._shared import check_new, rig_named
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -102,8 +102,7 @@ def _rig_new(
     from pamrs._writing import write_atomically
 
     file.parent.mkdir(parents=True, exist_ok=True)
-    if file.exists():
-        raise FileExistsError(f"{file}: is there already; it is not overwritten")
+    check_new(file)
     called = resolved(file).parent.name if file.stem == "rig" else file.stem
     called = (called or file.stem) if name is None else name
     write_atomically(file, rigs.template(like, called, gas))

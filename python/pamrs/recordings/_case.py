@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import positive
+from pamrs._checks import as_said, positive
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
@@ -154,7 +154,9 @@ class Case:
         ('valve_command', 'muscle_pressure')
         """
         if not isinstance(rig, Rig):
-            raise CaseError(f"rig = {rig!r} is not allowed: a Rig is needed, as of pamrs.load_rig")
+            raise CaseError(
+                f"rig = {as_said(rig)} is not allowed: a Rig is needed, as of pamrs.load_rig"
+            )
         written = dict(units or {})
         tables = arrays_of(recordings, held_out, written, sample_time)
         spacing = None if sample_time is None else positive("sample_time", sample_time)

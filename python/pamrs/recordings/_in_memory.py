@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import as_said
 from pamrs.errors import CaseError, joined
 
 __all__ = ["arrays_of"]
@@ -44,8 +45,8 @@ def arrays_of(
     """
     if not isinstance(recordings, Mapping) or not recordings:
         raise CaseError(
-            f"recordings = {_said(recordings)} is not allowed: a mapping from names to tables, one "
-            "at least, is needed"
+            f"recordings = {as_said(recordings)} is not allowed: a mapping from names to tables, "
+            "one at least, is needed"
         )
     problems = list[str]()
     tables = {name: _table(problems, name, table) for name, table in recordings.items()}
@@ -60,11 +61,6 @@ def arrays_of(
     return tables
 
 
-def _said(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 40 else f"{type(value).__name__} {text[:40]}..."
-
-
 def _table(problems: list[str], name: Any, table: Any) -> dict[str, Array]:
     """The channels of one recording; what is wrong is added to `problems`."""
     if not isinstance(name, str):
@@ -72,7 +68,8 @@ def _table(problems: list[str], name: Any, table: Any) -> dict[str, Array]:
     items = getattr(table, "items", None)
     if items is None:
         problems.append(
-            f"recording {name!r} = {_said(table)}: a dict of arrays, DataFrame or Dataset is needed"
+            f"recording {name!r} = {as_said(table)}: a dict of arrays, DataFrame or Dataset is "
+            "needed"
         )
         return {}
     pairs = list(items())
@@ -116,7 +113,7 @@ def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Arra
         try:
             array = array.astype(np.float64)
         except (TypeError, ValueError):
-            problems.append(f"{label} has values that are no numbers, such as {_said(array[0])}")
+            problems.append(f"{label} has values that are no numbers, such as {as_said(array[0])}")
             return None
     if array.dtype.kind not in _NUMBERS or array.ndim != 1 or array.size == 0:
         problems.append(

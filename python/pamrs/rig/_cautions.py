@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 from pamrs.rig._ports import Ports
-from pamrs.rig.schema import qualified, tables_of
+from pamrs.rig.schema import qualified, split_name, tables_of
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def _frictionless(parameters: Mapping[str, Parameter]) -> list[str]:
     found = []
     for name, usual in _usual_friction(parameters).items():
         known = parameters[name]
-        if known.value == 0.0 and known.known and not known.tol:
+        if known.value == known.tol == 0.0:
             size = f"{usual:.2g}" if usual else "..."
             found.append(
                 f"{name} = 0 {known.unit}, exactly: no laboratory knows that, and a diagnosis "
@@ -114,8 +114,8 @@ def _usual_friction(parameters: Mapping[str, Parameter]) -> dict[str, float]:
 
     found = {}
     for name in parameters:
-        table, _, word = name.rpartition(".")
-        block = table.partition(".")[0]
+        block, own_name, word = split_name(name)
+        table = qualified(block, own_name)
         if block not in ("arm", "link", "load") or word not in ("viscous", "coulomb"):
             continue
         mass = value(f"{table}.mass")
@@ -133,8 +133,9 @@ def _exact(parameters: Mapping[str, Parameter]) -> list[str]:
         return ["no value has a tolerance (tol): a diagnosis would take all of them as exact"]
     found = {}
     for name, known in parameters.items():
-        share = _MEASURED.get((name.partition(".")[0], name.rpartition(".")[2]))
-        if share and known.known and known.value and not known.tol:
+        block, _, key = split_name(name)
+        share = _MEASURED.get((block, key))
+        if share and known.value and not known.tol:
             found[name] = share * abs(known.value), known.unit
     if not found:
         return []

@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import finite
+from pamrs._checks import doubt_pascals, finite
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
-from pamrs.units import doubt_pascals
 
 Array = NDArray[np.float64]
 _FRICTION = ("friction_coefficient", "friction_pressure_slope", "friction_floor")

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import positive
+from pamrs._checks import doubt_pascals, positive
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
@@ -27,7 +27,6 @@ from pamrs.simulation._driving import (
     sensor_zero,
     signals_of,
 )
-from pamrs.units import doubt_pascals
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -19,6 +19,7 @@ from pamrs.report.text import (
     spoken_name,
 )
 from pamrs.report.verdict import unknown_volumes
+from pamrs.rig.schema import split_name
 
 # [noise levels] error of a model with a name from which it is reported with a reservation
 _MISSED_NOISES = 3.0
@@ -112,11 +113,14 @@ def left_out(case: Case, judged: list[Judged]) -> list[str]:
         "is known of it, a value and a tolerance (tol), and diagnose again"
         for effect in named
         for name, known in case.rig.parameters.items()
-        if f"{name.partition('.')[0]}.{name.rpartition('.')[2]}" in effect.info.like_values
-        and known.known
-        and known.value == 0.0
-        and not known.tol
+        if known.value == known.tol == 0.0 and _unnamed(name) in effect.info.like_values
     ]
+
+
+def _unnamed(name: str) -> str:
+    """A parameter without the name of its block: ``link.viscous`` of ``link.hand.viscous``."""
+    block, _, key = split_name(name)
+    return f"{block}.{key}"
 
 
 def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
