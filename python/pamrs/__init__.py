@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from pamrs.design import Lift, lift, sizing
     from pamrs.diagnosis import diagnose
     from pamrs.diagnosis.next_experiment import Plan, plan_diagnosis
-    from pamrs.diagnosis.result import Diagnosis
+    from pamrs.diagnosis.result import Diagnosis, load_result
     from pamrs.diagnosis.settings import DiagnosisSettings
     from pamrs.errors import (
         CaseError,
@@ -73,6 +73,7 @@ __all__ = [
     "lift",
     "load_case",
     "load_recording",
+    "load_result",
     "load_rig",
     "plan_diagnosis",
     "rigs",
@@ -90,7 +91,7 @@ _NAMES: Final = {
     "design": ("Lift", "lift"),
     "diagnosis": ("diagnose",),
     "diagnosis.next_experiment": ("Plan", "plan_diagnosis"),
-    "diagnosis.result": ("Diagnosis",),
+    "diagnosis.result": ("Diagnosis", "load_result"),
     "diagnosis.settings": ("DiagnosisSettings",),
     "errors": tuple(name for name in __all__ if name.endswith("Error")),
     "recordings": ("Case", "Issue", "Recording", "load_case", "load_recording"),

@@ -15,11 +15,21 @@ from pamrs import __version__, report
 from pamrs._writing import write_atomically
 from pamrs.declared import DEFINITIONS, document, object_of, told
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, to_plain
+from pamrs.errors import DiagnosisError
+from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, fields_from, to_plain
 from pamrs.report import text as words
 from pamrs.report.terminal import notebook, summary
 
-__all__ = ["READABLE", "SCHEMA", "VERDICTS", "Diagnosis", "ModelFile", "Trace", "schema"]
+__all__ = [
+    "READABLE",
+    "SCHEMA",
+    "VERDICTS",
+    "Diagnosis",
+    "ModelFile",
+    "Trace",
+    "load_result",
+    "schema",
+]
 
 SCHEMA: Final = "pamrs.diagnosis/2"
 """Name of the JSON schema that `Diagnosis.to_json` follows."""
@@ -218,6 +228,79 @@ class Diagnosis(Findings):
     def _repr_html_(self) -> str:
         """Short HTML for notebooks."""
         return notebook(self)
+
+
+#: What a file does not keep.
+_LIVE: Final = frozenset(
+    f.name for f in dataclasses.fields(Diagnosis) if not f.metadata.get("json", True)
+)
+
+
+class _Read(Diagnosis):
+    """A result that was read from a file: what the file does not keep is an error."""
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __getattribute__(self, name: str) -> Any:
+        if name in _LIVE:
+            raise DiagnosisError(
+                f"{name} is not kept in the file of a result: run pamrs.diagnose on the case again"
+                + (" (or load the model that --model wrote)" if name == "rig" else "")
+            )
+        return super().__getattribute__(name)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Diagnosis):
+            return NotImplemented
+        return self.to_json() == other.to_json()
+
+
+def load_result(path: str | os.PathLike[str]) -> Diagnosis:
+    """Read a result that `Diagnosis.to_json` or ``pamrs diagnose --json`` wrote.
+
+    Parameters
+    ----------
+    path : path-like
+        The file, or a folder with a ``result.json``.
+
+    Returns
+    -------
+    Diagnosis
+        With everything that JSON has: attributes, `summary()`, `headline`, `to_json()`. Of what it
+        has not (`rig`, `traces`, `residuals`, `condition_map`, `measured`, `timings`, `tried`,
+        `tested`, and with these report and pictures) a DiagnosisError says what to do.
+
+    Raises
+    ------
+    DiagnosisError
+        If the file cannot be read, is no result, or is of a schema that is not known.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> pamrs.load_result("out/result.json").headline  # doctest: +SKIP
+    'Missing is a leak of the muscle'
+    """
+    file = Path(path)
+    if file.is_dir():
+        file = file / "result.json"
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise DiagnosisError(f"{file}: cannot be read ({error.strerror})") from None
+    except ValueError as error:
+        raise DiagnosisError(f"{file}: is not the JSON of a result ({error})") from None
+    given = found.get("schema") if isinstance(found, dict) else None
+    if given not in READABLE:
+        raise DiagnosisError(
+            f"{file}: schema = {given!r} is not allowed: {' or '.join(READABLE)} is needed"
+        )
+    settings = found.pop("settings", {})
+    try:
+        values = {"case": file.parent.name} | fields_from(Diagnosis, found)
+        return _Read(**values, settings=DiagnosisSettings.from_dict(settings))
+    except (TypeError, ValueError, AttributeError) as error:
+        raise DiagnosisError(f"{file}: is no complete result ({error})") from None
 
 
 def schema() -> dict[str, Any]:

@@ -5,7 +5,8 @@ below reports and diagnosis, so that neither has to know the other to name what 
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
 `WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`channels_off` (of free runs); `to_plain`, by which they become JSON.
+`channels_off` (of free runs); `to_plain`, by which they become JSON, and `fields_from`, which reads
+it.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ from pamrs.findings._entries import (
     Where,
     WrongParameter,
 )
-from pamrs.findings._entry import Entry, to_plain
+from pamrs.findings._entry import Entry, fields_from, to_plain
 from pamrs.findings._findings import Findings, channels_off
 from pamrs.findings._trace import ModelFile, Trace
 
@@ -92,5 +93,6 @@ __all__ = [
     "Where",
     "WrongParameter",
     "channels_off",
+    "fields_from",
     "to_plain",
 ]

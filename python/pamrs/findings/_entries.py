@@ -125,7 +125,7 @@ class EffectFound(Entry):
     """
 
     id: str = field(metadata=told(least_length=1))
-    name: str = field(default="", metadata=told(json=False))
+    name: str = field(default="", metadata=told("what it is called", required=False))
     at: str = field(
         default="",
         metadata=told(

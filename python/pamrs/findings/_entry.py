@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import types
+import typing
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -79,4 +81,48 @@ def _entry(entry: Entry) -> dict[str, Any]:
             found[meta.get("key") or field.name] = to_plain(value)
     if "unit" in found:
         found["unit"] = found["unit"] or "1"  # of a plain number
+    return found
+
+
+def from_plain(hint: Any, value: Any) -> Any:
+    """A value as it was before `to_plain`: entries of their types, NaN where a number is null.
+
+    Parameters
+    ----------
+    hint : type
+        What it was: an entry, a plain type, or a container of either.
+    value : object
+        As JSON has it.
+
+    Raises
+    ------
+    TypeError, ValueError, AttributeError
+        If the value cannot be that.
+    """
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (types.UnionType, typing.Union):
+        (own,) = [one for one in inner if one is not type(None)]
+        return None if value is None else from_plain(own, value)
+    if origin is list:
+        return [from_plain(inner[0], one) for one in value]
+    if origin in (dict, Mapping):
+        return {key: from_plain(inner[1], one) for key, one in value.items()}
+    if dataclasses.is_dataclass(hint) and isinstance(hint, type):
+        return hint(**fields_from(hint, value))
+    if hint is float:
+        return math.nan if value is None else float(value)
+    if hint in (str, bool, int) and not isinstance(value, hint):
+        raise TypeError(f"{value!r} is no {hint.__name__}")
+    return value
+
+
+def fields_from(cls: type[Any], given: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments of a dataclass from the fields of it that were written; as :func:`from_plain`."""
+    if not isinstance(given, Mapping):
+        raise TypeError(f"{given!r} is no table of {cls.__name__}")
+    hints, found = typing.get_type_hints(cls), {}
+    for field in dataclasses.fields(cls):
+        key = field.metadata.get("key") or field.name
+        if field.metadata.get("json", True) and key in given:
+            found[field.name] = from_plain(hints[field.name], given[key])
     return found

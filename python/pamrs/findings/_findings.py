@@ -125,7 +125,7 @@ class Findings:
         If `verdict` is none of the allowed ones.
     """
 
-    case: str = field(metadata=told(json=False))
+    case: str = field(metadata=told("name of the case", required=False))
     verdict: str = field(metadata=told(enum=VERDICTS))
     misread: list[Misread] = field(
         default_factory=list,
@@ -199,7 +199,7 @@ class Findings:
     )
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
-    text: str = field(default="", metadata=told(json=False))
+    text: str = field(default="", metadata=told("the verdict in words", required=False))
     rig: ModelFile | None = field(default=None, metadata=told(json=False))
     traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
     measured: list[str] = field(default_factory=list, metadata=told(json=False))
