@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +23,9 @@ __all__ = [
     "checked_table",
     "doubt_pascals",
     "finite",
+    "is_quantity",
     "one_of",
+    "plain",
     "positive",
     "rising",
     "whole",
@@ -74,6 +77,40 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
         ) from None
 
 
+def is_quantity(value: Any) -> bool:
+    """Whether something is a number or an array with a unit of its own, as pint has them."""
+    return hasattr(value, "magnitude") and hasattr(value, "to")
+
+
+def plain(name: str, value: Any, unit: str) -> Any:
+    """A quantity as a plain number or array in an SI unit; anything else as it is.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for the message.
+    value : object
+        A pint quantity, or anything else. Pressures are taken as gauge pressures.
+    unit : str
+        The SI unit as pamrs writes it, "1" for plain numbers.
+
+    Raises
+    ------
+    ParameterError
+        If the quantity is of another dimension.
+    """
+    if not is_quantity(value):
+        return value
+    try:
+        return value.to(_POWER.sub("**", "dimensionless" if unit == "1" else unit)).magnitude
+    except Exception as error:  # of its own library, which is not imported here
+        raise ParameterError(
+            f"{name} = {as_said(value)} is not allowed: a quantity in {unit} or a unit of the same "
+            f"dimension is needed ({error})"
+        ) from None
+
+
+_POWER = re.compile(r"(?<=[a-z])(?=\d)")
 _MOST_SAID = 60
 _NO_NUMBER = (TypeError, ValueError, OverflowError)
 

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 import pamrs
-from pamrs.errors import CaseError, ParameterError, RecordingError
+from pamrs.errors import CaseError, DiagnosisError, ParameterError, RecordingError
 
 RIG = pamrs.rigs.shoulder()
 TIME = 0.005 * np.arange(400)
@@ -65,12 +65,74 @@ def test_data_frames_in_bar_and_degrees_with_their_own_times() -> None:
     assert np.allclose(own.channels["joint_angle"], ARRAYS["joint_angle"])
 
 
-def test_a_case_of_arrays_is_diagnosed() -> None:
+def test_arrays_are_diagnosed_without_a_folder() -> None:
     rng = np.random.default_rng(5)
     noise = {"muscle_pressure": 400.0, "joint_angle": 3e-4}
     noisy = {n: v + rng.normal(0.0, noise.get(n, 0.0), v.size) for n, v in ARRAYS.items()}
-    found = pamrs.diagnose(pamrs.Case.from_arrays(RIG, {"run": noisy}, sample_time=0.005))
+    lines = list[str]()
+    found = pamrs.diagnose(RIG, data=noisy | {"time": TIME}, progress=lines.append)
     assert found.verdict in ("none", "parameters")
+    assert [one.recording for one in found.data] == ["data"]
+    with pytest.raises(CaseError, match="'jont_angle'"):
+        pamrs.diagnose(RIG, data={"run": noisy | {"jont_angle": [[1.0]]}, "more": noisy})
+    with pytest.raises(DiagnosisError, match="data is missing"):
+        pamrs.diagnose(RIG)
+
+
+def _bench() -> pd.DataFrame:
+    """Of a bench: bar and degrees."""
+    frame = pd.DataFrame(ARRAYS | {"time": TIME})
+    return frame.assign(
+        muscle_pressure=1e-5 * frame["muscle_pressure"], joint_angle=np.degrees(frame.joint_angle)
+    )
+
+
+def _heading() -> object:
+    units = {"muscle_pressure": "bar", "joint_angle": "deg", "valve_command": "V", "time": "s"}
+    return _bench().rename(columns={name: f"{name} [{unit}]" for name, unit in units.items()})
+
+
+def _frame() -> object:
+    frame = _bench().set_index("time")
+    frame.attrs["units"] = {"muscle_pressure": "bar", "joint_angle": "deg"}
+    return frame
+
+
+def _dataset() -> object:
+    data = pytest.importorskip("xarray").Dataset.from_dataframe(_bench().set_index("time"))
+    data["muscle_pressure"].attrs["units"] = "bar"
+    data["joint_angle"].attrs["units"] = "deg"
+    data["time"] = 1e3 * data["time"]
+    data["time"].attrs["units"] = "ms"
+    return data
+
+
+def _pint() -> object:
+    unit = pytest.importorskip("pint").UnitRegistry()
+    table = {name: _bench()[name].to_numpy() for name in ("valve_command", "time")}
+    return table | {
+        "muscle_pressure": unit.Quantity(_bench()["muscle_pressure"].to_numpy(), "bar"),
+        "joint_angle": unit.Quantity(_bench()["joint_angle"].to_numpy(), "deg"),
+    }
+
+
+@pytest.mark.parametrize("make", [_heading, _frame, _dataset, _pint])
+def test_units_of_a_table_are_those_that_it_says(make) -> None:  # type: ignore[no-untyped-def]
+    (own,) = pamrs.Case.from_arrays(RIG, {"run": make()}).recordings
+    assert own.sample_time == pytest.approx(0.005)
+    for name, values in ARRAYS.items():
+        assert np.allclose(own.channels[name], values)
+
+
+def test_what_is_said_beside_a_table_holds_and_a_wrong_unit_is_named() -> None:
+    frame = _bench()
+    frame.attrs["units"] = {"muscle_pressure": "psi", "joint_angle": "deg"}
+    units = {"muscle_pressure": "bar"}
+    (own,) = pamrs.Case.from_arrays(RIG, {"run": frame}, units=units).recordings
+    assert np.allclose(own.channels["muscle_pressure"], ARRAYS["muscle_pressure"])
+    unit = pytest.importorskip("pint").UnitRegistry()
+    with pytest.raises(CaseError, match="'joint_angle' = .* a quantity in rad"):
+        pamrs.Case.from_arrays(RIG, {"run": frame.to_dict("list") | {"joint_angle": TIME * unit.m}})
 
 
 def test_times_are_dates_an_index_a_coordinate_or_in_another_unit() -> None:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 import os
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
@@ -65,7 +65,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty, NextExperiment
-from pamrs.recordings import Case, Recording, load_case
+from pamrs.recordings import Case, Recording, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
@@ -166,8 +166,9 @@ def _quiet(message: str) -> None:
 
 
 def diagnose(
-    case: Case | str | os.PathLike[str],
+    case: Case | Rig | str | os.PathLike[str],
     *,
+    data: Any = None,
     rig: Rig | str | os.PathLike[str] | None = None,
     allow_outside: bool = False,
     settings: DiagnosisSettings | None = None,
@@ -181,7 +182,10 @@ def diagnose(
     case : Case or path-like
         A case, its folder, or a model file that an earlier diagnosis wrote and that says from which
         case. Effects that the rig holds already are part of the nominal model: their parameters are
-        refitted with the others, and they are not named again.
+        refitted with the others, and they are not named again. With `data`, the rig or its file.
+    data : DataFrame, Dataset or dict of array_like, shape (n,), optional
+        Channels of a recording of the rig, or a dict of several such tables by their names, as
+        `Case.from_arrays` takes them (which also takes units, a sample time and what is held out).
     rig : Rig or path-like, optional
         A model to begin from instead of the case's own, for example one with the effects that
         an earlier diagnosis found.
@@ -212,7 +216,7 @@ def diagnose(
         this rig (units, swapped columns, dead sensors); the message says what was found and what is
         allowed.
     CaseError
-        If the folder is not a case.
+        If the folder is not a case, or `data` no recordings of one.
     RigError
         If the rig file is wrong.
     ValueError
@@ -224,11 +228,12 @@ def diagnose(
     >>> import pamrs
     >>> pamrs.diagnose("my_case").verdict  # doctest: +SKIP
     'effects'
+    >>> pamrs.diagnose(pamrs.load_rig("rig.toml"), data=frame).verdict  # doctest: +SKIP
+    'none'
     """
     began = time.perf_counter()
     say = progress or _quiet
-    if not isinstance(case, Case):
-        case = load_case(case, allow_outside=allow_outside)
+    case = _case_of(case, data, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
     case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
@@ -276,6 +281,19 @@ def diagnose(
         data=data,
         seconds=round(time.perf_counter() - began, 3),
     )
+
+
+def _case_of(case: Any, data: Any, *, allow_outside: bool) -> Case:
+    """The case that the caller means."""
+    if data is not None:
+        own = case if isinstance(case, (Rig, Case)) else load_rig(case)
+        several = isinstance(data, Mapping) and data and all(map(is_table, data.values()))
+        return Case.from_arrays(own, data if several else {"data": data})  # type: ignore[arg-type]
+    if isinstance(case, Rig):
+        raise DiagnosisError(
+            "case is a Rig, and data is missing: diagnose(rig, data=table), or a case or its folder"
+        )
+    return case if isinstance(case, Case) else load_case(case, allow_outside=allow_outside)
 
 
 def _as_found(case: Case, *problems: Problem) -> list[Recording]:

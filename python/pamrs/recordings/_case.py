@@ -120,11 +120,14 @@ class Case:
         recordings : mapping of str to mapping of str to array_like, shape (n,)
             By name of the recording its channels by theirs (``muscle_pressure.flexor``), as a dict
             of arrays, a DataFrame or a Dataset; NaN where nothing was measured. A channel, index or
-            coordinate ``time`` has the times of all others, in seconds or as dates.
+            coordinate ``time`` has the times of all others, in seconds or as dates. A heading
+            ``muscle_pressure [bar]`` says the unit, and so do ``attrs["units"]`` of a column (or of
+            a frame, by column) and a pint quantity; without, SI is meant.
         sample_time : float, optional
             Spacing of samples [s]: of the recordings without ``time``, and of the grid of all.
         units : mapping of str to str, optional
-            Units of channels that are not in SI units: ``{"muscle_pressure": "bar"}``.
+            Units of channels that are not in SI units and do not say so: ``{"muscle_pressure":
+            "bar"}``.
         held_out : sequence of str, optional
             Names of the recordings that are kept for the proof.
         name : str, optional
@@ -161,9 +164,10 @@ class Case:
         tables = arrays_of(recordings, held_out, written, sample_time)
         spacing = None if sample_time is None else positive("sample_time", sample_time)
         made = list[Recording]()
-        for called, table in tables.items():
-            channels = {key: written.get(key, unit_of(key)) for key in table if key != "time"}
-            clock = {"column": "time", "unit": written.get("time", "s")}
+        for called, (table, own_units) in tables.items():
+            said = own_units | written
+            channels = {key: said.get(key, unit_of(key)) for key in table if key != "time"}
+            clock = {"column": "time", "unit": said.get("time", "s")}
             found = load_recordings(
                 called,
                 channels={key: {"column": key, "unit": unit} for key, unit in channels.items()},

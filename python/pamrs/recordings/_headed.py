@@ -23,7 +23,7 @@ from pamrs.units import measured_from
 
 __all__ = ["load_recording"]
 
-_HEADING: Final = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
+HEADING: Final = re.compile(r"^\s*(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?\s*$")
 
 
 def load_recording(
@@ -123,7 +123,7 @@ def _understood(headings: list[str], source: str) -> dict[str, tuple[int, str, b
     for index, heading in enumerate(headings):
         if not heading.strip():
             continue
-        match = _HEADING.match(heading)
+        match = HEADING.match(heading)
         name = match["name"] if match else heading
         channel = channel_of(name)
         known = channel in CHANNELS and (channel != "time" or name == channel)

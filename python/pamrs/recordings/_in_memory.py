@@ -3,19 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import as_said
-from pamrs.errors import CaseError, joined
+from pamrs._checks import as_said, is_quantity, plain
+from pamrs.channels import unit_of
+from pamrs.errors import CaseError, ParameterError, joined
+from pamrs.recordings._headed import HEADING
 
-__all__ = ["arrays_of"]
+__all__ = ["Arrays", "arrays_of", "is_table"]
 
 Array = NDArray[np.float64]
 _NUMBERS = "biuf"  # kinds of arrays that are numbers
 _DATES = "mM"  # kinds that are times
+
+
+class Arrays(NamedTuple):
+    """A recording's channels.
+
+    Attributes
+    ----------
+    values : dict of str to (n,) array
+        By name.
+    units : dict of str to str
+        Of those whose table says it: in the heading (``muscle_pressure [bar]``), or in ``attrs`` of
+        a column or a frame.
+    """
+
+    values: dict[str, Array]
+    units: dict[str, str]
+
+
+def is_table(thing: Any) -> bool:
+    """Whether something has channels by name: a dict, DataFrame or Dataset."""
+    return isinstance(thing, Mapping) or hasattr(thing, "columns")
 
 
 def arrays_of(
@@ -23,9 +46,9 @@ def arrays_of(
     held_out: Sequence[str],
     units: Mapping[str, str],
     sample_time: float | None,
-) -> dict[str, dict[str, Array]]:
-    """Arrays by recording and channel, ``time`` among them [s] where a table has one, as a channel,
-    an index or a coordinate.
+) -> dict[str, Arrays]:
+    """Arrays by recording and channel, ``time`` among them where a table has one, as a channel, an
+    index or a coordinate.
 
     Parameters
     ----------
@@ -53,7 +76,7 @@ def arrays_of(
     problems += [
         f"recording {name!r} has no times: give it a channel time [s], or sample_time"
         for name, table in tables.items()
-        if table and "time" not in table and sample_time is None
+        if table.values and "time" not in table.values and sample_time is None
     ]
     problems += _names(tables, held_out, units)
     if problems:
@@ -61,52 +84,81 @@ def arrays_of(
     return tables
 
 
-def _table(problems: list[str], name: Any, table: Any) -> dict[str, Array]:
+def _table(problems: list[str], name: Any, table: Any) -> Arrays:
     """The channels of one recording; what is wrong is added to `problems`."""
     if not isinstance(name, str):
         problems.append(f"recording {name!r}: a name is needed that is a text")
-    items = getattr(table, "items", None)
-    if items is None:
+    found = Arrays({}, {})
+    if not is_table(table):
         problems.append(
             f"recording {name!r} = {as_said(table)}: a dict of arrays, DataFrame or Dataset is "
             "needed"
         )
-        return {}
-    pairs = list(items())
-    if "time" not in [key for key, _ in pairs]:
-        pairs += [("time", found) for found in [_times(table)] if found is not None]
-    keys = [key for key, _ in pairs]
+        return found
+    pairs = [(*_heading(key), values) for key, values in table.items()]
+    if "time" not in [key for key, _, _ in pairs]:
+        pairs += _times(table)
+    keys = [key for key, _, _ in pairs]
     problems += [
         f"recording {name!r} has {key!r} twice"
         for key in dict.fromkeys(keys)
         if keys.count(key) > 1
     ]
-    found = dict[str, Array]()
-    for key, values in pairs:
-        array = _array(problems, f"recording {name!r}, {key!r}", values, dates=key == "time")
+    for key, unit, values in pairs:
+        label = f"recording {name!r}, {key!r}"
+        own = unit_of(key)
+        if is_quantity(values):
+            try:
+                values = plain(label, values, own)
+            except ParameterError as error:
+                problems.append(str(error))
+                continue
+            unit = own
+        dated = key == "time" and np.asarray(values).dtype.kind in _DATES
+        array = _array(problems, label, values, dates=dated)
         if array is not None:
-            found[key] = array
-    if len(found) == len(pairs) and len({values.size for values in found.values()}) > 1:
-        told = ", ".join(f"{key} {values.size}" for key, values in found.items())
+            found.values[key] = array
+            if said := "s" if dated else unit or _noted(key, values, table):
+                found.units[key] = said
+    if len(found.values) == len(pairs) and len({a.size for a in found.values.values()}) > 1:
+        told = ", ".join(f"{key} {values.size}" for key, values in found.values.items())
         problems.append(f"recording {name!r}: arrays of one length are needed, not {told}")
-    if not set(found) - {"time"}:
+    if not set(found.values) - {"time"}:
         problems.append(f"recording {name!r} has no channel but time")
     return found
 
 
-def _times(table: Any) -> Any:
+def _heading(key: Any) -> tuple[Any, str]:
+    """Name and unit of ``muscle_pressure [bar]``; the unit is empty where it has none."""
+    match = HEADING.match(key) if isinstance(key, str) else None
+    return (match["name"], match["unit"] or "") if match and match["unit"] else (key, "")
+
+
+def _noted(key: str, values: Any, table: Any) -> str:
+    """The unit of a channel in ``attrs`` of itself, or of its table by name; empty without."""
+    for one in (values, table):
+        units = (getattr(one, "attrs", None) or {}).get("units")
+        if isinstance(units, Mapping):
+            units = units.get(key)
+        if isinstance(units, str):
+            return units
+    return ""
+
+
+def _times(table: Any) -> list[tuple[str, str, Any]]:
     """Times of a table that are an index or a coordinate called ``time``."""
     if "time" in getattr(table, "coords", ()):
-        return table.coords["time"]
+        return [("time", "", table.coords["time"])]
     index = getattr(table, "index", None)
-    return index if getattr(index, "name", None) == "time" else None
+    name, unit = _heading(getattr(index, "name", None))
+    return [("time", unit, index)] if name == "time" else []
 
 
 def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Array | None:
     """One channel; times since the first where they are dates."""
     masked = np.ma.getmaskarray(values) if isinstance(values, np.ma.MaskedArray) else None
     array = np.asarray(values)
-    if dates and array.dtype.kind in _DATES and array.size:
+    if dates and array.size:
         since = array - array[0] if array.dtype.kind == "M" else array
         array = since / np.timedelta64(1, "s")
     if array.dtype.kind == "O":
@@ -128,11 +180,11 @@ def _array(problems: list[str], label: str, values: Any, *, dates: bool) -> Arra
 
 
 def _names(
-    tables: Mapping[str, Mapping[str, Array]], held_out: Sequence[str], units: Mapping[str, str]
+    tables: Mapping[str, Arrays], held_out: Sequence[str], units: Mapping[str, str]
 ) -> list[str]:
     """Names in `held_out` and `units` that are those of nothing."""
     known = ", ".join(map(repr, tables))
-    channels = {key for table in tables.values() for key in table}
+    channels = {key for table in tables.values() for key in table.values}
     problems = [f"units[{k!r}]: no recording has that channel" for k in units if k not in channels]
     if isinstance(held_out, str):
         return [*problems, f"held_out = {held_out!r}: a list of names is needed"]
