@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 import numbers
 import re
-from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, Final, ParamSpec, TypeVar
 
+from pamrs.channels import UNITS, channel_of
 from pamrs.errors import ParameterError
 from pamrs.units import with_unit
 
@@ -27,10 +30,13 @@ __all__ = [
     "one_of",
     "plain",
     "positive",
+    "quantities",
     "rising",
     "whole",
 ]
 
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 _LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure
 
 
@@ -108,6 +114,65 @@ def plain(name: str, value: Any, unit: str) -> Any:
             f"{name} = {as_said(value)} is not allowed: a quantity in {unit} or a unit of the same "
             f"dimension is needed ({error})"
         ) from None
+
+
+#: SI units of the arguments of public functions, which mean the same wherever they are taken; of a
+#: mapping without one here, keys are names of arguments or channels.
+ARGUMENTS: Final = {
+    **dict.fromkeys(("pressure", "supply_command", "pressure_limit", "max_pressure"), "Pa"),
+    **dict.fromkeys(("modulus_offset", "ambient_pressure", "min_pressure"), "Pa"),
+    **dict.fromkeys(("c10", "c01", "bladder_modulus", "map_pressure", "level_tolerance"), "Pa"),
+    **dict.fromkeys(("length", "rest_length", "rest_diameter", "wall_thickness"), "m"),
+    **dict.fromkeys(("friction_presliding", "upper_axial", "upper_offset", "radius"), "m"),
+    **dict.fromkeys(("lower_axial", "lower_offset"), "m"),
+    **dict.fromkeys(("sample_time", "step", "duration", "period", "start", "stop", "at"), "s"),
+    **dict.fromkeys(("rise", "hold", "ramp", "delay"), "s"),
+    **dict.fromkeys(("angle", "rest_angle", "braid_angle", "low", "high", "to"), "rad"),
+    **dict.fromkeys(("before", "after", "bias", "triangle", "triangle_bias"), "rad"),
+    **dict.fromkeys(("contraction", "map_contraction", "modulus_slope"), "1"),
+    **dict.fromkeys(("force", "map_force", "buckling_load", "clipped"), "N"),
+    **dict.fromkeys(("temperature", "reference_temperature"), "K"),
+    "valve_command": "V",
+    "softening": "1/K",
+    "triangle_frequency": "1/s",
+}
+
+
+def quantities(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """A function that also takes pint quantities where `ARGUMENTS` has a unit."""
+    known: list[inspect.Signature] = []
+
+    @functools.wraps(function)
+    def inner(*args: Given.args, **kwargs: Given.kwargs) -> Result:
+        if not any(map(_with_units, args)) and not any(map(_with_units, kwargs.values())):
+            return function(*args, **kwargs)
+        if not known:
+            known.append(inspect.signature(function))
+        bound = known[0].bind_partial(*args, **kwargs)
+        for name, value in bound.arguments.items():
+            if name in ARGUMENTS or isinstance(value, Mapping):
+                bound.arguments[name] = _all_plain(name, value, ARGUMENTS.get(name))
+        return function(*bound.args, **bound.kwargs)
+
+    inner.quantities = True  # type: ignore[attr-defined]
+    return inner
+
+
+def _with_units(value: Any) -> bool:
+    """Whether a value has a unit of its own, or one that is in it."""
+    if isinstance(value, (float, int, str)) or value is None:
+        return False
+    if type(value) is dict:
+        return any(map(_with_units, value.values()))
+    return hasattr(value, "magnitude")
+
+
+def _all_plain(name: str, value: Any, unit: str | None) -> Any:
+    """A value, or each of a mapping, without units."""
+    if not isinstance(value, dict):
+        return value if unit is None else plain(name, value, unit)
+    units = {key: unit or ARGUMENTS.get(key, UNITS.get(channel_of(key))) for key in value}
+    return {key: _all_plain(f"{name} {key}", one, units[key]) for key, one in value.items()}
 
 
 _POWER = re.compile(r"(?<=[a-z])(?=\d)")
@@ -262,6 +327,7 @@ def checked_number(
     allowed = f"{'a whole number ' * whole}from {lower:g} to {upper:g}{last}"
     if math.isinf(upper):
         allowed = f"a {kind} number of {lower:g}{last} or more"
+    value = plain(name, value, unit or "1")
     try:
         number = _parsed(value)
     except _NO_NUMBER:

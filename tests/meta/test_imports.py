@@ -17,10 +17,9 @@ ROOT = Path(__file__).parents[2]
 #: Those in one line do not know each other.
 LAYERS = (
     ("errors",),
-    ("units",),
+    ("units", "channels"),
     ("declared",),
     (
-        "channels",
         "comparison",
         "findings",
         "_checks",

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import finite, one_of
+from pamrs._checks import finite, one_of, quantities
 from pamrs.channels import channel_of, rate_of, unit_of
 from pamrs.control._groups import joints_of, lengths_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
@@ -156,6 +156,7 @@ class ClosedLoop:
         }
 
 
+@quantities
 def closed_loop(
     plant: Rig | Simulator,
     controller: Controller,

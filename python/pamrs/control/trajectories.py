@@ -21,7 +21,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import finite, positive, whole
+from pamrs._checks import finite, positive, quantities, whole
 from pamrs.control._protocol import Reference
 from pamrs.errors import ParameterError
 
@@ -107,6 +107,7 @@ class Trajectory:
         finite("time", time)
         return Reference(*self._shape.at(time))
 
+    @quantities
     def sampled(self, sample_time: float, duration: float | None = None) -> tuple[Array, Reference]:
         """The times of a record and the reference at each.
 
@@ -349,6 +350,7 @@ def check_reach(
         )
 
 
+@quantities
 def lift_hold_return(
     low: float,
     high: float,
@@ -407,6 +409,7 @@ def lift_hold_return(
     return Trajectory("lift-hold-return", length, pieces, phases)
 
 
+@quantities
 def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0) -> Trajectory:
     """A step; its rate and acceleration are zero throughout, the impulse of the jump left out.
 
@@ -439,6 +442,7 @@ def step(before: float, after: float, *, at: float = 0.0, duration: float = 5.0)
     return Trajectory("step", length, pieces, {"step": (at, length)})
 
 
+@quantities
 def compound(
     *,
     cosines: Sequence[tuple[float, float]] | None = None,
@@ -492,6 +496,7 @@ def compound(
     return Trajectory("compound", positive("duration", duration), shape)
 
 
+@quantities
 def cosine_cycles(
     low: float, high: float, *, rise: float = 6.0, hold: float = 5.0, cycles: int = 8
 ) -> Trajectory:

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, whole
+from pamrs._checks import checked_number, quantities, whole
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
@@ -211,6 +211,7 @@ class Lift:
         return write_atomically(path, lift_png(self))
 
 
+@quantities
 def lift(
     rig: Rig, *, pressure: float | None = None, to: float | None = None, points: int = 721
 ) -> Lift:

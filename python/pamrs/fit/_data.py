@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import quantities
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
     FORCE_HIGH,
@@ -108,6 +109,7 @@ class ForceMap:
     # ------------------------------------------------------------------ making
 
     @classmethod
+    @quantities
     def from_arrays(
         cls,
         length: ArrayLike,

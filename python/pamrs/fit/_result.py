@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import quantities
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
 from pamrs.fit._estimate import geometry_slopes
@@ -175,6 +176,7 @@ class MuscleFit(FitStatistics):
             beyond_p * OUTSIDE_PRESSURE + beyond_e * OUTSIDE_CONTRACTION, dtype=np.uint8
         )
 
+    @quantities
     def predict(
         self,
         pressure: ArrayLike,

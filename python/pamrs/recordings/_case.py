@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_said, positive
+from pamrs._checks import as_said, positive, quantities
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
@@ -99,6 +99,7 @@ class Case:
         )
 
     @classmethod
+    @quantities
     def from_arrays(
         cls,
         rig: Rig,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
 from pamrs.channels import CHANNELS, channel_of
@@ -262,6 +263,7 @@ class Recording:
         """
         return [(a, b) for a, b in stretches(self.valid(*channels)) if b - a >= minimum]
 
+    @quantities
     def between(self, start: float | None = None, stop: float | None = None) -> Recording:
         """The part of a recording between two times; its time begins at 0 again.
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import finite
+from pamrs._checks import finite, plain, quantities
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
 
@@ -53,6 +53,7 @@ class Joint:
     array([0.0071, 0.0168])
     """
 
+    @quantities
     def __init__(
         self,
         *,
@@ -199,7 +200,7 @@ class Joint:
 
     @staticmethod
     def _over(function: Callable[[Array], Array], angle: ArrayLike) -> Array:
-        values = np.asarray(angle, dtype=np.float64)
+        values = np.asarray(plain("angle", angle, "rad"), dtype=np.float64)
         return function(np.ascontiguousarray(values.ravel())).reshape(values.shape)
 
     def __reduce__(self) -> tuple[Any, ...]:

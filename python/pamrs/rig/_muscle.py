@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import doubt_pascals, finite
+from pamrs._checks import doubt_pascals, finite, plain, quantities
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
@@ -94,6 +94,7 @@ class Muscle:
     array([3100.6])
     """
 
+    @quantities
     def __init__(
         self,
         *,
@@ -185,6 +186,7 @@ class Muscle:
         return cls(**model)
 
     @classmethod
+    @quantities
     def from_law(
         cls,
         law: Callable[[Array, Array], ArrayLike],
@@ -482,6 +484,7 @@ class Muscle:
         """
         return self._forces(self._core.force, pressure, contraction, direction)
 
+    @quantities
     def buckled(self, force: ArrayLike) -> Array:
         """Force of one muscle in a rig [N], where it bows out or goes slack when it is pushed.
 
@@ -522,7 +525,7 @@ class Muscle:
 
     @staticmethod
     def _over(function: Callable[[Array], Array], contraction: ArrayLike) -> Array:
-        e = np.asarray(contraction, dtype=np.float64)
+        e = np.asarray(plain("contraction", contraction, "1"), dtype=np.float64)
         return function(np.ascontiguousarray(e.ravel())).reshape(e.shape)
 
     @staticmethod
@@ -532,6 +535,8 @@ class Muscle:
         contraction: ArrayLike,
         direction: ArrayLike | None,
     ) -> Array:
+        pressure = plain("pressure", pressure, "Pa")
+        contraction = plain("contraction", contraction, "1")
         given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
         arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, as_said, whole
+from pamrs._checks import as_numbers, as_said, quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import initial_values, inputs_of, keywords
@@ -141,6 +141,7 @@ class Batch:
     ((3,), True)
     """
 
+    @quantities
     def __init__(
         self,
         rig: Rig | Sequence[Rig],
@@ -276,6 +277,7 @@ class Batch:
             )
         self._core.restore(samples, rows, status)
 
+    @quantities
     def reset(self, initial: Mapping[str, ArrayLike] | None = None) -> dict[str, Array]:
         """Begin again, all plants.
 
@@ -304,6 +306,7 @@ class Batch:
         """
         return self._named(self._core.observe())
 
+    @quantities
     def step(
         self,
         valve_command: ArrayLike | Mapping[str, ArrayLike] | None = None,
@@ -342,6 +345,7 @@ class Batch:
         }
         return self._named(self._core.advance(1, self._inputs.rows(len(self), asked), True))
 
+    @quantities
     def control(
         self,
         update: Callable[

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, check_column, one_of, whole
+from pamrs._checks import as_numbers, check_column, one_of, quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
@@ -31,6 +31,7 @@ REDUCTIONS = ("final", "min", "max", "peak", "mean", "squared_error")
 Reduction = tuple[str, str] | tuple[str, str, ArrayLike]
 
 
+@quantities
 def simulate_batch(
     rig: Rig,
     valve_command: Any = None,

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import doubt_pascals, positive
+from pamrs._checks import doubt_pascals, positive, quantities
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
@@ -545,6 +545,7 @@ def _revalued(rig: Rig, like: _core.Rig | None) -> _core.Rig | None:
     return compiled.revalued(values)
 
 
+@quantities
 def simulate(
     rig: Rig,
     valve_command: Signals | None = None,
@@ -640,7 +641,7 @@ def simulate(
         check_rows(kept, count)
     for name, signal in signals.items():
         if channel_of(name) in ("supply_command", "pressure"):
-            doubt_pascals(name, signal)
+            doubt_pascals(name, signal, inside=2)
     start = initial_values(initial, rig)
     held = {
         name: signal

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers
+from pamrs._checks import as_numbers, quantities
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import Signals, initial_values, inputs_of, keywords, signals_of
@@ -60,6 +60,7 @@ class Simulator:
     (0.5, True)
     """
 
+    @quantities
     def __init__(
         self,
         rig: Rig,
@@ -111,6 +112,7 @@ class Simulator:
         self._core.restore(np.ascontiguousarray(numbers.reshape(-1)))
         self.events = []
 
+    @quantities
     def reset(self, initial: Mapping[str, float] | None = None) -> dict[str, float]:
         """Begin again.
 
@@ -181,12 +183,18 @@ class Simulator:
                 "length": length,
                 "pressure": pressure,
             }
-            done = self._core.hold(1, self._inputs.numbers(asked))
+            done = self._held(asked)
         sample, events = done
         if events:
             self.events += [Event(*event) for event in events]
         return sample
 
+    @quantities
+    def _held(self, asked: dict[str, Any]) -> Any:
+        """A sample of commands that are more than one number, and what happened in it."""
+        return self._core.hold(1, self._inputs.numbers(asked))
+
+    @quantities
     def run(
         self,
         valve_command: Signals | None = None,
@@ -236,6 +244,7 @@ class Simulator:
         """Refuse rows of all channels that would not fit in memory."""
         check_rows(len(core_rig(self.rig).channels), rows)
 
+    @quantities
     def control(
         self,
         update: Callable[

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import whole
+from pamrs._checks import quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.sweeps._axes import INITIAL, Axes, Grid
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+@quantities
 def sweep(
     rig: Rig,
     over: Mapping[str, ArrayLike] | Axes,
