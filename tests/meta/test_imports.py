@@ -26,6 +26,7 @@ LAYERS = (
         "_files",
         "_losses",
         "_normal",
+        "_progress",
         "_stretches",
         "_termination",
         "_writing",

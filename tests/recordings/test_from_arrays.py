@@ -73,6 +73,11 @@ def test_arrays_are_diagnosed_without_a_folder() -> None:
     found = pamrs.diagnose(RIG, data=noisy | {"time": TIME}, progress=lines.append)
     assert found.verdict in ("none", "parameters")
     assert [one.recording for one in found.data] == ["data"]
+    assert lines[0] == "reading the case"
+    shares = [line.share for line in lines]  # type: ignore[attr-defined]
+    assert shares == sorted(shares)
+    assert (shares[0], shares[-1]) == (0.0, 1.0)
+    assert "chamber: judged" in lines
     with pytest.raises(CaseError, match="'jont_angle'"):
         pamrs.diagnose(RIG, data={"run": noisy | {"jont_angle": [[1.0]]}, "more": noisy})
     with pytest.raises(DiagnosisError, match="data is missing"):

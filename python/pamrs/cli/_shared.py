@@ -223,16 +223,18 @@ def write(contents: Contents, told: str = "") -> None:
 
 
 @contextmanager
-def progress(text: str) -> Iterator[None]:
-    """Say on standard error what is going on, with a clock where a person is looking."""
+def progress(text: str) -> Iterator[Callable[[str], None]]:
+    """Say on standard error what is going on, with a clock where a person is looking; what it gives
+    takes lines, which are shown there with percent and time left.
+    """
     started, text = time.perf_counter(), shown(text)
     if sys.stderr.isatty():
         from rich.console import Console
         from rich.text import Text
 
-        with Console(file=terminal()).status(Text(text)):
-            yield
+        with Console(file=terminal()).status(Text(text)) as status:
+            yield lambda line: status.update(Text(shown(getattr(line, "whole", line))))
     else:
         typer.echo(f"{text} ...", err=True)
-        yield
+        yield lambda line: None
     typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)

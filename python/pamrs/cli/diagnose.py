@@ -132,8 +132,8 @@ def diagnose_command(
         loaded = loaded.with_rig(load_rig(rig))
     from pamrs.diagnosis import diagnose
 
-    with progress(f"diagnosing {loaded.name}"):
-        result = diagnose(loaded, consider=consider or ())
+    with progress(f"diagnosing {loaded.name}") as say:
+        result = diagnose(loaded, consider=consider or (), progress=say)
     protocol = result.next_experiment.protocol
     if experiment is not None and protocol is None:
         typer.echo(

@@ -24,6 +24,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup, calibrate
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
@@ -78,7 +79,8 @@ _UNKNOWN_GEOMETRY_PROBABILITY = 0.4
 _REGULATOR_DROOP_SHIFT = 3.0
 
 
-Say = Callable[[str], None]
+#: Shares of a diagnosis at which its blocks begin to be judged, and are.
+_JUDGED = (0.3, 0.95)
 
 
 def _usable_share(block: Block, recordings: list[Prepared]) -> float:
@@ -161,10 +163,6 @@ def _wanted(rig: Rig) -> str:
     return ", ".join([*names, *core_rig(rig).inputs])
 
 
-def _quiet(message: str) -> None:
-    """Default receiver of progress."""
-
-
 def diagnose(
     case: Case | Rig | str | os.PathLike[str],
     *,
@@ -201,7 +199,9 @@ def diagnose(
         ``considered`` of the result says what it leaves. A block that keeps no more than noise has
         nothing for it to explain.
     progress : callable, optional
-        Called with a line of text now and then.
+        Called with a line of text now and then; its ``share`` (0 to 1) is how much is done, its
+        ``left`` how long it will go on [s, or None], its ``whole`` the text with both. Without one
+        a notebook shows it; ``logging.getLogger("pamrs")`` has it as INFO.
 
     Returns
     -------
@@ -232,7 +232,8 @@ def diagnose(
     'none'
     """
     began = time.perf_counter()
-    say = progress or _quiet
+    say = Steps(progress, within=_JUDGED)
+    say("reading the case", 0.0)
     case = _case_of(case, data, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
@@ -251,7 +252,7 @@ def diagnose(
     seen = blocks_beside_tanks(case.rig, case.channels)
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen)
     case = replace(case, recordings=shortened)
-    say(f"{case.name}: preparing {len(case.recordings)} recordings")
+    say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
     inner, outer, unjudged, begun = _problems(case, chosen, _asked(case.rig, consider))
     with _in_range(case.name):
         part, moved = partial(inner.losses.part, through=(PamrsError,)), list[str]()
@@ -271,6 +272,7 @@ def diagnose(
     warnings += diagnosis.warnings
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
+    say(f"{case.name}: done", 1.0)
     data = data_used(
         _as_found(case, inner, outer), counts, inner.blocks, case.rig, inner.core, unjudged
     )
@@ -303,7 +305,7 @@ def _as_found(case: Case, *problems: Problem) -> list[Recording]:
 
 
 def _physics(
-    case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Say
+    case: Case, inner: Problem, outer: Problem, unjudged: list[Unjudged], say: Steps
 ) -> tuple[Diagnosis, Problem, list[Unjudged]]:
     """The diagnosis of recordings that are what their log says, the recordings to fit with the
     blocks that were judged, and the blocks that were not.
@@ -317,7 +319,7 @@ def _physics(
     unsettled = _unsettled(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]
-    say("putting the answer together")
+    say("putting the answer together", _JUDGED[1])
     unjudged = [*unjudged, *_lost(every, inner)]
     found = conclude(case.rig, inner, outer, groups)
     proposal = inner.losses.part(

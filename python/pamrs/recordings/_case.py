@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from pamrs._checks import as_said, positive, quantities
+from pamrs._checks import as_said, plain, positive
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
 from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
@@ -99,7 +99,6 @@ class Case:
         )
 
     @classmethod
-    @quantities
     def from_arrays(
         cls,
         rig: Rig,
@@ -163,7 +162,9 @@ class Case:
             )
         written = dict(units or {})
         tables = arrays_of(recordings, held_out, written, sample_time)
-        spacing = None if sample_time is None else positive("sample_time", sample_time)
+        spacing = sample_time
+        if spacing is not None:
+            spacing = positive("sample_time", plain("sample_time", spacing, "s"))
         made = list[Recording]()
         for called, (table, own_units) in tables.items():
             said = own_units | written

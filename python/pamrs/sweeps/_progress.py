@@ -7,28 +7,10 @@ import time
 from collections.abc import Callable
 from typing import Final, TextIO
 
+from pamrs._progress import LOG, Line, duration_words
+
 #: Seconds from one line to the next, on a terminal and elsewhere.
 _TERMINAL, _FILE = 0.5, 15.0
-_MINUTE, _HOUR, _DAY = 60, 3600, 86_400
-
-
-def duration_words(seconds: float) -> str:
-    """A duration in two units at most: ``"2 min 5 s"``.
-
-    Examples
-    --------
-    >>> duration_words(125.0), duration_words(3.2), duration_words(200000.0)
-    ('2 min 5 s', '3 s', '2 d 7 h')
-    """
-    whole = round(seconds)
-    for big, name, small, part in (
-        (_DAY, "d", _HOUR, "h"),
-        (_HOUR, "h", _MINUTE, "min"),
-        (_MINUTE, "min", 1, "s"),
-    ):
-        if whole >= big:
-            return f"{whole // big} {name} {whole % big // small} {part}"
-    return f"{whole} s"
 
 
 class Progress:
@@ -41,8 +23,8 @@ class Progress:
     runs, done, ended : int
         Runs in all, those done before, and how many of these ended.
     chunks, chunks_done : int
-    shown : bool
-        Whether anything is written.
+    shown : bool or callable
+        Whether anything is written; what is called with each line instead.
     stream : text stream, optional
         By default stderr.
     clock : callable
@@ -58,14 +40,15 @@ class Progress:
         done: int = 0,
         ended: int = 0,
         chunks_done: int = 0,
-        shown: bool = True,
+        shown: bool | Callable[[str], object] = True,
         stream: TextIO | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._name, self._runs, self._chunks = name, runs, chunks
         self._before, self._done, self._ended = done, done, ended
         self._chunks_done = chunks_done
-        self._stream = (stream or sys.stderr) if shown else None
+        self._to = shown if callable(shown) else None
+        self._stream = (stream or sys.stderr) if shown and self._to is None else None
         self._clock, self._began = clock, clock()
         terminal = self._stream is not None and self._stream.isatty()
         self._every: Final = _TERMINAL if terminal else _FILE
@@ -92,15 +75,23 @@ class Progress:
             f"sweep {self._name}: {self._chunks_done} of {self._chunks} chunks, "
             f"{self._done} of {self._runs} runs{ended}"
         )
-        passed, new = self._clock() - self._began, self._done - self._before
-        if not new or passed <= 0.0:
+        passed, left = self._clock() - self._began, self._left()
+        if left is None:
             return said
-        said += f", {new / passed:.4g} runs/s"
+        said += f", {(self._done - self._before) / passed:.4g} runs/s"
         if self._done == self._runs:
             return f"{said}, took {duration_words(passed)}"
-        return f"{said}, {duration_words(passed * (self._runs - self._done) / new)} left"
+        return f"{said}, {duration_words(left)} left"
+
+    def _left(self) -> float | None:
+        """How long it will go on [s]; None where nothing is done yet."""
+        passed, new = self._clock() - self._began, self._done - self._before
+        return passed * (self._runs - self._done) / new if new and passed > 0.0 else None
 
     def _write(self, line: str, *, last: bool) -> None:
+        LOG.info("%s", line)
+        if self._to is not None:
+            self._to(Line(line, self._done / self._runs, self._left()))
         if self._stream is not None:
             end = "\n" if last else self._end
             self._stream.write(f"{line:<100}{end}" if self._end == "\r" else f"{line}{end}")

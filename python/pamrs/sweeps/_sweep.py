@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,7 +42,7 @@ def sweep(
     chunk: int | None = None,
     threads: int | None = None,
     in_flight: int | None = None,
-    progress: bool = True,
+    progress: bool | Callable[[str], object] = True,
 ) -> xr.Dataset:
     """Run a rig over a grid or over samples of its parameters, and keep a few numbers of each run.
 
@@ -86,8 +86,9 @@ def sweep(
         executor.
     in_flight : int, optional
         Chunks that an executor has at once; by default two for each worker.
-    progress : bool
-        Whether to write to stderr how far it is.
+    progress : bool or callable
+        Whether to write to stderr how far it is; or what is called with each line, whose ``share``
+        (0 to 1) and ``left`` [s] say how much is done and how long it will go on.
 
     Returns
     -------
@@ -175,7 +176,7 @@ def run_plan(
     chunk: int | None = None,
     threads: int | None = None,
     in_flight: int | None = None,
-    progress: bool = True,
+    progress: bool | Callable[[str], object] = True,
 ) -> xr.Dataset:
     """Run what a drive says over axes; other arguments, result and errors as of :func:`sweep`."""
     if not isinstance(rig, Rig):

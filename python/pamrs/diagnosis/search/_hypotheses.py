@@ -5,13 +5,14 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
 from threadpoolctl import threadpool_limits
 
+from pamrs._progress import Line
 from pamrs.diagnosis.evidence import (
     FORM_SHARE_ALIKE,
     Attempts,
@@ -107,6 +108,8 @@ _NEAR_START = 0.6
 _NEAR_FORM = 0.3  # share of the best gain that fits another form: strong effects are not linear
 _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
+_REFITTED = 0.3  # share of the work on some blocks that their refit is
+_SCREENED = 0.6  # share that it is up to the fits of what the screen found
 _POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
 
 
@@ -142,10 +145,17 @@ def examine(
     """
     losses, through = fitted.losses, (SimulationError,)
 
+    def judged(blocks: Sequence[Block]) -> None:
+        names = " and ".join(b.name for b in blocks)
+        say(Line(f"{names}: judged", 1.0, part=names))
+
     def begin(blocks: list[Block]) -> _Mismatch | BlockGroup | None:
         what = f"the judgement of {' and '.join(b.name for b in blocks)}"
         work = partial(_begin_part, fitted, held, nominal, blocks, say)
-        return losses.part(what, work, through=through)
+        found = losses.part(what, work, through=through)
+        if not isinstance(found, _Mismatch):
+            judged(blocks)
+        return found
 
     def end(part: _Mismatch | BlockGroup | None) -> list[BlockGroup]:
         if part is None or isinstance(part, BlockGroup):
@@ -160,7 +170,9 @@ def examine(
             through=through,
         )
         what = f"the judgement of {names}"
-        return losses.part(what, lambda: beside.groups(say), [], through=through)
+        found = losses.part(what, lambda: beside.groups(say), [], through=through)
+        judged(part.refit.trial.inner.blocks)
+        return found
 
     # two processors are kept busy by recordings and parts; threads of the linear algebra would only
     # wait for each other
@@ -183,9 +195,10 @@ def _begin_part(
     names = " and ".join(b.name for b in blocks)
 
     def tell(text: str) -> None:
-        say(f"{names}: {text}")
+        own = text if isinstance(text, Line) else Line(text)
+        say(Line(f"{names}: {text}", own.share, part=names))
 
-    tell("refitting the baseline inside its tolerances")
+    tell(Line("refitting the baseline inside its tolerances", 0.0))
     refit = _refit(inner, outer, nominal, same=held is fitted)
     kept = refit.start.fitted
     if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
@@ -334,10 +347,8 @@ def _explain(refit: _Refit, tell: Say) -> _Mismatch:
     trial, start = refit.trial, refit.start
     suspects, now = trial.suspects, start.fitted
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
-    tell(
-        f"after the refit the residual of {mismatch.name} is {now[mismatch.name].systematic:.2g} "
-        "noise levels"
-    )
+    size = f"{now[mismatch.name].systematic:.2g} noise levels"
+    tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFITTED))
     marginal = _is_marginal(refit)
     acting = _acting_effects(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
@@ -726,7 +737,7 @@ def _fit_singles(search: Search) -> list[Candidate]:
     least = max(LEAST_GAIN, _LEAST_GAIN_SHARE * most)
     worth = _by_family([e for e, gain in gains.items() if screened.strong or gain > least])
     first = ", ".join(f"{e} {gain:.3g}" for e, gain in list(gains.items())[:8])
-    search.tell(f"screened: {first or 'no effect acts here'}")
+    search.tell(Line(f"screened: {first or 'no effect acts here'}", _SCREENED))
 
     if screened.strong:
         chosen, near, short = _shortlist(search, worth, ranked)

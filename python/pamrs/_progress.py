@@ -1,0 +1,145 @@
+"""How far a long work is, and when it will be done: lines of text for whoever asks, for a notebook,
+and for ``logging.getLogger("pamrs")``, which is silent unless a program wants to hear it.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Final
+
+__all__ = ["LOG", "Line", "Steps", "duration_words", "receiver"]
+
+LOG: Final = logging.getLogger("pamrs")
+LOG.addHandler(logging.NullHandler())
+
+_MINUTE, _HOUR, _DAY = 60, 3600, 86_400
+_LEAST_SHARE: Final = 0.05  # of the work, before which its speed says little
+#: Of what is left of a part up to nearly its end, what a line without a share gets.
+_UNKNOWN: Final = 0.15
+_NEARLY: Final = 0.95
+
+
+class Line(str):
+    """What is going on.
+
+    Attributes
+    ----------
+    share : float or None
+        How much of the work is done, from 0 to 1.
+    left : float or None
+        How long it will go on as it looks now [s].
+    part : str
+        Of several that are done at the same time, the one that `share` is of; empty for the whole.
+    """
+
+    share: float | None
+    left: float | None
+    part: str
+
+    def __new__(
+        cls, text: str, share: float | None = None, left: float | None = None, part: str = ""
+    ) -> Line:
+        """A line of text with what is known of the work."""
+        self = super().__new__(cls, text)
+        self.share, self.left, self.part = share, left, part
+        return self
+
+    @property
+    def whole(self) -> str:
+        """With percent and time left: ``"42 %, about 9 s left: shoulder: screened"``."""
+        if self.share is None:
+            return str(self)
+        left = "" if self.left is None else f", about {duration_words(self.left)} left"
+        return f"{100 * self.share:.0f} %{left}: {self}"
+
+
+def duration_words(seconds: float) -> str:
+    """A duration in two units at most: ``"2 min 5 s"``.
+
+    Examples
+    --------
+    >>> duration_words(125.0), duration_words(3.2), duration_words(200000.0)
+    ('2 min 5 s', '3 s', '2 d 7 h')
+    """
+    whole = round(seconds)
+    for big, name, small, part in (
+        (_DAY, "d", _HOUR, "h"),
+        (_HOUR, "h", _MINUTE, "min"),
+        (_MINUTE, "min", 1, "s"),
+    ):
+        if whole >= big:
+            return f"{whole // big} {name} {whole % big // small} {part}"
+    return f"{whole} s"
+
+
+class Steps:
+    """The lines of a work whose length nobody knows beforehand: what each step says is passed on
+    with the share that is done and the time that is left. Threads may share one.
+
+    Parameters
+    ----------
+    to : callable, optional
+        Gets each :class:`Line`; without one a notebook shows them, and nobody else.
+    within : (float, float), optional
+        Shares of the work between which its parts are done.
+    clock : callable, optional
+        Gives a time [s].
+    """
+
+    def __init__(
+        self,
+        to: Callable[[str], object] | None = None,
+        *,
+        within: tuple[float, float] = (0.0, 1.0),
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self._to, self._within, self._clock = receiver(to), within, clock
+        self._began, self._share = clock(), 0.0
+        self._parts: dict[str, float] = {}
+        self._lock = threading.Lock()
+
+    def __call__(self, text: str, share: float | None = None) -> None:
+        """Pass a line on."""
+        with self._lock:
+            own = text.share if isinstance(text, Line) else share
+            part = text.part if isinstance(text, Line) else ""
+            if part:
+                done = self._parts.get(part, 0.0)
+                more = max(0.0, _NEARLY - done) * _UNKNOWN if own is None else 0.0
+                self._parts[part] = max(own or 0.0, done + more)
+                low, high = self._within
+                own = low + (high - low) * sum(self._parts.values()) / len(self._parts)
+            self._share = max(self._share, own or 0.0)
+            passed = self._clock() - self._began
+            known = self._share >= _LEAST_SHARE
+            left = passed * (1.0 - self._share) / self._share if known else None
+            line = Line(text, self._share, left)
+            LOG.info("%s", line.whole)
+            self._to(line)
+
+
+def receiver(given: Callable[[str], object] | None) -> Callable[[str], object]:
+    """What takes lines: what is given, else the output of a notebook's cell, else nothing."""
+    if given is not None:
+        return given
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return _in_notebook() if getattr(shell, "kernel", None) is not None else lambda line: None
+
+
+def _in_notebook() -> Callable[[str], object]:
+    """One line of a cell's output that is written anew."""
+    display: Any = sys.modules["IPython"].display.display
+    handle: list[Any] = []
+
+    def show(line: str) -> None:
+        told = {"text/plain": line.whole if isinstance(line, Line) else line}
+        if handle:
+            handle[0].update(told, raw=True)
+        else:
+            handle.append(display(told, raw=True, display_id=True))
+
+    return show
