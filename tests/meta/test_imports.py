@@ -29,6 +29,7 @@ LAYERS = (
         "_progress",
         "_stretches",
         "_termination",
+        "_views",
         "_writing",
     ),
     ("effects",),

@@ -165,4 +165,4 @@ def test_pictures_of_a_bench_and_of_nothing_that_moves(tmp_path: Path) -> None:
         pamrs.simulate(rig, sample_time=0.01, length=[0.27, 0.27], pressure=[1e5] * 2),
         pamrs.simulate(pamrs.rigs.sealed_chamber(), sample_time=0.1, duration=0.0),
     ):
-        assert run.plot(tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+        assert run.figure(tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")

@@ -54,4 +54,4 @@ def lift_command(
         pressure=None if pressure is None else exact("pressure", pressure, "pressure"),
         to=None if to is None else exact("to", to, "angle"),
     )
-    write({json: document(SCHEMA, **result.to_dict()), png: result.plot}, result.summary())
+    write({json: document(SCHEMA, **result.to_dict()), png: result.figure}, result.summary())

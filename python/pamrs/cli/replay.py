@@ -70,7 +70,7 @@ def replay_command(
             beside = None if own is None else nominal
     if plot is not None and drawn is not None:
         result, recorded = drawn, usable_samples(shown)
-        write({plot: lambda path: result.plot(path, recorded=recorded, nominal=beside)})
+        write({plot: lambda path: result.figure(path, recorded=recorded, nominal=beside)})
 
 
 def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, Rig | None]:

@@ -121,7 +121,7 @@ def simulate_command(
             lines.append(with_unit(told, unit))
     files: Contents = {
         output: lambda path: _write_csv(path, result),
-        plot: lambda path: result.plot(path, recorded=recorded),
+        plot: lambda path: result.figure(path, recorded=recorded),
         animation: lambda path: _animate(path, result, speed),
     }
     write(files, "\n".join(lines))

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import finite, one_of, quantities
+from pamrs._views import Curve, Panels, View, in_laboratory_units, over_time
 from pamrs.channels import channel_of, rate_of, unit_of
 from pamrs.control._groups import joints_of, lengths_of
 from pamrs.control._protocol import Controller, Reference, check_controller, check_drives_valve
@@ -33,7 +34,7 @@ MOST_VOLTS = 1000.0
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(View):
     """A closed loop as it went.
 
     Attributes
@@ -81,6 +82,25 @@ class ClosedLoop:
     def error(self) -> Array:
         """Reference minus angle [rad]."""
         return np.asarray(self.reference.angle - self.angle, dtype=np.float64)
+
+    def _panels(self) -> Panels:
+        lines: dict[str, list[Curve]] = {}
+        for name, wanted in zip(self.joints, np.atleast_2d(self.reference.angle), strict=True):
+            reference = ("reference", self.time, wanted, {"color": "black", "ls": "--", "lw": 0.9})
+            lines[name] = [reference, ("measured", self.time, self.channels[name], {})]
+        own = self.command if isinstance(self.command, Mapping) else {}
+        for name, values in {**self.channels, **own}.items():
+            lines.setdefault(name, [("", self.time, values, {})])
+        return over_time(lines)
+
+    def _numbers(self) -> dict[str, str]:
+        told = {"rig": self.rig.name, "time": f"{self.time[-1] - self.time[0]:.4g} s"}
+        for name, error in zip(self.joints, np.atleast_2d(self.error), strict=True):
+            sizes = {"rms": np.sqrt(np.mean(error**2)), "largest": np.abs(error).max()}
+            sizes["last"] = error[-1]
+            for word, size in sizes.items():
+                told[f"{word} error of {name}"] = in_laboratory_units(name, size)
+        return told | {"events": str(len(self.events))}
 
     def metrics(self, joint: str | None = None, *, unit: str | None = None) -> Metrics:
         """Errors, curvature and phases, see :func:`pamrs.control.metrics.evaluate`.

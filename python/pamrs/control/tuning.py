@@ -11,12 +11,14 @@ import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, one_of, positive, rising, whole
+from pamrs._views import COLOURS, Panels, View, in_laboratory_units
 from pamrs.control._groups import joints_of
 from pamrs.control._protocol import Controller
 from pamrs.control._sweeping import sweep
@@ -37,7 +39,7 @@ _FAILED: Final = 1e3
 
 
 @dataclass(frozen=True)
-class GainMap:
+class GainMap(View):
     """Metrics over a grid of gains, for each payload.
 
     Attributes
@@ -63,6 +65,38 @@ class GainMap:
     j: Array = field(repr=False)
     rms: Array = field(repr=False)
     unit: str = "rad"
+
+    def _panels(self) -> Panels:
+        return {
+            f"{mass:g} kg": partial(self._draw, number=p) for p, mass in enumerate(self.payloads)
+        }
+
+    def _draw(self, axes: Any, number: int) -> None:
+        """J over the first two gains, the smallest of all others."""
+        names, values = list(self.axes), np.where(np.isfinite(self.j), self.j, np.nan)[number]
+        values = np.fmin.reduce(values, axis=tuple(range(2, values.ndim))) if names[2:] else values
+        grid = [self.axes[name] for name in names[:2]]
+        row = self.best()[number]
+        axes.set_title(f"J with {self.payloads[number]:g} kg", fontsize="medium")
+        axes.set_xlabel(names[0])
+        if len(grid) == 1:
+            axes.plot(grid[0], values, "o-", color=COLOURS[0], ms=3)
+            axes.set_ylabel("J [1]")
+        else:
+            mesh = axes.pcolormesh(*grid, values.T, shading="nearest")
+            axes.figure.colorbar(mesh, ax=axes, label="J [1]")
+            axes.set_ylabel(names[1])
+        axes.plot(row[names[0]], row[names[1]] if grid[1:] else row["j"], "x", color=COLOURS[1])
+
+    def _numbers(self) -> dict[str, str]:
+        told = {}
+        for row in self.best():
+            gains = ", ".join(f"{name} = {row[name]:.4g}" for name in self.axes)
+            error = in_laboratory_units("joint_angle", row["rms"])
+            told[f"best with {row['payload']:g} kg"] = f"{gains}: J {row['j']:.4g}, rms {error}"
+        edges = {name: (axis[0], axis[-1]) for name, axis in self.axes.items() if len(axis) > 1}
+        border = {n for row in self.best() for n, ends in edges.items() if row[n] in ends}
+        return told | ({"on the border of the map": ", ".join(sorted(border))} if border else {})
 
     def best(self, by: str = "j") -> list[dict[str, float]]:
         """The gains with the smallest metric, payload by payload.

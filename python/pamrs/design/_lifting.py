@@ -12,6 +12,7 @@ import math
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
@@ -19,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, quantities, whole
+from pamrs._views import Panels, View
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
@@ -47,7 +49,7 @@ _LIFTING, _HOLDING = -1.0, 1.0  # direction of the muscles: shortening, about to
 
 
 @dataclass(frozen=True, eq=False)
-class Lift:
+class Lift(View):
     """What :func:`lift` found; SI units, angles from the vertical.
 
     Attributes
@@ -192,7 +194,18 @@ class Lift:
             "text": self.text,
         }
 
-    def plot(self, path: str | os.PathLike[str]) -> Path:
+    def _panels(self) -> Panels:
+        from pamrs.design import _lifting_figure as figure
+
+        return {
+            "torque": partial(figure.draw_torques, result=self),
+            "payload": partial(figure.draw_capacity, result=self),
+        }
+
+    def _numbers(self) -> dict[str, str]:
+        return {"rig": self.rig, "pressure": f"{self.pressure / 1e5:.4g} bar", "result": self.text}
+
+    def figure(self, path: str | os.PathLike[str]) -> Path:
         """Write a picture of torques and capacity over the angle, a PNG.
 
         Parameters

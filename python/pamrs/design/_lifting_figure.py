@@ -39,17 +39,21 @@ def lift_png(result: Lift) -> bytes:
         figure.get_layout_engine().set(w_pad=0.1, h_pad=0.08)  # type: ignore[union-attr, call-arg]
         headed(figure, f"{result.rig} {result.text}", 118, 9.5)
         left, right = figure.subplots(1, 2)
-        _torques(left, result)
-        _capacity(right, result)
-        for axes in (left, right):
-            if result.reached < result.angle[-1]:
-                axes.axvline(math.degrees(result.reached), color=_INK, lw=0.9, ls=(0, (2, 2)))
-            axes.set_xlim(math.degrees(result.angle[0]), math.degrees(result.angle[-1]))
-            axes.set_xlabel("joint angle [deg]")
+        draw_torques(left, result)
+        draw_capacity(right, result)
         return png(figure)
 
 
-def _torques(axes: Axes, result: Lift) -> None:
+def _finish(axes: Axes, result: Lift) -> None:
+    """The axis of angles, and how far the arm comes."""
+    if result.reached < result.angle[-1]:
+        axes.axvline(math.degrees(result.reached), color=_INK, lw=0.9, ls=(0, (2, 2)))
+    axes.set_xlim(math.degrees(result.angle[0]), math.degrees(result.angle[-1]))
+    axes.set_xlabel("joint angle [deg]")
+    axes.legend(loc="upper right")
+
+
+def draw_torques(axes: Axes, result: Lift) -> None:
     """Muscles against gravity; what is missing is filled."""
     angle, lifting = np.degrees(result.angle), result.torque - result.coulomb
     holding = result.torque_holding + result.coulomb
@@ -92,10 +96,10 @@ def _torques(axes: Axes, result: Lift) -> None:
         1.3 * max(float(holding.max()), float(result.gravity.max())),
     )
     axes.set_ylabel("torque [N m]")
-    axes.legend(loc="upper right")
+    _finish(axes, result)
 
 
-def _capacity(axes: Axes, result: Lift) -> None:
+def draw_capacity(axes: Axes, result: Lift) -> None:
     """Payload that is just lifted past each angle, against the one that there is."""
     capacity = np.where(np.isfinite(result.capacity), np.maximum(result.capacity, 0.0), math.nan)
     axes.plot(
@@ -112,4 +116,4 @@ def _capacity(axes: Axes, result: Lift) -> None:
     middle = float(np.median(there)) if there.size else 0.0
     axes.set_ylim(0.0, 1.3 * max(2.2 * middle, 1.2 * result.payload, 1e-9))
     axes.set_ylabel("payload [kg]")
-    axes.legend(loc="upper right")
+    _finish(axes, result)

@@ -8,11 +8,14 @@ import dataclasses
 import json
 import os
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 from pamrs import __version__, report
+from pamrs._views import COLOURS, Panels, View
 from pamrs._writing import write_atomically
+from pamrs.channels import laboratory_unit
 from pamrs.declared import DEFINITIONS, document, object_of, told
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
@@ -38,7 +41,7 @@ READABLE: Final = ("pamrs.diagnosis/1", SCHEMA)
 
 
 @dataclass(frozen=True, repr=False)
-class Diagnosis(Findings):
+class Diagnosis(View, Findings):
     """Result of `pamrs.diagnose`.
 
     Its entries have attributes and can be read by key as well: ``effect.id`` is ``effect["id"]``.
@@ -225,9 +228,32 @@ class Diagnosis(Findings):
         """
         return report.write_figure(self, path)
 
+    def _panels(self) -> Panels:
+        from pamrs.report.figures import telling_trace
+
+        trace = telling_trace(self)
+        return {} if trace is None else {trace.channel: partial(_draw_trace, trace=trace)}
+
     def _repr_html_(self) -> str:
-        """Short HTML for notebooks."""
-        return notebook(self)
+        """Short HTML for notebooks, with the recording that shows most."""
+        return notebook(self) + self._picture()
+
+
+def _draw_trace(axes: Any, trace: Trace) -> None:
+    """A channel as measured, by the rig file, and by the model with what was found."""
+    unit, factor = laboratory_unit(trace.channel)
+    own = ("black", *COLOURS[1::-1])
+    kinds = ("measured", "before", "after")
+    for kind, colour in zip(kinds, own, strict=True):
+        values = factor * getattr(trace, kind)
+        axes.plot(trace.time, values, color=colour, lw=1.0, label=_CURVES[kind])
+    axes.set_title(f"{trace.recording} ({trace.role})", fontsize="medium")
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel(f"{trace.channel.replace('_', ' ')} [{unit}]")
+    axes.legend(fontsize="small", frameon=False)
+
+
+_CURVES: Final = {"measured": "measured", "before": "your model", "after": "with what was found"}
 
 
 #: What a file does not keep.
@@ -240,6 +266,9 @@ class _Read(Diagnosis):
     """A result that was read from a file: what the file does not keep is an error."""
 
     __hash__ = None  # type: ignore[assignment]
+
+    def _repr_html_(self) -> str:
+        return notebook(self)
 
     def __getattribute__(self, name: str) -> Any:
         if name in _LIVE:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "ErrorCurve",
+    "draw_family",
     "errors_svg",
     "family_svg",
     "moduli_svg",
@@ -102,7 +103,7 @@ def _fitted_levels(fit: MuscleFit) -> set[int]:
 # ------------------------------------------------------------------------- family
 
 
-def _draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
+def draw_family(axes: Axes, fit: MuscleFit, *, size: float = 26.0) -> Any:
     """Measured points and model lines over contraction, coloured by pressure; returns what a colour
     bar needs.
     """
@@ -198,7 +199,7 @@ def family_svg(fit: MuscleFit, prefix: str = "family") -> str:
     str
         SVG element. Levels of the fit are filled, others open.
     """
-    return _with_bar(partial(_draw_family, fit=fit), 5.4, prefix, label="pressure [kPa]")
+    return _with_bar(partial(draw_family, fit=fit), 5.4, prefix, label="pressure [kPa]")
 
 
 def _with_bar(draw: Callable[[Axes], Any], height: float, prefix: str, **bar: Any) -> str:
@@ -446,7 +447,7 @@ def summary_png(fit: MuscleFit, curves: Sequence[ErrorCurve], title: str) -> byt
         left, right = figure.subfigures(1, 2, width_ratios=[1.35, 1.0], squeeze=False)[0]
         axes = left.subplots()
         bar: dict[str, Any] = {"location": "bottom", "pad": 0.02, "aspect": 40}
-        left.colorbar(_draw_family(axes, fit, size=20.0), ax=axes, label="pressure [kPa]", **bar)
+        left.colorbar(draw_family(axes, fit, size=20.0), ax=axes, label="pressure [kPa]", **bar)
         axes.set_title("Force: measured against model")
         upper, lower = right.subplots(2, 1, gridspec_kw={"height_ratios": [1.25, 1.0]})
         _draw_errors(upper, curves, left=False)

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._data import ForceMap
 from pamrs.fit._validation import WEAK
@@ -81,7 +83,7 @@ class FrictionLevel:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class FrictionFit:
+class FrictionFit(View):
     """Friction coefficients of a muscle; the names are those of lmfit's results where there is one.
 
     Attributes
@@ -139,6 +141,20 @@ class FrictionFit:
         )
         law = f"max({c0:.4g} {'-' if c1 < 0.0 else '+'} {1e6 * abs(c1):.4g}/MPa P, {self.floor:g})"
         return f"FrictionFit(c_F = {law}, {len(self.levels)} levels)"
+
+    def _panels(self) -> Panels:
+        from pamrs.fit._friction_figure import draw_law
+
+        return {"coefficient": partial(draw_law, fit=self)}
+
+    def _numbers(self) -> dict[str, str]:
+        c0, c1 = self.params.values()
+        return {
+            "c0": f"{c0.value:.4g} ± {c0.stderr:.2g}",
+            "c1": f"{1e6 * c1.value:.4g} ± {1e6 * c1.stderr:.2g} 1/MPa",
+            "floor": f"{self.floor:g}",
+            "presliding": self.presliding_reason,
+        }
 
     @property
     def told(self) -> bool:

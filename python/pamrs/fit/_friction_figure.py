@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.fit._friction import FrictionFit
 
-__all__ = ["friction_png"]
+__all__ = ["draw_law", "friction_png"]
 
 _INK: Final = "#374151"
 _MARKS: Final = ((-1, "v", "contracting"), (1, "^", "lengthening"))
@@ -29,7 +29,7 @@ def friction_png(fit: FrictionFit, data: ForceMap) -> bytes:
     with summary_figure(f"{data.label}: {law}", 200, 13.0, 5.0) as (figure, finished):
         loops, line = figure.subplots(1, 2, width_ratios=[1.35, 1.0])
         _draw_loops(loops, fit, data)
-        _draw_law(line, fit)
+        draw_law(line, fit)
         return finished()
 
 
@@ -62,7 +62,7 @@ def _draw_loops(axes: Axes, fit: FrictionFit, data: ForceMap) -> None:
     axes.legend(loc="upper right")
 
 
-def _draw_law(axes: Axes, fit: FrictionFit) -> None:
+def draw_law(axes: Axes, fit: FrictionFit) -> None:
     """Coefficient of each level with two standard errors, and the law."""
     pressure, value, error = (
         np.array([getattr(x, key) for x in fit.levels])

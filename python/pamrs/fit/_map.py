@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._data import ForceMap
 
@@ -38,7 +39,7 @@ _STIFF: Final = 1e-4
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MapFit:
+class MapFit(View):
     """A table of forces, and what the measurements say of it.
 
     Attributes
@@ -82,6 +83,25 @@ class MapFit:
             f"MapFit({len(self.pressure)} x {len(self.contraction)} nodes, {self.rows} rows, error "
             f"{100 * self.share:.2g} %)"
         )
+
+    def _panels(self) -> Panels:
+        return {"force": self._draw}
+
+    def _draw(self, axes: Any) -> None:
+        """Force over contraction, a line for each pressure of the table."""
+        for pressure, force in zip(self.pressure, self.force, strict=True):
+            axes.plot(100.0 * self.contraction, force, lw=1.2, label=f"{pressure / 1e5:.3g} bar")
+        axes.set_xlabel("contraction [%]")
+        axes.set_ylabel("pulling force [N]")
+        axes.legend(fontsize="small", frameon=False)
+
+    def _numbers(self) -> dict[str, str]:
+        return {
+            "nodes": f"{len(self.pressure)} pressures x {len(self.contraction)} contractions",
+            "rows": str(self.rows),
+            "error": f"{100 * self.share:.3g} % of the force",
+            "scatter": f"{self.scatter:.4g} N",
+        }
 
     def predict(self, pressure: Any, contraction: Any) -> Array:
         """Force [N] at gauge pressures [Pa] and contraction ratios [1], broadcast together, as a

@@ -13,11 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs._checks import quantities
+from pamrs._views import Panels, View
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
 from pamrs.fit._estimate import geometry_slopes
 from pamrs.fit._statistics import FitParameter, FitStatistics, determination
 from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
+from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.fit._compare import ModelComparison
@@ -34,7 +36,7 @@ OUTSIDE_PRESSURE, OUTSIDE_CONTRACTION = 1, 2
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class MuscleFit(FitStatistics):
+class MuscleFit(View, FitStatistics):
     """A fitted muscle: made by :func:`pamrs.fit.fit_muscle`.
 
     It has the numbers of the fit (:class:`pamrs.fit._statistics.FitStatistics`), errors by pressure
@@ -46,6 +48,22 @@ class MuscleFit(FitStatistics):
     def refitted(self, muscle: Muscle, **options: Any) -> MuscleFit:
         """The same map fitted in another way; arguments as those of :func:`fit_muscle`."""
         return self._fit(self.data, muscle, **options)
+
+    def _panels(self) -> Panels:
+        return {"force": self._draw}
+
+    def _draw(self, axes: Any) -> None:
+        from pamrs.fit._figures import draw_family
+
+        axes.figure.colorbar(draw_family(axes, self), ax=axes, label="pressure [kPa]")
+
+    def _numbers(self) -> dict[str, str]:
+        told = {
+            item.name: with_unit(f"{item.value:.5g} ± {item.stderr:.2g}", item.unit)
+            for item in self.params.values()
+        }
+        error = f"{100 * self.rms_error:.3g} % of the largest force"
+        return {"model": self.model, "points": str(self.ndata), "rms error": error, **told}
 
     @cached_property
     def all_residuals(self) -> Array:

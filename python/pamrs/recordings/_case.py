@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from pamrs._checks import as_said, plain, positive
 from pamrs._files import MOST_NAME, found_outside, resolved, shown, toml_document
+from pamrs._views import COLOURS, Curve, Panels, View, over_time
 from pamrs.channels import channel_of, unit_of
 from pamrs.declared import problems_of
 from pamrs.effects import find_parameter
@@ -53,7 +54,7 @@ _LIES_OUTSIDE: Final = (
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Case(View):
     """A rig and its recordings.
 
     Attributes
@@ -79,6 +80,24 @@ class Case:
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])
         object.__setattr__(self, "description", shown(self.description, lines=True))
+
+    def _panels(self) -> Panels:
+        series: dict[str, list[Curve]] = {}
+        for number, recording in enumerate(self.recordings):
+            colour = COLOURS[number % len(COLOURS)]
+            style = {"color": colour, "ls": "-" if recording.role == "fit" else "--"}
+            for name, values in recording.channels.items():
+                line = (f"{recording.name} ({recording.role})", recording.time, values, style)
+                series.setdefault(name, []).append(line)
+        return over_time(series)
+
+    def _numbers(self) -> dict[str, str]:
+        told = {
+            f"recording {one.name}": f"{one.role}, {one.duration:.4g} s, {len(one)} samples, "
+            f"{len(one.issues)} issues"
+            for one in self.recordings
+        }
+        return {"case": self.name, "rig": self.rig.name, **told}
 
     @property
     def fit(self) -> list[Recording]:

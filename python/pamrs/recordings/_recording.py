@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
+from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import RecordingError
@@ -108,7 +109,7 @@ class OwnValue:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording:
+class Recording(View):
     """One recording on a uniform grid.
 
     Attributes
@@ -175,6 +176,18 @@ class Recording:
             f"Recording({self.name!r}, {self.role}, {len(self)} samples every {self.sample_time:g} "
             f"s: {', '.join(self.channels)}; {len(self.issues)} issues)"
         )
+
+    def _panels(self) -> Panels:
+        return over_time({n: [("", self.time, v, {})] for n, v in self.channels.items()})
+
+    def _numbers(self) -> dict[str, str]:
+        spans = {
+            name: in_laboratory_units(name, np.nanmin(values), np.nanmax(values))
+            for name, values in self.channels.items()
+            if np.isfinite(values).any()
+        }
+        about = f"{self.role}, {self.duration:.4g} s, {len(self)} samples"
+        return {f"recording {self.name}": about, **spans, "issues": str(len(self.issues))}
 
     @property
     def duration(self) -> float:

@@ -14,12 +14,13 @@ import math
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from pamrs._checks import checked_number, checked_table, one_of
 from pamrs._files import read_toml
+from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RigError, joined, meant
 from pamrs.rig._cautions import cautions_of
 from pamrs.rig._ports import Ports, connect, wiring
@@ -72,7 +73,7 @@ _COMPARED: Final = ("name", "_model", "_tolerances", "_effect_std")
 
 
 @dataclass(frozen=True, eq=False)
-class Rig:
+class Rig(View):
     """The model of a test bench; made by :func:`load_rig`, changed only by making another.
 
     Attributes
@@ -165,6 +166,23 @@ class Rig:
         ``"air: supply -> valve -> chamber -> ambient"``.
         """
         return wiring(self._model, self._connected)
+
+    def _panels(self) -> Panels:
+        from pamrs.rig import _drawing
+
+        forces = {"force": partial(_drawing.draw_forces, rig=self)} if self.tables("muscle") else {}
+        return {"blocks": partial(_drawing.draw_blocks, rig=self), **forces}
+
+    def _numbers(self) -> dict[str, str]:
+        told = {"rig": self.name, "blocks": ", ".join(self.blocks)}
+        for name, table in self.tables("muscle").items():
+            size = f"{1e3 * table['rest_length']:.4g} x {1e3 * table['rest_diameter']:.4g} mm"
+            told[qualified("muscle", name)] = f"{table['model']}, {size}, {table['count']} of them"
+        for name, table in self.tables("supply").items():
+            bar = f"{table['initial_pressure'] / 1e5:.4g} bar"
+            told[qualified("supply", name)] = f"{table['kind']}, {bar}"
+        told |= {"effects": ", ".join(full_name(e) for e in self.effects)} if self.effects else {}
+        return told | {"cautions": "; ".join(self.cautions) or "none"}
 
     @property
     def cautions(self) -> list[str]:

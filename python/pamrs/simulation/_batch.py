@@ -6,6 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs._checks import as_numbers, as_said, quantities, whole
+from pamrs._views import COLOURS, Panels, View, in_laboratory_units, over_time
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import initial_values, inputs_of, keywords
@@ -27,6 +29,7 @@ from pamrs.simulation._simulation import (
 )
 
 Array = NDArray[np.float64]
+_MOST_DRAWN = 40  # plants of a batch
 #: What is made from the rest, and not pickled.
 _MADE = ("_core", "_first", "_inputs", "_channels", "_commands")
 
@@ -47,7 +50,7 @@ class Failure(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BatchRun(Mapping[str, Array]):
+class BatchRun(View, Mapping[str, Array]):
     """What :meth:`Batch.control` or :func:`pamrs.simulate_batch` recorded; ``run["joint_angle"]``
     has the shape (n, rows).
 
@@ -75,6 +78,33 @@ class BatchRun(Mapping[str, Array]):
         """Which plants ended, shape (n,)."""
         return np.array([failure is not None for failure in self.status], dtype=np.bool_)
 
+    def _panels(self) -> Panels:
+        if self.time.size < 2 or not self.channels:
+            return {
+                name: partial(_draw_spread, name=name, of=v) for name, v in self.reduced.items()
+            }
+        faint = {"color": COLOURS[0], "alpha": 0.5, "lw": 0.8}
+        shown = range(0, len(self.status), max(1, len(self.status) // _MOST_DRAWN))
+        return over_time(
+            {
+                name: [("", self.time, values[k], faint) for k in shown]
+                for name, values in self.channels.items()
+            }
+        )
+
+    def _numbers(self) -> dict[str, str]:
+        rows = f"{self.time[-1]:.4g} s in {self.time.size} rows" if self.time.size else "no rows"
+        told = {"plants": f"{len(self.status)}, {self.failed.sum()} of them ended", "time": rows}
+        last = {name: v[~self.failed, -1] for name, v in self.channels.items() if v.shape[1]}
+        last |= {name: values[~self.failed] for name, values in self.reduced.items()}
+        return told | {
+            f"{name} at the end" if name in self.channels else name: (
+                in_laboratory_units(name, values.min(), values.max())
+            )
+            for name, values in last.items()
+            if values.size
+        }
+
     def __getitem__(self, channel: str) -> Array:
         try:
             return self.channels[channel]
@@ -93,6 +123,13 @@ class BatchRun(Mapping[str, Array]):
     def __repr__(self) -> str:
         ended = f"{len(self.status)} plants, {self.failed.sum()} of them ended"
         return f"BatchRun({ended}; {self.time.size} rows of {', '.join(self.channels)})"
+
+
+def _draw_spread(axes: Any, name: str, of: Array) -> None:
+    """How many plants have which number."""
+    axes.hist(of[np.isfinite(of)], bins="auto", color=COLOURS[0])
+    axes.set_xlabel(name)
+    axes.set_ylabel("plants")
 
 
 class Batch:

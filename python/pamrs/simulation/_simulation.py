@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs._checks import doubt_pascals, positive, quantities
+from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
@@ -195,7 +196,7 @@ def _again(count: int) -> str:
     return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
 
 
-class Simulation(Mapping[str, Array]):
+class Simulation(View, Mapping[str, Array]):
     """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
 
     ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is
@@ -452,7 +453,20 @@ class Simulation(Mapping[str, Array]):
         columns = {name: values for name, values in self._channels.items() if name != "time"}
         return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
 
-    def plot(
+    def _panels(self) -> Panels:
+        channels = {name: values for name, values in self._channels.items() if name != "time"}
+        return over_time({n: [("", self.time, v, {})] for n, v in channels.items()})
+
+    def _numbers(self) -> dict[str, str]:
+        told = {"rig": self.rig.name, "time": f"{self.time[-1]:.4g} s in {self.time.size} rows"}
+        for head in ("muscle_pressure", "joint_angle", "length"):
+            for block, values in self.under(head).items():
+                span = in_laboratory_units(head, values.min(), values.max())
+                last = in_laboratory_units(head, values[-1])
+                told[dotted(head, block)] = f"{span}, at the end {last}"
+        return told | {"events": str(len(self.events))}
+
+    def figure(
         self,
         path: str | os.PathLike[str],
         *,

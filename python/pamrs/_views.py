@@ -1,0 +1,160 @@
+"""What draws itself: `plot(ax)`, and in a notebook a picture with the main numbers.
+
+Each class says which panels it has and which numbers; everything else is here. matplotlib is
+imported when something is drawn.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from typing import Any, Final, TypeAlias
+
+from pamrs.channels import channel_of, laboratory_unit
+from pamrs.errors import ParameterError, meant
+
+__all__ = ["COLOURS", "Panels", "Curve", "View", "in_laboratory_units", "legend", "over_time"]
+
+#: What draws each panel, by its name, the most telling one first.
+Panels: TypeAlias = "dict[str, Callable[[Any], object]]"
+#: Label, times [s], values [SI], and how the line is drawn.
+Curve: TypeAlias = tuple[str, Any, Any, dict[str, Any]]
+
+#: Told apart by colour-blind readers and in grey print (after Okabe and Ito).
+COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
+_MOST_SHOWN: Final = 3  # panels in a notebook
+_MOST_POINTS: Final = 4000
+#: Channels that show how a rig runs, the most telling one first; others only where these are not.
+_TELLING: Final[tuple[str, ...]] = (
+    *("joint_angle", "length", "muscle_pressure", "force", "valve_command", "supply_command"),
+    *("supply_pressure", "line_pressure", "joint_torque", "muscle_force"),
+)
+
+
+class View:
+    """What can be drawn: panels, and numbers with units."""
+
+    def _panels(self) -> Panels:
+        """What draws each panel."""
+        raise NotImplementedError
+
+    def _numbers(self) -> dict[str, str]:
+        """The main numbers with their units, by what they are."""
+        raise NotImplementedError
+
+    def plot(self, ax: Any = None, *, what: str | Sequence[str] | None = None) -> Any:
+        """Draw it with matplotlib.
+
+        Parameters
+        ----------
+        ax : Axes or sequence of Axes, optional
+            Where: one gets the first panel, several get one each; by default a new figure has all.
+        what : str or sequence of str, optional
+            Names of the panels; by default all, the most telling one first.
+
+        Returns
+        -------
+        Axes or ndarray of Axes
+            What was drawn on.
+
+        Raises
+        ------
+        ParameterError
+            If there is no such panel or none at all, or more Axes than panels.
+        """
+        panels = self._panels()
+        names = list(panels) if what is None else [what] if isinstance(what, str) else list(what)
+        for name in names:
+            if name not in panels:
+                raise ParameterError(f"what = {name!r} is not allowed; {meant(name, panels)}")
+        if not names:
+            raise ParameterError(f"there is nothing to draw in {self!r}")
+        if ax is None:
+            from matplotlib import pyplot
+
+            size = (7.0, 0.6 + 2.2 * len(names))
+            _, ax = pyplot.subplots(len(names), figsize=size, layout="constrained")
+        several = ax.ravel() if hasattr(ax, "ravel") else ax if isinstance(ax, Sequence) else [ax]
+        if len(several) > len(names):
+            raise ParameterError(
+                f"ax has {len(several)} Axes, which is not allowed: at most one for each of "
+                f"{', '.join(names)}"
+            )
+        for axes, name in zip(several, names, strict=False):
+            panels[name](axes)
+        return ax
+
+    def _repr_html_(self) -> str:
+        """Picture and main numbers for notebooks."""
+        return f"<div>{self._picture()}{table(self._numbers())}</div>"
+
+    def _picture(self) -> str:
+        """The first panels as an image."""
+        from matplotlib.figure import Figure
+
+        panels = list(self._panels().values())[:_MOST_SHOWN]
+        if not panels:
+            return ""
+        size = (7.0, 0.4 + 1.9 * len(panels))
+        figure = Figure(figsize=size, dpi=150, layout="constrained")
+        every = figure.subplots(len(panels), squeeze=False)[:, 0]
+        for draw, axes in zip(panels, every, strict=True):
+            draw(axes)
+        file = io.BytesIO()
+        figure.savefig(file, format="png")
+        data = base64.b64encode(file.getvalue()).decode()
+        return f'<img style="width:44em;max-width:100%" src="data:image/png;base64,{data}">'
+
+
+def table(numbers: Mapping[str, str]) -> str:
+    """Numbers by what they are, as HTML."""
+    rows = (
+        f"<tr><th style='text-align:left'>{html.escape(name)}</th>"
+        f"<td style='text-align:left'>{html.escape(value)}</td></tr>"
+        for name, value in numbers.items()
+    )
+    return f"<table>{''.join(rows)}</table>"
+
+
+def in_laboratory_units(channel: str, *values: float) -> str:
+    """Values of a channel in the unit that people read it in: ``"15 to 42 deg"``."""
+    unit, factor = laboratory_unit(channel)
+    return f"{' to '.join(f'{factor * float(v):.4g}' for v in values)} {unit}".removesuffix(" 1")
+
+
+def over_time(channels: Mapping[str, Iterable[Curve]]) -> Panels:
+    """Panels of channels over time, those of several blocks in one.
+
+    Parameters
+    ----------
+    channels : mapping of str to iterable of Curve
+        By name what is drawn of each.
+    """
+    heads: dict[str, list[tuple[str, list[Curve]]]] = {}
+    for name, series in channels.items():
+        heads.setdefault(channel_of(name), []).append((name, list(series)))
+    told: list[str] = [head for head in _TELLING if head in heads] or list(heads)
+    return {head: partial(_draw_channel, head=head, of=heads[head]) for head in told}
+
+
+def _draw_channel(axes: Any, head: str, of: list[tuple[str, list[Curve]]]) -> None:
+    """A channel of every block that has it."""
+    unit, factor = laboratory_unit(head)
+    for number, (name, series) in enumerate(of):
+        for label, time, values, style in series:
+            step = max(1, len(time) // _MOST_POINTS)
+            text = " ".join(part for part in (name.partition(".")[2], label) if part)
+            own = {"color": COLOURS[number % len(COLOURS)], "lw": 1.2} | style
+            axes.plot(time[::step], factor * values[::step], label=text or "_", **own)
+    axes.set_ylabel(f"{head.replace('_', ' ')} [{unit}]")
+    axes.set_xlabel("time [s]")
+    legend(axes)
+
+
+def legend(axes: Any) -> None:
+    """A legend where there is something to tell apart."""
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize="small", frameon=False)
