@@ -191,7 +191,11 @@ def test_a_regulator_and_named_blocks_are_driven_by_name():
 def test_a_table_has_a_column_for_everything(rig):
     pytest.importorskip("pandas")
     run = closed_loop(rig, SmallPid(), LIFT, 0.5, channels=["muscle_pressure"])
-    assert list(run.to_pandas().columns) == [
+    frame = run.to_pandas()
+    units = {"time": "s", "reference": "rad", "reference_rate": "rad/s", "muscle_pressure": "Pa"}
+    assert units.items() <= frame.attrs["units"].items()
+    assert "command" not in frame.attrs["units"]
+    assert list(frame.columns) == [
         "reference",
         "reference_rate",
         "command",

@@ -28,6 +28,7 @@ LAYERS = (
         "_normal",
         "_progress",
         "_stretches",
+        "_tables",
         "_termination",
         "_views",
         "_writing",

@@ -170,14 +170,6 @@ def test_reference_may_be_an_angle_or_a_pressure(tmp_path: Path) -> None:
     assert "reference [V]" in refused(tmp_path, f"{header}[V]\n{rows}")
 
 
-def test_to_pandas(tmp_path: Path) -> None:
-    pytest.importorskip("pandas")
-    frame = load(tmp_path, lively()).to_pandas()
-    assert frame.index.name == "time [s]"
-    assert list(frame)[-1] == "joint_angle [rad]"
-    assert len(frame) == N
-
-
 def test_valid_names_what_is_missing(tmp_path: Path) -> None:
     recording = load(tmp_path, lively())
     with pytest.raises(RecordingError, match="'force'"):

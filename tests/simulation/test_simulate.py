@@ -55,15 +55,6 @@ def test_unknown_channel_names_the_known_ones() -> None:
         run()["no_such_channel"]
 
 
-def test_to_pandas() -> None:
-    pandas = pytest.importorskip("pandas")
-    result = run()
-    frame = result.to_pandas()
-    assert isinstance(frame, pandas.DataFrame)
-    assert len(frame) == 11
-    np.testing.assert_array_equal(frame["joint_angle"].to_numpy(), result["joint_angle"])
-
-
 @pytest.mark.parametrize(
     ("name", "changes"),
     rows_of(__file__, "bad_argument_is_refused_by_name"),

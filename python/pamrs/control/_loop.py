@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import finite, one_of, quantities
+from pamrs._tables import Columns, Tabular
+from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Curve, Panels, View, in_laboratory_units, over_time
 from pamrs.channels import channel_of, rate_of, unit_of
 from pamrs.control._groups import joints_of, lengths_of
@@ -22,9 +24,6 @@ from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation import Event, Simulator, core_rig, default_step, whole_samples
 
-if TYPE_CHECKING:
-    import pandas as pd
-
 Array = NDArray[np.float64]
 #: From a controller's command to the keywords of :meth:`pamrs.Simulator.step`:
 #: ``lambda u: {"valve_command": {"flexor": u, ...}}``.
@@ -34,7 +33,7 @@ MOST_VOLTS = 1000.0
 
 
 @dataclass(frozen=True)
-class ClosedLoop(View):
+class ClosedLoop(View, Tabular):
     """A closed loop as it went.
 
     Attributes
@@ -141,28 +140,14 @@ class ClosedLoop(View):
             unit=chosen,
         )
 
-    def to_pandas(self) -> pd.DataFrame:
-        """All columns as a table indexed by time [s].
-
-        Returns
-        -------
-        pandas.DataFrame
-            ``reference`` and ``reference_rate``, ``command``, and every channel.
-
-        Raises
-        ------
-        MissingPackageError
-            If pandas is not installed.
-        """
-        try:
-            import pandas as pd
-        except ImportError as error:
-            from pamrs.errors import missing_package
-
-            raise missing_package(error, "io") from error
+    def _columns(self) -> Columns:
         commands = self.command if isinstance(self.command, Mapping) else {"command": self.command}
-        columns = {**self._wanted(), **commands, **self.channels}
-        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+        wanted = self._wanted()
+        own = unit_of(self.joint)
+        units = {name: own + "/s" * name.startswith("reference_rate") for name in wanted}
+        found = columns_over_time(self.time, {**wanted, **commands, **self.channels}, units)
+        known = {name: unit for name, unit in found.units.items() if name != "command"}
+        return found._replace(units=known)  # what a command is, its actuation alone says
 
     def _wanted(self) -> dict[str, Array]:
         """Reference and its rate as columns."""

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, one_of, positive, rising, whole
+from pamrs._tables import Columns, Tabular
 from pamrs._views import COLOURS, Panels, View, in_laboratory_units
 from pamrs.control._groups import joints_of
 from pamrs.control._protocol import Controller
@@ -39,7 +40,7 @@ _FAILED: Final = 1e3
 
 
 @dataclass(frozen=True)
-class GainMap(View):
+class GainMap(View, Tabular):
     """Metrics over a grid of gains, for each payload.
 
     Attributes
@@ -65,6 +66,12 @@ class GainMap(View):
     j: Array = field(repr=False)
     rms: Array = field(repr=False)
     unit: str = "rad"
+
+    def _columns(self) -> Columns:
+        axes = {"payload": self.payloads, **self.axes}
+        names = ("j", "squared_error", "curvature", "rms")
+        values = {name: (tuple(axes), getattr(self, name)) for name in names}
+        return Columns(axes, values, {"payload": "kg", "j": "1", "rms": "rad"})
 
     def _panels(self) -> Panels:
         return {

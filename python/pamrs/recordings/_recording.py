@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 from pamrs._checks import quantities
 from pamrs._files import MOST_NAME, shown
 from pamrs._stretches import stretches
+from pamrs._tables import Columns, Tabular
+from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs.channels import CHANNELS, channel_of
 from pamrs.effects import EFFECTS
@@ -27,8 +29,6 @@ from pamrs.recordings._faults import Fault, find_faults
 from pamrs.rig import full_name, named_entries
 
 if TYPE_CHECKING:
-    import pandas as pd
-
     from pamrs.rig import Rig
 
 __all__ = [
@@ -109,7 +109,7 @@ class OwnValue:
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(View):
+class Recording(View, Tabular):
     """One recording on a uniform grid.
 
     Attributes
@@ -319,13 +319,8 @@ class Recording(View):
             issues=issues,
         )
 
-    def to_pandas(self) -> pd.DataFrame:
-        """A data frame indexed by time, SI values, NaN where masked; needs pandas."""
-        import pandas as pd
-
-        index = pd.Index(self.time, name="time [s]")
-        data = {f"{name} [{self.units[name]}]": values for name, values in self.channels.items()}
-        return pd.DataFrame(data, index=index)
+    def _columns(self) -> Columns:
+        return columns_over_time(self.time, self.channels, self.units)
 
 
 # ------------------------------------------------------------------------ assembly

@@ -14,7 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs._checks import as_numbers, as_said, quantities, whole
+from pamrs._tables import Columns, Tabular
 from pamrs._views import COLOURS, Panels, View, in_laboratory_units, over_time
+from pamrs.channels import unit_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._driving import initial_values, inputs_of, keywords
@@ -50,7 +52,7 @@ class Failure(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class BatchRun(View, Mapping[str, Array]):
+class BatchRun(View, Tabular, Mapping[str, Array]):
     """What :meth:`Batch.control` or :func:`pamrs.simulate_batch` recorded; ``run["joint_angle"]``
     has the shape (n, rows).
 
@@ -77,6 +79,14 @@ class BatchRun(View, Mapping[str, Array]):
     def failed(self) -> NDArray[np.bool_]:
         """Which plants ended, shape (n,)."""
         return np.array([failure is not None for failure in self.status], dtype=np.bool_)
+
+    def _columns(self) -> Columns:
+        axes = {"plant": np.arange(len(self.status)), "time": self.time}
+        values: dict[str, tuple[tuple[str, ...], Array]] = {}
+        values |= {name: (("plant", "time"), of) for name, of in self.channels.items()}
+        values |= {name: (("plant",), of) for name, of in self.reduced.items()}
+        units = {name: unit_of(name) for name in self.channels}
+        return Columns(axes, values, {"time": "s", **units})
 
     def _panels(self) -> Panels:
         if self.time.size < 2 or not self.channels:

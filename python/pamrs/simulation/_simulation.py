@@ -10,13 +10,15 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
 from pamrs._checks import doubt_pascals, positive, quantities
+from pamrs._tables import Columns, Tabular
+from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
@@ -28,9 +30,6 @@ from pamrs.simulation._driving import (
     sensor_zero,
     signals_of,
 )
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -196,7 +195,7 @@ def _again(count: int) -> str:
     return {1: "", 2: " and once more"}.get(count, f" and {count - 1} more times")
 
 
-class Simulation(View, Mapping[str, Array]):
+class Simulation(View, Tabular, Mapping[str, Array]):
     """Simulated channels by name, SI, gauge pressures; ``time`` [s] is a channel too.
 
     ``result["muscle_pressure"]`` is an array with one row per sample; ``result.time`` is
@@ -446,12 +445,9 @@ class Simulation(View, Mapping[str, Array]):
                 )
         return said
 
-    def to_pandas(self) -> pd.DataFrame:
-        """All channels as a table indexed by time [s]."""
-        import pandas as pd
-
-        columns = {name: values for name, values in self._channels.items() if name != "time"}
-        return pd.DataFrame(columns, index=pd.Index(self.time, name="time"))
+    def _columns(self) -> Columns:
+        channels = {name: values for name, values in self._channels.items() if name != "time"}
+        return columns_over_time(self.time, channels, {})
 
     def _panels(self) -> Panels:
         channels = {name: values for name, values in self._channels.items() if name != "time"}
