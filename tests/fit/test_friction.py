@@ -167,6 +167,18 @@ def test_force_map_with_rows_of_unknown_direction():
     assert "1 row of 1440 has no number" in text
 
 
+def test_it_is_handed_on_to_lmfit_and_to_a_notebook():
+    pytest.importorskip("lmfit")
+    fit = fitted(**loops())
+    found = fit.to_lmfit()
+    assert {name: one.value for name, one in found.items()} == {
+        name: one.value for name, one in fit.params.items()
+    }
+    assert found["friction_pressure_slope"].user_data["unit"] == "1/Pa"
+    assert "data:image/png" in fit._repr_html_()
+    assert f"{fit.params['friction_coefficient'].value:.4g}" in fit._repr_html_()
+
+
 def test_a_pressure_with_one_branch_is_named_and_the_others_count():
     made = loops()
     keep = ~((made["pressure"] == 3e5) & (made["direction"] > 0))

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pamrs.errors import missing_package
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.rig import Rig
 
-__all__ = ["fit_report", "to_dict", "to_rig"]
+__all__ = ["fit_report", "to_dict", "to_lmfit", "to_rig"]
 
 
 _NUMBERS: Final = (
@@ -130,6 +133,33 @@ def _kept(name: str, value: float, muscle: Mapping[str, Any]) -> bool:
     """Whether a number of the rig, by its dotted name, is the same with the fitted muscle in it."""
     block, _, key = name.partition(".")
     return block != "muscle" or muscle.get(key) == value
+
+
+def to_lmfit(params: Mapping[str, Any], covar: NDArray[np.float64]) -> Any:
+    """What :meth:`MuscleFit.to_lmfit` and :meth:`FrictionFit.to_lmfit` return.
+
+    Parameters
+    ----------
+    params : mapping of str to FitParameter or LawParameter
+        The numbers of a fit.
+    covar : (p, p) array
+        Their covariance.
+    """
+    try:
+        from lmfit import Parameters
+    except ImportError as error:
+        raise missing_package(error, "lmfit") from error
+    found, names = Parameters(), [re.sub(r"\W", "_", name) for name in params]
+    spread = np.sqrt(np.diag(covar))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        together = covar / np.outer(spread, spread)
+    for k, (name, item) in enumerate(zip(names, params.values(), strict=True)):
+        found.add(name, value=item.value, user_data={"unit": item.unit})
+        one = found[name]
+        one.stderr = item.stderr if np.isfinite(item.stderr) else None
+        one.init_value = getattr(item, "init_value", None)
+        one.correl = {o: float(together[k, i]) for i, o in enumerate(names) if i != k}
+    return found
 
 
 def to_dict(fit: MuscleFit) -> dict[str, Any]:

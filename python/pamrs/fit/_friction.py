@@ -228,6 +228,19 @@ class FrictionFit(View):
             changes["friction_presliding"] = self.presliding
         return muscle.replace(**changes)
 
+    def to_lmfit(self) -> Any:
+        """The fitted numbers as ``lmfit.Parameters``: values, standard errors and correlations, SI
+        units in ``user_data["unit"]``.
+
+        Raises
+        ------
+        MissingPackageError
+            If lmfit is not installed.
+        """
+        from pamrs.fit._export import to_lmfit
+
+        return to_lmfit(self.params, self.covar)
+
     def fit_report(self) -> str:
         """The result in words and a table."""
         c0, c1 = self.params["friction_coefficient"], self.params["friction_pressure_slope"]

@@ -348,6 +348,19 @@ class MuscleFit(View, FitStatistics):
 
         return to_rig(self, rig)
 
+    def to_lmfit(self) -> Any:
+        """The fitted numbers as ``lmfit.Parameters``: values, standard errors and correlations, SI
+        units in ``user_data["unit"]``.
+
+        Raises
+        ------
+        MissingPackageError
+            If lmfit is not installed.
+        """
+        from pamrs.fit._export import to_lmfit
+
+        return to_lmfit(self.params, self.covar)
+
     def to_dict(self) -> dict[str, Any]:
         """The fit as plain numbers and text, ready for JSON."""
         from pamrs.fit._export import to_dict
