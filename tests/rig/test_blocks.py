@@ -447,10 +447,16 @@ def test_a_bench_without_a_muscle_is_the_packaged_one() -> None:
     assert (other.name, other.parameters) == ("mine", rigs.bench().parameters)
 
 
+NO_LIMIT = "limits.max_pressure is missing"
+
+
 @pytest.mark.parametrize("name", rigs.names())
 def test_every_packaged_rig_is_a_function_without_arguments(name: str) -> None:
     assert same(getattr(rigs, name)(), rigs.named(name))
-    assert getattr(rigs, name)().cautions == []
+    rig = getattr(rigs, name)()
+    assert [told for told in rig.cautions if not told.startswith(NO_LIMIT)] == []
+    limited = "max_pressure" in rig.limits or not rig.tables("muscle")
+    assert any(told.startswith(NO_LIMIT) for told in rig.cautions) != limited
     with pytest.raises(AttributeError, match="knee"):
         rigs.knee()
 
@@ -472,7 +478,44 @@ def told_of(name: str, old: str, new: str) -> list[str]:
         flags=re.M | re.S,
     )
     assert count
-    return parse_rig(text).cautions
+    return [told for told in parse_rig(text).cautions if not told.startswith(NO_LIMIT)]
+
+
+def test_muscles_of_which_nobody_says_what_they_bear_are_told() -> None:
+    said = {"shoulder": "the 13.8 bar of the supply", "regulated_joint": "up to the supply"}
+    for name, bar in said.items():
+        text = (Path(rigs.__file__).parent / f"{name}.toml").read_text(encoding="utf-8")
+        bare = re.sub(r"^\[limits\].*?(?=^\[|\Z)", "", text, flags=re.M | re.S)
+        (told,) = parse_rig(bare).cautions
+        assert told.startswith(NO_LIMIT)
+        assert bar in told
+        limit = '[limits]\nmax_pressure = { value = 7, unit = "bar" }\n'
+        assert parse_rig(bare + limit).cautions == []
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            r"^rest_length *=.*?$",
+            'rest_length = { value = 2.76, unit = "m", tol = 0.01 }',
+            ["muscle is long for its joint", "45.2 mm, 1.6 %", "= 2760 mm"],
+        ),
+        (
+            r"^rest_length *=.*?$",
+            'rest_length = { value = 130, unit = "mm", tol = 1 }',
+            ["muscle is short for its joint", "at 13.8 bar it pulls up to"],
+        ),
+        (
+            r"^rest_angle *=.*?$",
+            'rest_angle = { value = 35, unit = "deg" }',
+            ["muscle is stretched by", "where its braid is taut"],
+        ),
+    ],
+)
+def test_muscles_that_do_not_fit_their_joint_are_told(old: str, new: str, said: list[str]) -> None:
+    (told,) = told_of("shoulder", old, new)
+    assert all(part in told for part in said), told
 
 
 def test_a_regulator_without_a_line_feeds_nothing() -> None:

@@ -8,12 +8,18 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
 from pamrs.rig._ports import Ports
 from pamrs.rig.schema import qualified, split_name, tables_of
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
+    from pamrs.rig._muscle import Muscle
     from pamrs.rig._rig import Parameter
+
+Array = NDArray[np.float64]
 
 _PATHS = {"fill": ("fill",), "vent": ("vent",), "closed": (), "either": ("fill", "vent")}
 """Paths that are open in each position of a spool that switches."""
@@ -34,6 +40,8 @@ _MEASURED: Final = {
 }
 """Values that a laboratory measures, by block and key, with a usual tolerance as a share."""
 
+_ANGLES: Final = 200  # angles at which a joint is looked at
+_LEAST_STROKE: Final = 0.02  # of the rest length, below which a muscle has little to do
 _STIFFEST: Final = 5e6  # modulus of the stiffest rubber that bladders are made of [Pa]
 
 
@@ -63,7 +71,85 @@ def cautions_of(
         found += _late(label, valve)
     for name, muscle in tables_of(model, "muscle").items():
         found += _strut(qualified("muscle", name), muscle)
+    found += [*_limitless(model), *_strokes(model, ports)]
     return [*found, *_frictionless(parameters), *_exact(parameters)]
+
+
+def _highest(model: Mapping[str, Any]) -> float | None:
+    """The highest pressure that the muscles get [Pa, gauge], where the file says one."""
+    limit = model.get("limits", {}).get("max_pressure")
+    tables = tables_of(model, "supply").values()
+    full = [table["initial_pressure"] for table in tables if table["kind"] != "regulator"]
+    return limit or max(full, default=0.0) or None
+
+
+def _limitless(model: Mapping[str, Any]) -> list[str]:
+    """Muscles of which nobody says what pressure they bear."""
+    if not tables_of(model, "muscle") or "max_pressure" in model.get("limits", {}):
+        return []
+    highest = _highest(model)
+    bar = "" if highest is None else f"the {highest / 1e5:.4g} bar of "
+    return [
+        "limits.max_pressure is missing: nothing says which pressure the muscles bear, and "
+        f"simulations go up to {bar}the supply without a word; [limits] with max_pressure = "
+        '{ value = ..., unit = "bar" } says it'
+    ]
+
+
+def _strokes(model: Mapping[str, Any], ports: Ports) -> list[str]:
+    """Muscles that are too long or too short for what their joint asks of them."""
+    from pamrs.rig._joint import Joint
+    from pamrs.rig._muscle import Muscle
+
+    found = []
+    joints, own_ways = tables_of(model, "joint"), tables_of(model, "transmission")
+    for name, ends in ports["muscle"].items():
+        kind, _, joint = ends["joint"].partition(".")
+        if kind != "joint":
+            continue
+        table = joints[joint]
+        way = Joint.from_model(own_ways.get(name, table))
+        angles = np.linspace(table["min_angle"], table["max_angle"], _ANGLES)
+        if not way.reaches(angles).all():
+            continue  # an error, when the rig is used
+        muscle = Muscle.from_model(tables_of(model, "muscle")[name])
+        found += _stroke(
+            qualified("muscle", name), ends["joint"], muscle, way.shortening(angles), model
+        )
+    return found
+
+
+def _stroke(
+    label: str, joint: str, muscle: Muscle, shortening: Array, model: Mapping[str, Any]
+) -> list[str]:
+    """What is odd about how far a joint shortens a muscle [m] between its stops."""
+    rest = float(muscle.parameters["rest_length"])
+    low, high = float(shortening.min()), float(shortening.max())
+    if high - low < _LEAST_STROKE * rest:
+        share = 100 * (high - low) / rest
+        return [
+            f"{label} is long for its joint: between its stops {joint} shortens it by "
+            f"{1e3 * (high - low):.3g} mm, {share:.2g} % of {label}.rest_length = "
+            f"{1e3 * rest:.4g} mm; are all lengths in the unit that they say?"
+        ]
+    first, last = muscle.contraction_range
+    found = []
+    if first <= low / rest < 0.0 and bool(muscle.braid_taut(low / rest)):
+        found.append(
+            f"{label} is stretched by {-1e3 * low:.3g} mm at a stop of {joint}, where its braid is "
+            "taut: the joint's rest_angle is the angle at which muscles have their rest length"
+        )
+    highest = _highest(model)
+    if highest is not None and high / rest <= last:
+        grid = np.linspace(0.0, last, _ANGLES)
+        free = float(grid[muscle.force_table(highest, grid) >= 0.0].max(initial=0.0))
+        if free < high / rest:
+            found.append(
+                f"{label} is short for its joint: at a stop of {joint} it is shortened by "
+                f"{100 * high / rest:.3g} %, and at {highest / 1e5:.4g} bar it pulls up to "
+                f"{100 * free:.3g} % only"
+            )
+    return found
 
 
 def _unfed(model: Mapping[str, Any], ports: Ports) -> list[str]:

@@ -188,8 +188,9 @@ class Rig(View):
     def cautions(self) -> list[str]:
         """What of the rig is possible, and most likely a mistake, one sentence each: chambers that
         no air reaches, valves that never pass air, delays as long as the period of the pulses,
-        muscles that push more than rubber bears, friction of exactly nothing, measured values
-        without a tolerance. Empty where nothing is.
+        muscles that push more than rubber bears, that are too long or short for their joint, or
+        whose largest pressure nobody says, friction of exactly nothing, measured values without a
+        tolerance. Empty where nothing is.
         """
         return cautions_of(self._model, self._connected, self._known)
 
