@@ -21,9 +21,11 @@ if TYPE_CHECKING:
 __all__ = [
     "as_numbers",
     "as_said",
+    "by_hand",
     "check_column",
     "checked_number",
     "checked_table",
+    "doubt",
     "doubt_pascals",
     "finite",
     "is_quantity",
@@ -422,12 +424,35 @@ def doubt_pascals(name: str, pressure: ArrayLike, *, inside: int = 1) -> None:
 
     largest = float(np.max(np.abs(pressure), initial=0.0))
     if 0.0 < largest < _LEAST_PRESSURE:
-        import warnings
+        said = f"{name} never exceeds {largest:.4g} Pa (gauge): pascals are wanted, 1 bar is 1e5"
+        doubt(said, inside=inside + 1)
 
-        from pamrs.errors import UnitWarning
 
-        warnings.warn(
-            f"{name} never exceeds {largest:.4g} Pa (gauge): pascals are wanted, 1 bar is 1e5",
-            UnitWarning,
-            stacklevel=2 + inside,
-        )
+def doubt(said: str, *, inside: int = 1) -> None:
+    """Warn of a value that is possible and most likely meant in another unit, unless the package
+    itself gave it.
+
+    Parameters
+    ----------
+    said : str
+        What it is, and what is wanted.
+    inside : int, optional
+        How many functions inside the one that a user calls asks.
+
+    Warns
+    -----
+    UnitWarning
+    """
+    import sys
+    import warnings
+
+    from pamrs.errors import UnitWarning
+
+    if sys._getframe(1 + inside).f_globals.get("__name__", "").partition(".")[0] == "pamrs":
+        return
+    warnings.warn(said, UnitWarning, stacklevel=2 + inside)
+
+
+def by_hand(value: float) -> bool:
+    """Whether a number has so few digits that a person wrote it, and no sensor did."""
+    return float(f"{value:.2g}") == value

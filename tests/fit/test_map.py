@@ -205,6 +205,7 @@ def test_measured_rows_become_a_monotone_table_with_their_scatter() -> None:
     assert np.all(np.diff(fit.force, axis=1) <= 0.0)
     p, e = np.meshgrid(np.linspace(0.0, 6e5, 25), np.linspace(0.0, 0.25, 25), indexing="ij")
     error = np.abs(fit.predict(p, e) - law(p, e))
+    assert np.allclose(fit.predict(4e5, length=0.25 * (1.0 - e)), fit.predict(4e5, e))
     assert error.max() < 16.0  # between levels a parabola is not known better
     at = np.abs(fit.predict(LEVELS[:, None], e[0]) - law(LEVELS[:, None], e[0]))
     assert np.sqrt(np.mean(at**2)) < 3.0

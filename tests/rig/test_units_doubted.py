@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import pamrs
-from pamrs.errors import UnitWarning
+from pamrs.errors import ParameterError, UnitWarning
 
 TOLD = r"never exceeds 2 Pa \(gauge\): pascals are wanted, 1 bar is 1e5"
 
@@ -26,6 +26,89 @@ def test_a_regulator_set_to_two_pascals_is_doubted() -> None:
     with pytest.warns(UnitWarning, match=rf"^supply_command {TOLD}") as caught:
         pamrs.simulate(rig, supply_command=np.full(20, 2.0), sample_time=0.01)
     assert caught[0].filename == __file__
+
+
+def test_a_start_and_a_lift_at_two_pascals_are_doubted() -> None:
+    shoulder = pamrs.rigs.shoulder()
+    for begin in (
+        lambda: pamrs.simulate(
+            shoulder, 5.0, sample_time=0.01, duration=0.1, initial={"muscle_pressure": 2.0}
+        ),
+        lambda: pamrs.Simulator(shoulder, sample_time=0.01, initial={"muscle_pressure": 2.0}),
+    ):
+        with pytest.warns(UnitWarning, match=rf"^initial muscle_pressure {TOLD}") as caught:
+            begin()
+        assert caught[0].filename == __file__
+    with pytest.warns(UnitWarning, match=rf"^pressure {TOLD}") as caught:
+        pamrs.Joint(kind="pulley", radius=0.03).torque(shoulder.muscle, 2.0, 0.5)
+    assert [one.filename for one in caught] == [__file__]
+    with pytest.warns(UnitWarning, match=r"^pressure never exceeds 8\.3 Pa") as caught:
+        pamrs.lift(pamrs.rigs.named("elbow"), pressure=8.3)
+    assert caught[0].filename == __file__
+
+
+def test_a_length_where_a_contraction_is_wanted_is_doubted() -> None:
+    muscle = pamrs.rigs.shoulder().muscle  # of 276 mm
+    with pytest.warns(UnitWarning, match=r"^contraction = 0\.27 .* or length=") as caught:
+        muscle.force(4e5, 0.27)
+    assert caught[0].filename == __file__
+    with pytest.raises(ParameterError, match="contraction_ratio = 270"):
+        muscle.force(4e5, 270)  # millimetres
+    long = muscle.replace(rest_length=0.5)
+    with pytest.raises(ParameterError, match=r"contraction_ratio = 0\.45"):
+        long.force(4e5, 0.45)
+
+
+def test_a_length_is_taken_where_it_is_called_so() -> None:
+    muscle = pamrs.rigs.shoulder().muscle
+    rest = muscle.parameters["rest_length"]
+    length = np.array([rest, 0.9 * rest])
+    for force in (muscle.force, muscle.force_table):
+        assert np.array_equal(force(4e5, length=length), force(4e5, 1.0 - length / rest))
+        for given in ({}, {"contraction": 0.1, "length": length}):
+            with pytest.raises(ParameterError, match="contraction or length, one of the two"):
+                force(4e5, **given)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: pamrs.Joint(kind="pulley", radius=30), "joint.radius = 30"),
+        (
+            lambda: pamrs.rigs.shoulder().with_parameters({"muscle.rest_length": 276}),
+            "muscle.rest_length = 276 m",
+        ),
+        (
+            lambda: pamrs.simulate(
+                pamrs.rigs.bench(), sample_time=0.01, length=[270] * 9, pressure=[2e5] * 9
+            ),
+            r"length\[0\] = 270",
+        ),
+        (
+            lambda: pamrs.simulate(
+                pamrs.rigs.shoulder(),
+                5.0,
+                sample_time=0.01,
+                duration=0.1,
+                initial={"joint_angle": 45},
+            ),
+            "initial.joint_angle = 45",
+        ),
+    ],
+)
+def test_millimetres_and_degrees_are_refused(call, said: str) -> None:  # type: ignore[no-untyped-def]
+    with pytest.raises(ParameterError, match=said):
+        call()
+
+
+def test_what_a_sensor_reads_and_what_the_package_asks_is_not_doubted() -> None:
+    rig = pamrs.rigs.shoulder()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        start = {"muscle_pressure": 12.3456}
+        pamrs.simulate(rig, 5.0, sample_time=0.01, duration=0.1, initial=start)
+        pamrs.library.evaluate.free_contraction(rig.muscle, 4e5)
+        pamrs.Joint(kind="pulley", radius=0.03).torque(rig.muscle, [0.0, 2e5], 0.5)
 
 
 def test_no_pressure_and_usual_ones_are_not() -> None:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import checked_number, quantities, whole
+from pamrs._checks import checked_number, doubt_pascals, quantities, whole
 from pamrs._views import Panels, View
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
@@ -438,7 +438,9 @@ def _pressure(rig: Rig, pressure: float | None) -> float:
                 "be taken"
             )
         return max(float(supply["initial_pressure"]) for supply in rig.tables("supply").values())
-    return checked_number("pressure", pressure, 0.0, 1e8, "Pa")
+    known = checked_number("pressure", pressure, 0.0, 1e8, "Pa")
+    doubt_pascals("pressure", known, inside=3)
+    return known
 
 
 def _crossings(function: Callable[[Array], Array], angle: Array) -> list[float]:

@@ -103,18 +103,29 @@ class MapFit(View):
             "scatter": f"{self.scatter:.4g} N",
         }
 
-    def predict(self, pressure: Any, contraction: Any) -> Array:
-        """Force [N] at gauge pressures [Pa] and contraction ratios [1], broadcast together, as a
-        muscle with this table has it.
+    def predict(self, pressure: Any, contraction: Any = None, *, length: Any = None) -> Array:
+        """Force [N], as a muscle with this table has it.
 
         Parameters
         ----------
-        pressure, contraction : array_like
+        pressure : array_like
+            Gauge pressure [Pa].
+        contraction, length : array_like, optional
+            Contraction ratio [1] or length [m], one of the two; broadcast against ``pressure``.
 
         Returns
         -------
         ndarray
+
+        Raises
+        ------
+        ParameterError
+            If not one of contraction and length is given.
         """
+        if (contraction is None) == (length is None):
+            raise ParameterError("give contraction or length, one of the two")
+        if contraction is None:
+            contraction = 1.0 - np.asarray(length, dtype=np.float64) / self.rest_length
         return _predict(self.pressure, self.contraction, self.force, pressure, contraction)
 
     def to_muscle(self, muscle: Muscle) -> Muscle:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import finite, plain, quantities
+from pamrs._checks import doubt_pascals, finite, plain, quantities
 from pamrs.rig._muscle import Muscle
 from pamrs.rig.schema import SPRING, STOPS
 
@@ -195,6 +195,8 @@ class Joint:
         ParameterError
             As :meth:`shortening` and :meth:`pamrs.Muscle.force`.
         """
+        pressure = plain("pressure", pressure, "Pa")
+        doubt_pascals("pressure", pressure)
         contraction = self.shortening(angle) / float(muscle.parameters["rest_length"])
         return np.asarray(count * muscle.force(pressure, contraction) * self.torque_arm(angle))
 

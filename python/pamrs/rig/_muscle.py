@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import doubt_pascals, finite, plain, quantities
+from pamrs._checks import doubt, doubt_pascals, finite, plain, quantities
 from pamrs.errors import ParameterError
 from pamrs.rig.muscle_models import PARAMETERS, own_geometry
 
@@ -456,7 +456,12 @@ class Muscle:
         return columns.reshape(*e.shape, columns.shape[1])
 
     def force(
-        self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        *,
+        length: ArrayLike | None = None,
     ) -> Array:
         """Pulling force of one muscle [N], exact solve.
 
@@ -464,12 +469,14 @@ class Muscle:
         ----------
         pressure : array_like
             Gauge pressure [Pa].
-        contraction : array_like
-            Contraction ratio [1]; broadcast against ``pressure``.
+        contraction : array_like, optional
+            Contraction ratio ``1 - L/L0`` [1], this or ``length``; broadcast against ``pressure``.
         direction : array_like, optional
             Direction of motion, from -1 (contracting) to +1 (lengthening): adds the friction
             hysteresis and, for ``elbow_linear``, the lengthening branch. None: the contracting
             branch without friction.
+        length : array_like, optional
+            Length [m].
 
         Returns
         -------
@@ -480,9 +487,15 @@ class Muscle:
         ------
         ParameterError
             If a value is not finite, a pressure below vacuum, a contraction beyond the braid's
-            limits or a direction outside -1 to 1.
+            limits or a direction outside -1 to 1; if not one of contraction and length is given.
+
+        Warns
+        -----
+        UnitWarning
+            If pressures are so small that bar are meant, or contractions are lengths of the muscle
+            at which it could only push.
         """
-        return self._forces(self._core.force, pressure, contraction, direction)
+        return self._forces(self._core.force, pressure, contraction, direction, length)
 
     @quantities
     def buckled(self, force: ArrayLike) -> Array:
@@ -503,7 +516,12 @@ class Muscle:
         return np.asarray(held.reshape(straight.shape))
 
     def force_table(
-        self, pressure: ArrayLike, contraction: ArrayLike, direction: ArrayLike | None = None
+        self,
+        pressure: ArrayLike,
+        contraction: ArrayLike | None = None,
+        direction: ArrayLike | None = None,
+        *,
+        length: ArrayLike | None = None,
     ) -> Array:
         """Pulling force of one muscle [N] from the compiled table; otherwise as :meth:`force`.
 
@@ -511,39 +529,51 @@ class Muscle:
         ----------
         pressure : array_like
             Gauge pressure [Pa].
-        contraction : array_like
+        contraction : array_like, optional
             Contraction ratio [1], inside :attr:`contraction_range`; broadcast against ``pressure``.
-        direction : array_like, optional
-            Direction of motion, as for :meth:`force`.
+        direction, length : array_like, optional
+            As for :meth:`force`.
 
         Returns
         -------
         ndarray
             Force in the broadcast shape.
         """
-        return self._forces(self._core.force_table, pressure, contraction, direction)
+        return self._forces(self._core.force_table, pressure, contraction, direction, length)
 
     @staticmethod
     def _over(function: Callable[[Array], Array], contraction: ArrayLike) -> Array:
         e = np.asarray(plain("contraction", contraction, "1"), dtype=np.float64)
         return function(np.ascontiguousarray(e.ravel())).reshape(e.shape)
 
-    @staticmethod
     def _forces(
+        self,
         function: Callable[[Array, Array, Array | None], Array],
         pressure: ArrayLike,
-        contraction: ArrayLike,
+        contraction: ArrayLike | None,
         direction: ArrayLike | None,
+        length: ArrayLike | None,
     ) -> Array:
-        pressure = plain("pressure", pressure, "Pa")
+        if (contraction is None) == (length is None):
+            raise ParameterError("give contraction or length, one of the two")
+        pressure, rest = plain("pressure", pressure, "Pa"), float(self._model["rest_length"])
+        if contraction is None:
+            contraction = 1.0 - np.asarray(plain("length", length, "m"), dtype=np.float64) / rest
         contraction = plain("contraction", contraction, "1")
         given = [pressure, contraction] if direction is None else [pressure, contraction, direction]
         arrays = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in given))
         flat = [np.ascontiguousarray(array.ravel()) for array in arrays]
         doubt_pascals("pressure", flat[0], inside=2)
-        return function(flat[0], flat[1], flat[2] if len(flat) > 2 else None).reshape(
-            arrays[0].shape
-        )
+        force = function(flat[0], flat[1], flat[2] if len(flat) > 2 else None)
+        low, high = flat[1].min(initial=np.inf), flat[1].max(initial=-np.inf)
+        pushes = flat[0].max(initial=0.0) > 0.0 and force.max(initial=-np.inf) < 0.0
+        if pushes and 0.5 * rest < low <= high < 1.05 * rest:
+            doubt(
+                f"contraction = {high:.4g} is a ratio at which the muscle only pushes, and could "
+                "be its length in m: 1 - L/L0 is wanted, or length=",
+                inside=2,
+            )
+        return force.reshape(arrays[0].shape)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return Muscle.from_model, (self.parameters,)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of
-from pamrs.channels import channel_of, dotted
+from pamrs._checks import by_hand, doubt_pascals, one_of
+from pamrs.channels import channel_of, dotted, unit_of
 from pamrs.errors import ParameterError, meant
 from pamrs.simulation._plants import rowwise
 
@@ -326,6 +326,8 @@ def initial_values(initial: Mapping[str, float] | None, rig: Rig) -> dict[str, f
             raise ParameterError(
                 f"initial {name} = {value!r} is not allowed: a number is needed"
             ) from None
+        if unit_of(channel) == "Pa" and by_hand(start[name]):
+            doubt_pascals(f"initial {name}", start[name], inside=3)
     return start
 
 
