@@ -143,11 +143,11 @@ def over_time(channels: Mapping[str, Iterable[Curve]]) -> Panels:
 def _draw_channel(axes: Any, head: str, of: list[tuple[str, list[Curve]]]) -> None:
     """A channel of every block that has it."""
     unit, factor = laboratory_unit(head)
-    for number, (name, series) in enumerate(of):
+    for name, series in of:
         for label, time, values, style in series:
             step = max(1, len(time) // _MOST_POINTS)
             text = " ".join(part for part in (name.partition(".")[2], label) if part)
-            own = {"color": COLOURS[number % len(COLOURS)], "lw": 1.2} | style
+            own = {"color": COLOURS[len(axes.lines) % len(COLOURS)], "lw": 1.2} | style
             axes.plot(time[::step], factor * values[::step], label=text or "_", **own)
     axes.set_ylabel(f"{head.replace('_', ' ')} [{unit}]")
     axes.set_xlabel("time [s]")
