@@ -155,9 +155,9 @@ class StandIn:
 
 def _map(length: Array, pressure: Array, force: Array, direction: Array | None = None) -> ForceMap:
     return ForceMap.from_arrays(
-        length,
-        pressure,
-        force,
+        length=length,
+        pressure=pressure,
+        force=force,
         rest_length=float(_nominal().parameters["rest_length"]),
         direction=direction,
         check_duplicates=False,

@@ -42,7 +42,9 @@ def _map(pressure: Any, length: Any) -> Any:
     unit = pressure.units if hasattr(pressure, "units") else None
     lengths = grid if unit is None else U.Quantity(1e3 * grid, "mm")
     pressures = given if unit is None else U.Quantity(1e-5 * given, "bar")
-    return ForceMap.from_arrays(lengths, pressures, 1e-3 * given, rest_length=length).contraction
+    return ForceMap.from_arrays(
+        length=lengths, pressure=pressures, force=1e-3 * given, rest_length=length
+    ).contraction
 
 
 CASES: dict[str, tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = {

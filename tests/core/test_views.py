@@ -44,8 +44,9 @@ def _map() -> Any:
     pressure, shortened = np.meshgrid([2e5, 4e5, 6e5], contraction, indexing="ij")
     rest = muscle.parameters["rest_length"]
     force = muscle.force(pressure, shortened)
-    given = [(1.0 - shortened) * rest, pressure, force]
-    return pamrs.fit.ForceMap.from_arrays(*(one.ravel() for one in given), rest_length=rest)
+    given = {"length": (1.0 - shortened) * rest, "pressure": pressure, "force": force}
+    columns = {name: one.ravel() for name, one in given.items()}
+    return pamrs.fit.ForceMap.from_arrays(**columns, rest_length=rest)
 
 
 def _gains() -> Any:

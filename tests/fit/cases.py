@@ -52,7 +52,11 @@ def measure(
     force = force + noise * np.random.default_rng(seed).standard_normal(len(p))
     ways = None if direction is None else np.full(len(p), direction)
     return ForceMap.from_arrays(
-        of.parameters["rest_length"] * (1.0 - e), p, force, rest_length=rest, direction=ways
+        length=of.parameters["rest_length"] * (1.0 - e),
+        pressure=p,
+        force=force,
+        rest_length=rest,
+        direction=ways,
     )
 
 
@@ -67,3 +71,8 @@ def truth(of, fit):
             for name in fit.params
         ]
     )
+
+
+def named(columns):
+    """Columns of a force map by their names."""
+    return dict(zip(("length", "pressure", "force"), columns, strict=True))

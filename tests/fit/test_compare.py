@@ -11,7 +11,7 @@ from pamrs import Muscle
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, compare_models, fit_friction, fit_muscle
 from pamrs.fit._compare import effective_size, recommend
-from tests.fit.cases import REST, TOLERANCE, measure, muscle
+from tests.fit.cases import REST, TOLERANCE, measure, muscle, named
 
 
 def row(comparison, model, order=None):
@@ -141,14 +141,18 @@ def loops(seed):
     p, e, way = (values.ravel() for values in grid)
     force = real.force(p, e) * (1.0 + 0.04 * way)
     force = force + 0.01 * force.max() * np.random.default_rng(seed).standard_normal(len(p))
-    return ForceMap.from_arrays(0.3 * (1.0 - e), p, force, rest_length=0.3), Muscle(**sizes), way
+    return (
+        ForceMap.from_arrays(length=0.3 * (1.0 - e), pressure=p, force=force, rest_length=0.3),
+        Muscle(**sizes),
+        way,
+    )
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_hysteresis_does_not_recommend_a_model_that_is_plainly_worse(seed):
     data, nominal, way = loops(seed)
     told = ForceMap.from_arrays(
-        data.length, data.pressure, data.force, rest_length=0.3, direction=way
+        length=data.length, pressure=data.pressure, force=data.force, rest_length=0.3, direction=way
     )
     for comparison in (
         compare_models(data, nominal),
@@ -201,13 +205,17 @@ def test_independent_noise_counts_every_point_and_model_error_does_not():
     data = measure(muscle(), pressures=pressures, contractions=contractions, noise=5.0)
     assert effective_size(fit_muscle(data, muscle())) > 0.7 * 360
     wave = 20.0 * np.sin(40.0 * data.contraction) * data.pressure / 8e5
-    smooth = ForceMap.from_arrays(data.length, data.pressure, data.force + wave, rest_length=REST)
+    smooth = ForceMap.from_arrays(
+        length=data.length, pressure=data.pressure, force=data.force + wave, rest_length=REST
+    )
     size = effective_size(fit_muscle(smooth, muscle()))
     assert 12 <= size < 0.2 * 360
     turned = np.where(
         data.level % 2 == 0, wave, -wave
     )  # smooth along each level, opposite in the next
-    along = ForceMap.from_arrays(data.length, data.pressure, data.force + turned, rest_length=REST)
+    along = ForceMap.from_arrays(
+        length=data.length, pressure=data.pressure, force=data.force + turned, rest_length=REST
+    )
     assert effective_size(fit_muscle(along, muscle())) < 0.5 * 360
 
 
@@ -218,7 +226,7 @@ def test_loops_without_a_friction_law_are_said_to_favour_the_model_with_two_bran
         np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")
     ]
     way = np.repeat([-1.0, 1.0], len(maps[0]))
-    data = ForceMap.from_arrays(*columns, rest_length=REST, direction=way)
+    data = ForceMap.from_arrays(**named(columns), rest_length=REST, direction=way)
     found = compare_models(data, muscle(), models=["kothera", "elbow_linear"], orders=[2])
     assert "which favours it; fit friction first" in found.to_text()
     fitted = compare_models(data, real, models=["kothera", "elbow_linear"], orders=[2])

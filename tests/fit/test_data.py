@@ -44,7 +44,9 @@ wall_thickness = { value = 2.0, unit = "mm", unknown = true }
 
 
 def made(length=LENGTHS, pressure=PRESSURES, force=FORCES, rest_length=REST, **options):
-    return ForceMap.from_arrays(length, pressure, force, rest_length=rest_length, **options)
+    return ForceMap.from_arrays(
+        length=length, pressure=pressure, force=force, rest_length=rest_length, **options
+    )
 
 
 def changed(values, index, value):

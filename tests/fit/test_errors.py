@@ -7,7 +7,7 @@ import pytest
 
 from pamrs.errors import ParameterError
 from pamrs.fit import FitError, ForceMap, fit_friction, fit_muscle, load_force_map
-from tests.fit.cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle
+from tests.fit.cases import CONTRACTIONS, PRESSURES, REST, SHAPE, TOLERANCE, measure, muscle, named
 from tests.tables import rows_of
 
 
@@ -65,9 +65,9 @@ def test_a_small_range_of_contraction_is_a_warning():
 def test_levels_with_too_few_points_are_named():
     data = measure(muscle())
     thin = ForceMap.from_arrays(
-        np.append(data.length, 0.19),
-        np.append(data.pressure, 9.5e5),
-        np.append(data.force, 300.0),
+        length=np.append(data.length, 0.19),
+        pressure=np.append(data.pressure, 9.5e5),
+        force=np.append(data.force, 300.0),
         rest_length=REST,
     )
     with pytest.raises(
@@ -95,7 +95,10 @@ def test_a_level_that_cannot_be_missed_gives_plain_errors():
     data = measure(muscle(), noise=1.0)
     kept = np.isin(data.level, [0, 5]) | np.isclose(data.contraction, CONTRACTIONS[4])
     thin = ForceMap.from_arrays(
-        data.length[kept], data.pressure[kept], data.force[kept], rest_length=REST
+        length=data.length[kept],
+        pressure=data.pressure[kept],
+        force=data.force[kept],
+        rest_length=REST,
     )
     fit = fit_muscle(thin, muscle())
     assert fit.errors == "plain"
@@ -138,7 +141,9 @@ def test_a_point_that_the_others_do_not_predict_is_named_by_its_row(settings):
     force[wrong] += [900.0, -700.0]
     force[5] = np.nan  # rows that are not used count too
     fit = fit_muscle(
-        ForceMap.from_arrays(data.length, data.pressure, force, rest_length=REST),
+        ForceMap.from_arrays(
+            length=data.length, pressure=data.pressure, force=force, rest_length=REST
+        ),
         muscle(),
         **settings,
     )
@@ -151,7 +156,7 @@ def test_a_point_that_the_others_do_not_predict_is_named_by_its_row(settings):
     assert note.count("index ") == 2
     if not settings:
         others = ForceMap.from_arrays(
-            *(np.delete(v, [5, *wrong]) for v in (data.length, data.pressure, force)),
+            **named(np.delete(v, [5, *wrong]) for v in (data.length, data.pressure, force)),
             rest_length=REST,
         )
         predicted = float(fit_muscle(others, muscle()).predict(2e5, length=data.length[17]))
@@ -183,7 +188,10 @@ def test_scatter_that_grows_with_the_force_names_no_point(share):
         data = measure(muscle())
         noise = share * np.random.default_rng(seed).standard_normal(len(data.force))
         map_ = ForceMap.from_arrays(
-            data.length, data.pressure, data.force * (1.0 + noise), rest_length=REST
+            length=data.length,
+            pressure=data.pressure,
+            force=data.force * (1.0 + noise),
+            rest_length=REST,
         )
         found += bool(noted(fit_muscle(map_, muscle()), "their scatter"))
     assert found <= 2
@@ -196,13 +204,13 @@ def test_exchanged_directions_are_asked_about():
         np.concatenate([getattr(m, name) for m in maps]) for name in ("length", "pressure", "force")
     ]
     way = np.concatenate([np.ones(len(maps[0])), -np.ones(len(maps[1]))])
-    data = ForceMap.from_arrays(*columns, rest_length=REST, direction=way)
+    data = ForceMap.from_arrays(**named(columns), rest_length=REST, direction=way)
     assert noted(fit_muscle(data, muscle()), "are the directions exchanged?")
     assert any("are the directions exchanged?" in issue for issue in fit_friction(data).issues)
     one = ForceMap.from_arrays(
-        maps[0].length,
-        maps[0].pressure,
-        maps[0].force,
+        length=maps[0].length,
+        pressure=maps[0].pressure,
+        force=maps[0].force,
         rest_length=REST,
         direction=-np.ones(len(maps[0])),
     )
@@ -220,7 +228,9 @@ def test_loops_without_friction_do_not_tell_any():
             for name in ("length", "pressure", "force")
         ]
         way = np.concatenate([-np.ones(len(maps[0])), np.ones(len(maps[1]))])
-        told += fit_friction(ForceMap.from_arrays(*columns, rest_length=REST, direction=way)).told
+        told += fit_friction(
+            ForceMap.from_arrays(**named(columns), rest_length=REST, direction=way)
+        ).told
     assert told <= 1
 
 
@@ -268,14 +278,15 @@ def test_hysteresis_of_a_muscle_without_friction_is_named():
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("length", "pressure", "force", "direction")
     ]
-    loops = ForceMap.from_arrays(*columns[:3], rest_length=REST, direction=columns[3])
+    loops = ForceMap.from_arrays(**named(columns[:3]), rest_length=REST, direction=columns[3])
     (note,) = noted(fit_muscle(loops, muscle()), "the muscle has no friction")
     assert "differ by +- 4 %" in note
     assert not noted(fit_muscle(loops, rubbing), "no friction")
     assert not noted(fit_muscle(loops, muscle(), direction=None), "no friction")
     still = ForceMap.from_arrays(
-        *columns[:2],
-        np.tile(measure(muscle(), noise=3.0).force, 2),
+        length=columns[0],
+        pressure=columns[1],
+        force=np.tile(measure(muscle(), noise=3.0).force, 2),
         rest_length=REST,
         direction=columns[3],
     )
@@ -299,7 +310,10 @@ def test_rest_lengths_must_agree():
 def test_a_map_without_pull_is_refused():
     data = measure(muscle())
     pushed = ForceMap.from_arrays(
-        data.length, data.pressure, -np.abs(data.force) - 1.0, rest_length=REST
+        length=data.length,
+        pressure=data.pressure,
+        force=-np.abs(data.force) - 1.0,
+        rest_length=REST,
     )
     with pytest.raises(FitError, match="pulling force is needed"):
         fit_muscle(pushed, muscle())

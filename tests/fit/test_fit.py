@@ -85,7 +85,10 @@ def test_standard_errors_by_level_see_errors_that_a_level_shares():
             modulus_scale=0.0
         ).force(data.pressure, data.contraction)
         crept = ForceMap.from_arrays(
-            data.length, data.pressure, data.force + stiffer * elastic, rest_length=REST
+            length=data.length,
+            pressure=data.pressure,
+            force=data.force + stiffer * elastic,
+            rest_length=REST,
         )
         fit = fit_muscle(crept, real)
         assert fit.errors == "level"
@@ -135,7 +138,11 @@ def test_names_tell_the_pressure_of_each_level_apart():
         grid.ravel() for grid in np.meshgrid([2e5, 2.0004e5, 343.75e3], CONTRACTIONS, indexing="ij")
     )
     data = ForceMap.from_arrays(
-        REST * (1.0 - e), p, real.force(p, e), rest_length=REST, level_tolerance=10.0
+        length=REST * (1.0 - e),
+        pressure=p,
+        force=real.force(p, e),
+        rest_length=REST,
+        level_tolerance=10.0,
     )
     assert list(fit_muscle(data, real, moduli="per_level").params) == [
         "E1_200kPa",
@@ -181,7 +188,9 @@ def test_a_level_has_its_own_moduli_whatever_the_other_levels_say():
 
     def moduli(other):
         changed = np.where(nominal == PRESSURES[0], force, other * force)
-        data = ForceMap.from_arrays(REST * (1.0 - contraction), pressure, changed, rest_length=REST)
+        data = ForceMap.from_arrays(
+            length=REST * (1.0 - contraction), pressure=pressure, force=changed, rest_length=REST
+        )
         return fit_muscle(data, real, moduli="per_level").moduli()[1]
 
     np.testing.assert_allclose(moduli(1.5)[0], moduli(1.0)[0], rtol=1e-9)
@@ -235,9 +244,9 @@ def with_level_at_zero(force):
     length = REST * (1.0 - CONTRACTIONS)
     pull = force * np.cos(np.arange(len(length)))
     return ForceMap.from_arrays(
-        np.append(data.length, length),
-        np.append(data.pressure, np.zeros(len(length))),
-        np.append(data.force, pull),
+        length=np.append(data.length, length),
+        pressure=np.append(data.pressure, np.zeros(len(length))),
+        force=np.append(data.force, pull),
         rest_length=REST,
     )
 
@@ -346,9 +355,9 @@ def test_elbow_model_has_a_branch_for_lengthening():
         assert fit.params["bladder_modulus"].value == pytest.approx(8e5, rel=1e-8)
     up, unknown = measure(real, direction=1), measure(real)
     both = ForceMap.from_arrays(
-        np.append(up.length, unknown.length),
-        np.append(up.pressure, unknown.pressure),
-        np.append(up.force, unknown.force),
+        length=np.append(up.length, unknown.length),
+        pressure=np.append(up.pressure, unknown.pressure),
+        force=np.append(up.force, unknown.force),
         rest_length=REST,
         direction=np.append(up.direction, unknown.direction),
     )
@@ -433,7 +442,9 @@ def test_fit_becomes_a_rig():
     shoulder = rigs.shoulder()
     real = shoulder.muscle
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), PRESSURES))
-    data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
+    data = ForceMap.from_arrays(
+        length=0.276 * (1.0 - e), pressure=p, force=real.force(p, e), rest_length=0.276
+    )
     rig = fit_muscle(data, real, order=2).to_rig(shoulder)
     assert rig.blocks == shoulder.blocks
     assert rig.model["muscle"]["count"] == 6
@@ -509,7 +520,9 @@ def test_a_rig_keeps_the_tolerances_of_what_the_fit_did_not_change():
     shoulder = rigs.shoulder()
     real = shoulder.muscle
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 9), PRESSURES))
-    data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
+    data = ForceMap.from_arrays(
+        length=0.276 * (1.0 - e), pressure=p, force=real.force(p, e), rest_length=0.276
+    )
     nominal = real.replace(
         friction_coefficient=0.5 * real.parameters["friction_coefficient"] + 0.01
     )

@@ -63,7 +63,9 @@ def fitted(pressure, contraction, force, direction=None, **options):
     """The friction of a map of loops."""
     length = REST * (1.0 - np.asarray(contraction))
     made = {"rest_length": REST, "direction": direction, "check_duplicates": False}
-    return fit_friction(ForceMap.from_arrays(length, pressure, force, **made), **options)
+    return fit_friction(
+        ForceMap.from_arrays(length=length, pressure=pressure, force=force, **made), **options
+    )
 
 
 def test_exact_loops_give_the_coefficients_back():
@@ -153,9 +155,9 @@ def test_force_map_with_rows_of_unknown_direction():
     force = made["force"].copy()
     force[20] = np.nan
     data = ForceMap.from_arrays(
-        REST * (1.0 - made["contraction"]),
-        made["pressure"],
-        force,
+        length=REST * (1.0 - made["contraction"]),
+        pressure=made["pressure"],
+        force=force,
         rest_length=REST,
         direction=way,
         check_duplicates=False,

@@ -39,7 +39,9 @@ def rows(noise: float = 0.0, half_width: float = 0.0, seed: int = 0) -> ForceMap
     way = np.tile(np.repeat([-1.0, 1.0], 60), len(LEVELS))
     p = np.repeat(LEVELS, 120)
     force = law(p, e) + way * half_width + noise * rng.normal(size=len(p))
-    return ForceMap.from_arrays(0.25 * (1.0 - e), p, force, rest_length=0.25, direction=way)
+    return ForceMap.from_arrays(
+        length=0.25 * (1.0 - e), pressure=p, force=force, rest_length=0.25, direction=way
+    )
 
 
 def reference(p_axis: Any, e_axis: Any, force: Any, p: float, e: float) -> float:
@@ -196,7 +198,10 @@ def test_measured_rows_become_a_monotone_table_with_their_scatter() -> None:
     whole = rows(noise=4.0, half_width=6.0)
     order = np.random.default_rng(9).permutation(len(whole.force))
     mixed = ForceMap.from_arrays(
-        whole.length[order], whole.pressure[order], whole.force[order], rest_length=0.25
+        length=whole.length[order],
+        pressure=whole.pressure[order],
+        force=whole.force[order],
+        rest_length=0.25,
     )
     alike = fit_map(mixed)  # nobody knows which branch a row is of
     assert alike.scatter == pytest.approx(np.hypot(4.0, 6.0), rel=0.12)
@@ -219,7 +224,10 @@ def test_corners_that_nobody_measured_are_said_and_go_on() -> None:
     data = rows(noise=1.0)
     keep = ~((data.pressure < 1.5e5) & (data.contraction > 0.12)) & (data.pressure > 0.0)
     cut = ForceMap.from_arrays(
-        data.length[keep], data.pressure[keep], data.force[keep], rest_length=0.25
+        length=data.length[keep],
+        pressure=data.pressure[keep],
+        force=data.force[keep],
+        rest_length=0.25,
     )
     fit = fit_map(cut)
     text = fit.fit_report()

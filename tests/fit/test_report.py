@@ -12,6 +12,7 @@ from pamrs.fit import ForceMap, compare_models, fit_muscle
 from pamrs.fit import report as pages
 from pamrs.fit.remarks import headline, limits, meaning, percent, residual_pattern
 from pamrs.rig import Muscle
+from tests.fit.cases import named
 from tests.tables import rows_of
 
 REST = 0.3
@@ -48,7 +49,12 @@ def data(muscle):
     force = muscle.force(p, e) + np.random.default_rng(5).normal(scale=1.0, size=e.size)
     force[[3, 17]] = np.nan
     return ForceMap.from_arrays(
-        REST * (1 - e), p, force, rest_length=REST, name="bench 7", source="bench.csv"
+        length=REST * (1 - e),
+        pressure=p,
+        force=force,
+        rest_length=REST,
+        name="bench 7",
+        source="bench.csv",
     )
 
 
@@ -137,7 +143,11 @@ def test_every_kind_of_fit_has_a_page(data, muscle, options):
 def test_text_from_files_is_escaped(muscle):
     e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS))
     evil = ForceMap.from_arrays(
-        REST * (1 - e), p, muscle.force(p, e), rest_length=REST, name="<b>x</b>"
+        length=REST * (1 - e),
+        pressure=p,
+        force=muscle.force(p, e),
+        rest_length=REST,
+        name="<b>x</b>",
     )
     page = pages.render_html(fit_muscle(evil, muscle), command="<script>")
     assert "<b>x</b>" not in page
@@ -150,7 +160,11 @@ def test_directions_draw_both_branches(muscle):
         grid.ravel() for grid in np.meshgrid(np.linspace(0.01, 0.19, 5), LEVELS, [-1.0, 1.0])
     )
     loop = ForceMap.from_arrays(
-        REST * (1 - e), p, rubbing.force(p, e, direction=d), rest_length=REST, direction=d
+        length=REST * (1 - e),
+        pressure=p,
+        force=rubbing.force(p, e, direction=d),
+        rest_length=REST,
+        direction=d,
     )
     page = pages.render_html(fit_muscle(loop, rubbing))
     assert "model, contracting" in page
@@ -293,7 +307,10 @@ def loops(muscle, tmp_path_factory):
     force = rubbing.force(p, e, direction=d) + np.random.default_rng(2).normal(size=e.size)
     path = tmp_path_factory.mktemp("loops") / "loops.csv"
     return write(
-        path, ForceMap.from_arrays(REST * (1 - e), p, force, rest_length=REST, direction=d)
+        path,
+        ForceMap.from_arrays(
+            length=REST * (1 - e), pressure=p, force=force, rest_length=REST, direction=d
+        ),
     )
 
 
@@ -385,7 +402,9 @@ def test_the_fitted_muscle_goes_into_the_rig_that_it_is_of(capsys, tmp_path):
     )
     path = write(
         tmp_path / "map.csv",
-        ForceMap.from_arrays(0.276 * (1 - e), p, stiffer.force(p, e), rest_length=0.276),
+        ForceMap.from_arrays(
+            length=0.276 * (1 - e), pressure=p, force=stiffer.force(p, e), rest_length=0.276
+        ),
     )
     code, _, err = run(capsys, path, "--muscle", source, "--rig", tmp_path / "fitted.toml")
     assert code == 0
@@ -417,7 +436,7 @@ def test_a_level_at_rest_has_a_page_and_pictures(capsys, data, tmp_path):
         np.append(data.pressure, 0 * e),
         np.append(data.force, -0.5 * np.cos(9 * e)),
     ]
-    path = write(tmp_path / "rest.csv", ForceMap.from_arrays(*columns, rest_length=REST))
+    path = write(tmp_path / "rest.csv", ForceMap.from_arrays(**named(columns), rest_length=REST))
     for levels in ([], ["--levels", "100kPa,300kPa,600kPa"]):
         files = [tmp_path / name for name in ("x.html", "x.png", "x.json")]
         outputs = ["--report", files[0], "--png", files[1], "--json", files[2]]

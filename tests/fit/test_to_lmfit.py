@@ -26,7 +26,7 @@ def fit() -> Any:
     noise = np.random.default_rng(3).normal(0.0, 4.0, pressure.size)
     force = MUSCLE.force(pressure, shortened) + noise
     data = pamrs.fit.ForceMap.from_arrays(
-        (1.0 - shortened) * rest, pressure, force, rest_length=rest
+        length=(1.0 - shortened) * rest, pressure=pressure, force=force, rest_length=rest
     )
     return pamrs.fit.fit_muscle(data, MUSCLE, order=2)
 

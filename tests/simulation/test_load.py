@@ -67,7 +67,9 @@ def test_steps_on_the_frame_are_the_run() -> None:
 def test_a_fitted_muscle_goes_onto_the_bench_and_back() -> None:
     real = muscle().replace(friction_coefficient=0.0)
     p, e = (grid.ravel() for grid in np.meshgrid([2e5, 4e5, 6e5], np.linspace(0.0, 0.25, 8)))
-    data = ForceMap.from_arrays(0.276 * (1.0 - e), p, real.force(p, e), rest_length=0.276)
+    data = ForceMap.from_arrays(
+        length=0.276 * (1.0 - e), pressure=p, force=real.force(p, e), rest_length=0.276
+    )
     rig = parse_rig(fit_muscle(data, real, order=2).to_rig().to_toml_text())
     length = np.linspace(0.276, 0.21, 50)
     run = pamrs.simulate(rig, sample_time=0.01, length=length, pressure=np.full(50, 3e5))

@@ -232,6 +232,16 @@ def gain_map(
     ------
     ParameterError
         As :func:`pamrs.control.sweep`, if an axis is empty, or every run of a payload failed.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> from pamrs.control import PID, trajectories
+    >>> lift = trajectories.lift_hold_return(*trajectories.degrees(20, 60))
+    >>> gains = {"kp": [0.5, 1.0, 1.5], "ki": [8.0, 10.0, 12.0]}
+    >>> (best,) = gain_map(pamrs.rigs.shoulder(), PID, gains, lift).best("rms")
+    >>> best["kp"], best["ki"], round(best["rms"], 3)  # inside the map, not on its border
+    (1.0, 10.0, 0.052)
     """
     grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
     if not grid:

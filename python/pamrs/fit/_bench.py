@@ -52,7 +52,9 @@ def from_recording(
             f"{', '.join(recording.channels)}"
         )
     return ForceMap.from_arrays(
-        *(recording.channels[channel] for channel in needed),
+        length=recording.channels["length"],
+        pressure=recording.channels[pressure],
+        force=recording.channels["force"],
         rest_length=rest_length,
         direction=series_ways(
             recording.channels["length"], recording.channels[pressure], rest_length

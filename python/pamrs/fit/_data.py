@@ -112,10 +112,10 @@ class ForceMap:
     @quantities
     def from_arrays(
         cls,
-        length: ArrayLike,
-        pressure: ArrayLike,
-        force: ArrayLike,
         *,
+        pressure: ArrayLike,
+        length: ArrayLike,
+        force: ArrayLike,
         rest_length: float,
         direction: ArrayLike | None = None,
         clipped: float | None = None,
@@ -132,8 +132,8 @@ class ForceMap:
 
         Parameters
         ----------
-        length, pressure, force : (n,) array_like
-            Length [m], gauge pressure [Pa], force [N]; NaN where there is no value.
+        pressure, length, force : (n,) array_like
+            Gauge pressure [Pa], length [m], force [N]; NaN where there is no value.
         rest_length : float
             Length at zero contraction [m].
         direction : (n,) array_like, optional

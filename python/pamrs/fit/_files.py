@@ -140,9 +140,9 @@ def read_map(
         notes += _narrow(contraction, found["contraction"])
         values["length"] = rest_length * (1.0 - contraction)
     return ForceMap.from_arrays(
-        values["length"],
-        values["pressure"],
-        values["force"],
+        length=values["length"],
+        pressure=values["pressure"],
+        force=values["force"],
         rest_length=rest_length,
         direction=values.get("direction"),
         **levels,

@@ -154,7 +154,8 @@ def fit_muscle(
     >>> from pamrs.fit import ForceMap, fit_muscle
     >>> muscle = pamrs.rigs.shoulder().muscle
     >>> e, p = (grid.ravel() for grid in np.meshgrid(np.linspace(0.0, 0.25, 8), [2e5, 4e5, 6e5]))
-    >>> data = ForceMap.from_arrays(0.276 * (1 - e), p, muscle.force(p, e), rest_length=0.276)
+    >>> force, length = muscle.force(p, e), 0.276 * (1 - e)
+    >>> data = ForceMap.from_arrays(pressure=p, length=length, force=force, rest_length=0.276)
     >>> fit = fit_muscle(data, muscle, order=2)
     >>> fit.x.round(4)[:2].tolist()
     [3.0, -0.35]

@@ -90,6 +90,8 @@ class Muscle:
     >>> muscle = pamrs.rigs.shoulder().muscle
     >>> muscle.force(4e5, [0.0, 0.1]).round(1)
     array([3351. , 1289.6])
+    >>> muscle.force(4e5, length=[0.276, 0.2484]).round(1)
+    array([3351. , 1289.6])
     >>> muscle.replace(model="gaylord").force(4e5, [0.1]).round(1)
     array([3100.6])
     """

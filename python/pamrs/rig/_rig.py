@@ -82,6 +82,16 @@ class Rig(View):
         The rig's name.
     source : str
         Where it was read from, for messages.
+
+    Examples
+    --------
+    >>> import pamrs
+    >>> rig = pamrs.rigs.shoulder()
+    >>> rig.wiring[0]
+    'air: supply -> valve -> chamber -> ambient'
+    >>> heavy = rig.with_parameters({"arm.payload": 12.0})
+    >>> heavy.parameter("arm.payload").value, heavy == rig
+    (12.0, False)
     """
 
     name: str
