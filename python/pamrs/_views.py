@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import html
 import io
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final, TypeAlias
@@ -63,13 +64,19 @@ class View:
         Raises
         ------
         ParameterError
-            If there is no such panel or none at all, or more Axes than panels.
+            If there is no such panel or none at all, `ax` is a file, or there are more Axes than
+            panels.
         """
         panels = self._panels()
         names = list(panels) if what is None else [what] if isinstance(what, str) else list(what)
         for name in names:
             if name not in panels:
                 raise ParameterError(f"what = {name!r} is not allowed; {meant(name, panels)}")
+        if isinstance(ax, (str, os.PathLike)):
+            raise ParameterError(
+                f"ax = {os.fspath(ax)!r} is not allowed: Axes of matplotlib are needed, whose "
+                "figure writes a file (savefig)"
+            )
         if not names:
             raise ParameterError(f"there is nothing to draw in {self!r}")
         if ax is None:

@@ -140,6 +140,8 @@ def test_panels_by_name_and_on_axes_of_ones_own() -> None:
     empty = pamrs.simulate_batch(RIG, 5.6, sample_time=5e-3, duration=0.1, n=2)
     with pytest.raises(ParameterError, match="there is nothing to draw in BatchRun"):
         empty.plot()
+    with pytest.raises(ParameterError, match=r"ax = 'run\.png' is not allowed"):
+        run.plot("run.png")
     with pytest.raises(ParameterError, match="ax has 3 Axes"):
         run.plot(Figure().subplots(3), what=["joint_angle"])
 

@@ -222,6 +222,18 @@ class Clock:
         return self.now
 
 
+def test_whoever_asks_gets_lines_with_share_and_time_left(capsys):
+    clock, heard = Clock(), []
+    progress = Progress("out.zarr", runs=100, chunks=4, shown=heard.append, clock=clock)
+    clock.now = 20.0
+    progress.add(25, 0)
+    clock.now = 80.0
+    progress.add(75, 0)
+    assert capsys.readouterr().err == ""
+    assert [(line.share, line.left) for line in heard] == [(0.25, 60.0), (1.0, 0.0)]
+    assert heard[0].startswith("sweep out.zarr: 1 of 4 chunks")
+
+
 def test_progress_says_how_long_it_will_take(capsys):
     clock = Clock()
     progress = Progress("out.zarr", runs=1000, chunks=10, done=200, chunks_done=2, clock=clock)
