@@ -35,6 +35,7 @@ __all__ = [
     "quantities",
     "rising",
     "whole",
+    "without_units",
 ]
 
 Given = ParamSpec("Given")
@@ -74,6 +75,7 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
     """
     import numpy as np
 
+    without_units(name, values)
     size = getattr(values, "size", 0)  # an array that repeats one number is larger than it looks
     if isinstance(size, int) and size > most:
         raise ParameterError(f"{name} has {size} numbers, which is not allowed: at most {most} are")
@@ -83,6 +85,14 @@ def as_numbers(name: str, values: Any, most: int) -> NDArray[np.float64]:
         raise ParameterError(
             f"{name} = {as_said(values)} is not allowed: numbers are needed"
         ) from None
+
+
+def without_units(name: str, values: Any) -> None:
+    """Refuse quantities of pint where units are not converted: arrays would lose theirs."""
+    if _with_units(values):
+        raise ParameterError(
+            f"{name} = {as_said(values)} is not allowed: plain numbers are needed here, in SI units"
+        )
 
 
 def is_quantity(value: Any) -> bool:
@@ -107,6 +117,8 @@ def plain(name: str, value: Any, unit: str) -> Any:
     ParameterError
         If the quantity is of another dimension.
     """
+    if isinstance(value, (list, tuple)):
+        return [plain(name, one, unit) for one in value] if _with_units(value) else value
     if not is_quantity(value):
         return value
     try:
@@ -166,6 +178,8 @@ def _with_units(value: Any) -> bool:
         return False
     if type(value) is dict:
         return any(map(_with_units, value.values()))
+    if isinstance(value, (list, tuple)):
+        return bool(value) and is_quantity(value[0])
     return hasattr(value, "magnitude")
 
 

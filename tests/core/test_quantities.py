@@ -27,6 +27,9 @@ JOINT = pamrs.Joint(kind="pulley", radius=0.03)
 LOOP = PID(1.4, 0.5, period=0.005)
 
 
+LEAK = "ml/s/bar"
+
+
 def _stepped(sample: Any, command: Any) -> float:
     plant = pamrs.Simulator(SHOULDER, sample_time=sample, initial={"joint_angle": 20 * U.deg})
     return plant.step(command)["joint_angle"]
@@ -76,6 +79,42 @@ CASES: dict[str, tuple[Callable[..., Any], tuple[Any, ...], tuple[Any, ...]]] = 
     "simulator": (_stepped, (5 * U.ms, 6000 * U.mV), (0.005, 6.0)),
     "batch": (_batch, (5 * U.ms, U.Quantity([5500.0, 6000.0], "mV")), (0.005, [5.5, 6.0])),
     "map": (_map, (1 * U.bar, 200 * U.mm), (1e5, 0.2)),
+    "volts": (
+        lambda u: pamrs.simulate(SHOULDER, u, sample_time=0.05)["joint_angle"],
+        ([5500 * U.mV, 5.6 * U.V, 5.7 * U.V],),
+        ([5.5, 5.6, 5.7],),
+    ),
+    "plants": (
+        lambda mass: pamrs.simulate_batch(
+            SHOULDER,
+            5.5,
+            sample_time=5e-3,
+            duration=0.1,
+            parameters={"arm.payload": mass},
+            reduce={"end": ("final", "joint_angle")},
+        ).reduced["end"],
+        (U.Quantity([500.0, 900.0], "g"),),
+        ([0.5, 0.9],),
+    ),
+    "moduli": (
+        lambda offset: pamrs.Muscle(
+            rest_length=0.2,
+            rest_diameter=0.02,
+            braid_angle=1.2,
+            wall_thickness=1e-3,
+            modulus_slope=[1.0],
+            modulus_offset=offset,
+        ).force(4e5, 0.1),
+        ([500 * U.kPa],),
+        ([5e5],),
+    ),
+    "effect": (
+        lambda q: SHOULDER.with_effect("leak_muscle", {"conductance": q}).effects[0]["parameters"][
+            "conductance"
+        ],
+        (U.Quantity(1.0, LEAK),),
+        (1.0 * U.Quantity(1.0, LEAK).to_base_units().magnitude,),
+    ),
     "trajectory": (
         lambda low, high: trajectories.cosine_cycles(low, high)(3.0).angle,
         (15 * U.deg, 50 * U.deg),
@@ -110,6 +149,14 @@ def test_a_quantity_is_what_it_is_in_si(name: str) -> None:
         ),
         (lambda: SHOULDER.with_parameters({"arm.payload": 3 * U.m}), "arm.payload = .* in kg"),
         (lambda: pamrs.simulate(SHOULDER, 5.0, sample_time=3 * U.m, duration=1), "sample_time = "),
+        (
+            lambda: pamrs.sweeps.Grid({"arm.payload": U.Quantity([1.0, 2.0], "kg")}),
+            "arm.payload = .* plain numbers are needed here, in SI units",
+        ),
+        (
+            lambda: pamrs.Simulator(SHOULDER, sample_time=0.01).restore([1 * U.m] * 9),
+            "state = .* plain numbers are needed here",
+        ),
     ],
 )
 def test_a_quantity_of_another_dimension_is_named(call: Callable[[], Any], said: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs import _core
-from pamrs._checks import as_numbers, check_column, one_of, quantities, whole
+from pamrs._checks import as_numbers, check_column, one_of, plain, quantities, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.simulation._batch import BatchRun, Failure
@@ -130,8 +130,13 @@ def simulate_batch(
     signals = {name: _numbers(name, values) for name, values in given.items()}
     rows = _row_count(signals, duration, sample_time)
     starts = initial_values(dict.fromkeys(initial or {}, 0.0), rig)
+    known = rig.parameters if parameters else {}
+    plants = {
+        name: plain(name, values, known[name].unit if name in known else "1")
+        for name, values in (parameters or {}).items()
+    }
     per_plant = {
-        **{name: _numbers(name, values) for name, values in (parameters or {}).items()},
+        **{name: _numbers(name, values) for name, values in plants.items()},
         **{f"initial {name}": _numbers(name, (initial or {})[name]) for name in starts},
         **{name: values[:, 0] for name, values in signals.items() if values.ndim == 2},
     }
@@ -149,7 +154,7 @@ def simulate_batch(
         prescribed(_repeated(signals, rows), begin, count),
         sample_time,
         chosen_step(sample_time, step),
-        _parameters(rig, parameters or {}, count),
+        _parameters(rig, plants, count),
         begin,
         wanted,
         every,

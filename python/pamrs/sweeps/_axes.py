@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import check_column
+from pamrs._checks import check_column, without_units
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS
 from pamrs.errors import ParameterError, meant
@@ -193,6 +193,7 @@ class Axes(ABC):
 
 
 def _column(name: str, values: ArrayLike) -> Array:
+    without_units(name, values)
     try:
         column = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
