@@ -221,6 +221,6 @@ lock:  ## pin the newest versions that pyproject.toml allows
 	rm -rf $(VENV)/lock
 
 clean:  ## remove everything that was built
-	rm -rf $(VENV) target dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) target dist out docs/reference/api .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python trial tests benchmarks demo fingerprints reproduction -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 	rm -f python/pamrs/_core*.so

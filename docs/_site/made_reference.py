@@ -8,9 +8,6 @@ import math
 import re
 from pathlib import Path
 
-from sphinx.errors import ExtensionError
-from sphinx.util.docutils import SphinxDirective
-
 
 def cell(text):
     """A text as a cell of a table; code stays as it is."""
@@ -184,6 +181,7 @@ MADE = {
 
 def directive(made):
     """A directive that puts the Markdown of a function into its page."""
+    from sphinx.util.docutils import SphinxDirective
 
     class Made(SphinxDirective):
         """Content from the package."""
@@ -198,6 +196,8 @@ def directive(made):
 
 def write_schemas(app, error):
     """The JSON schemas as files, which a page offers; and a check that no page needs a server."""
+    from sphinx.errors import ExtensionError
+
     if error is not None or app.builder.format != "html":
         return
     folder = Path(app.outdir) / "schema"
