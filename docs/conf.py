@@ -121,6 +121,14 @@ def _links_out_of_the_site(app, docname, source):
         source[0] += "\n```{toctree}\n:hidden:\n:glob:\n\n*\n```\n"
 
 
+def _public_signature(app, what, name, thing, options, signature, returned):
+    """A class that others make has no signature to show."""
+    if signature and re.search(r"[(\s]_\w", signature):
+        return "", returned
+    return None
+
+
 def setup(app):
     """Called by Sphinx."""
+    app.connect("autodoc-process-signature", _public_signature)
     app.connect("source-read", _links_out_of_the_site)

@@ -136,6 +136,9 @@ def _kind(entry, document):
         entry = document["$defs"][entry["$ref"].rpartition("/")[2]] | {
             key: value for key, value in entry.items() if key != "$ref"
         }
+    ways = [_kind(way, document)[0] for way in entry.get("anyOf", entry.get("oneOf", ()))]
+    if ways:
+        return " or ".join(dict.fromkeys(filter(None, ways))), entry
     if "enum" in entry:
         return ", ".join(f"`{word}`" for word in entry["enum"]), entry
     if "const" in entry:
@@ -155,7 +158,8 @@ def schema_keys(which):
         for key, value in entry.get("properties", {}).items():
             kind, whole = _kind(value, document)
             item = _kind(whole["items"], document)[1] if "items" in whole else whole
-            if item.get("properties") and item["properties"] not in seen:
+            told = [one for one in item.get("properties", {}).values() if "description" in one]
+            if told and item["properties"] not in seen:
                 seen.append(item["properties"])
                 inner.append((f"{name}{key}", item))
             mark = "needed" if key in needed else ""
@@ -165,6 +169,7 @@ def schema_keys(which):
             yield f"### `{path}`\n"
             yield from table_of(f"{path}.", item)
 
+    yield "### The whole file\n"
     yield from table_of("", document)
 
 
