@@ -19,7 +19,7 @@ RUST_SOURCES := $(shell find crates -name '*.rs' -path '*/src/*' 2>/dev/null) \
 CARGO := env -u MAKEFLAGS -u MFLAGS cargo
 # One by one, since cargo fmt does not see modules that a macro declares.
 RUSTFMT := find crates -name '*.rs' -print0 | xargs -0 rustfmt --edition 2021
-PYTHON_SOURCES := .ci python tests trial demo benchmarks fingerprints reproduction cases
+PYTHON_SOURCES := .ci docs/conf.py docs/_site python tests trial demo benchmarks fingerprints reproduction cases
 # Processes that pytest takes; a file of tests stays in one, so that what its tests share is computed once.
 WORKERS ?= $(shell nproc 2>/dev/null || echo 2)
 PYTEST := $(BIN)/python -m pytest -q -n $(WORKERS) --dist loadfile
@@ -48,7 +48,7 @@ export OPENBLAS_NUM_THREADS ?= 1
 
 .PHONY: FORCE help setup build demo prove test test-all checks lint lint-rust lint-python test-rust test-python \
         test-python-all wheel wheel-test snapshots hostile logs fuzz deny format bench convergence recruitment \
-        effects reproduce example golden lock clean
+        docs effects reproduce example golden lock clean
 
 help:  ## this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' $(firstword $(MAKEFILE_LIST))
@@ -73,6 +73,12 @@ $(VENV)/.installed: requirements-dev.lock | $(VENV)/.built
 $(VENV)/.bench: requirements-bench.lock $(VENV)/.installed
 	@echo "installing what requirements-bench.lock pins into $(VENV)"
 	@$(PIP_INSTALL) --requirement requirements-bench.lock --constraint requirements-dev.lock
+	@touch $@
+
+# So are the tools that make the site.
+$(VENV)/.docs: requirements-docs.lock $(VENV)/.installed
+	@echo "installing what requirements-docs.lock pins into $(VENV)"
+	@$(PIP_INSTALL) --requirement requirements-docs.lock --constraint requirements-dev.lock
 	@touch $@
 
 # Other flags are another library.
@@ -182,6 +188,12 @@ convergence: build  ## order, stability and error of every packaged rig
 recruitment: build  ## recruitment in real time against fixed recruitment, and bundles of small muscles
 	$(BIN)/python -m benchmarks.recruitment docs
 
+# A tutorial runs again where its text or the package has changed. Warnings, lost links included, are errors.
+docs: build $(VENV)/.docs  ## the site, its tutorials run, to out/site/index.html
+	@rm -rf out/site out/docs-pages docs/reference/api
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --quiet -b html -d out/docs-pages docs out/site
+	@echo "written: out/site/index.html"
+
 effects: build  ## a page of every effect of the catalogue, its fingerprint drawn by the simulator
 	$(BIN)/python -m fingerprints docs/effects
 
@@ -198,15 +210,17 @@ golden: build  ## the published golden values against this build
 lock:  ## pin the newest versions that pyproject.toml allows
 	@"$(PYTHON)" -c 'import sys; sys.exit(sys.version_info[:2] != (3, 11) and "make lock takes Python 3.11; this is " + sys.version.split()[0] + " (choose one: make lock PYTHON=path/to/python3.11)")'
 	rm -rf $(VENV)/lock && "$(PYTHON)" -m venv $(VENV)/lock
-	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; b = o.pop("bench"); w = lambda name, some: open("$(VENV)/lock/" + name, "w").write("".join(r + "\n" for r in some if not r.startswith("pamrs"))); w("wanted.txt", p["dependencies"] + sum(o.values(), [])); w("bench.txt", b)'
+	$(VENV)/lock/bin/python -c 'import tomllib; p = tomllib.load(open("pyproject.toml", "rb"))["project"]; o = p["optional-dependencies"]; b, d = o.pop("bench"), o.pop("docs"); w = lambda name, some: open("$(VENV)/lock/" + name, "w").write("".join(r + "\n" for r in some if not r.startswith("pamrs"))); w("wanted.txt", p["dependencies"] + sum(o.values(), [])); w("bench.txt", b); w("docs.txt", d)'
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/wanted.txt
 	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/dev.lock
+	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/docs.txt --constraint $(VENV)/lock/dev.lock
+	{ head -1 requirements-docs.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock; } > $(VENV)/lock/docs.lock
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/bench.txt --constraint $(VENV)/lock/dev.lock
-	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock; } > $(VENV)/lock/bench.lock
-	mv $(VENV)/lock/dev.lock requirements-dev.lock && mv $(VENV)/lock/bench.lock requirements-bench.lock
+	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock -f $(VENV)/lock/docs.lock; } > $(VENV)/lock/bench.lock
+	mv $(VENV)/lock/dev.lock requirements-dev.lock && mv $(VENV)/lock/docs.lock requirements-docs.lock && mv $(VENV)/lock/bench.lock requirements-bench.lock
 	rm -rf $(VENV)/lock
 
 clean:  ## remove everything that was built
-	rm -rf $(VENV) target dist out .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) target dist out docs/reference/api .pytest_cache .mypy_cache .ruff_cache .hypothesis
 	find python trial tests benchmarks demo fingerprints reproduction -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
 	rm -f python/pamrs/_core*.so

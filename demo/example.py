@@ -1,7 +1,8 @@
 """Write the files that ``pamrs example`` copies: ``python -m demo.example FOLDER``.
 
 ``shoulder`` is a case with a leak concealed by the plant of ``make demo``, its key beside it;
-``bench`` is what docs/ten_minutes.md begins with, a force map and a log with friction of the braid.
+``bench`` is what docs/tutorials/log_to_diagnosis.md begins with, a force map and a log with
+friction of the braid.
 """
 
 import re
@@ -84,8 +85,8 @@ def write_log(path: Path, rig: pamrs.Rig, rng: np.random.Generator) -> None:
 def write_bench(folder: Path) -> None:
     """The rig file of the page, a force map and a log."""
     folder.mkdir()
-    page = (ROOT / "docs" / "ten_minutes.md").read_text(encoding="utf-8")
-    rig_file = re.search(r"^```toml\n(# rig\.toml\n.*?)^```$", page, re.M | re.S)
+    page = (ROOT / "docs/tutorials/log_to_diagnosis.md").read_text(encoding="utf-8")
+    rig_file = re.search(r"^%%writefile rig\.toml\n(# rig\.toml\n.*?)^```$", page, re.M | re.S)
     assert rig_file is not None
     (folder / "rig.toml").write_text(rig_file[1], encoding="utf-8")
     rig, rng = stand(), np.random.default_rng(11)

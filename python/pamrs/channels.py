@@ -22,6 +22,7 @@ __all__ = [
     "dotted",
     "laboratory_unit",
     "rate_of",
+    "read_in",
     "recorded_as",
     "unit_of",
     "with_trait",
@@ -256,6 +257,22 @@ _LABORATORY: Final = {
 }
 
 
+def read_in(unit: str) -> tuple[str, float]:
+    """The unit that people read a quantity in, and the factor from SI.
+
+    Parameters
+    ----------
+    unit : str
+        Its SI unit.
+
+    Returns
+    -------
+    tuple of (str, float)
+        bar, deg, mm, their rates; SI for all others.
+    """
+    return _LABORATORY.get(unit, (unit, 1.0))
+
+
 def laboratory_unit(name: str) -> tuple[str, float]:
     """The unit that people read a channel in, and the factor from SI.
 
@@ -269,5 +286,4 @@ def laboratory_unit(name: str) -> tuple[str, float]:
     tuple of (str, float)
         bar, deg, mm, their rates; SI for all others.
     """
-    unit = unit_of(name)
-    return _LABORATORY.get(unit, (unit, 1.0))
+    return read_in(unit_of(name))

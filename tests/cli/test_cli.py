@@ -150,7 +150,10 @@ class FakeDiagnosis:
         return "verdict: none"
 
     def to_json(self, path=None):
-        Path(path).write_text(json.dumps({"verdict": "none"}), encoding="utf-8")
+        text = json.dumps({"verdict": "none"})
+        if path is not None:
+            Path(path).write_text(text, encoding="utf-8")
+        return text
 
     def report(self, path):
         Path(path).write_text("<html>", encoding="utf-8")
@@ -181,6 +184,8 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
         assert str(path) in err
     commands = paths["experiment"].read_text(encoding="utf-8").splitlines()
     assert commands == ["time [s],valve_command [V]", "0,5", "0.1,5", "0.2,5"]
+    code, out, err = run(capsys, "diagnose", tmp_path, "--json", "-", "--quiet")
+    assert (code, json.loads(out), err) == (0, {"verdict": "none"}, "")
     # where there is nothing to play, that is said in the place of a file
     monkeypatch.setattr(FakeDiagnosis.next_experiment, "protocol", None)
     absent = tmp_path / "absent.csv"

@@ -151,15 +151,18 @@ def pinned(lock):
 def test_locks_pin_every_dependency():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     extras = dict(project["optional-dependencies"])
-    peers = extras.pop("bench")
+    apart = {name: extras.pop(name) for name in ("bench", "docs")}
 
     def names(wanted):
         return {plain(re.split(r"[\s<>=!~\[;]", requirement)[0]) for requirement in wanted}
 
     wanted = [*project["dependencies"], *chain.from_iterable(extras.values())]
     assert names(wanted) - {"pamrs"} <= pinned("requirements-dev.lock")
-    assert names(peers) <= pinned("requirements-bench.lock")
-    assert not pinned("requirements-dev.lock") & pinned("requirements-bench.lock")
+    taken = pinned("requirements-dev.lock")
+    for name, peers in apart.items():
+        assert names(peers) <= pinned(f"requirements-{name}.lock")
+        assert not taken & pinned(f"requirements-{name}.lock")
+        taken |= pinned(f"requirements-{name}.lock")
 
 
 def test_locks_are_what_pyproject_allows():
@@ -167,7 +170,7 @@ def test_locks_are_what_pyproject_allows():
     requirements = pytest.importorskip("packaging.requirements")
     with (ROOT / "pyproject.toml").open("rb") as file:
         project = tomllib.load(file)["project"]
-    files = [ROOT / f"requirements-{name}.lock" for name in ("dev", "bench")]
+    files = [ROOT / f"requirements-{name}.lock" for name in ("dev", "bench", "docs")]
     lines = [file.read_text(encoding="utf-8").splitlines() for file in files]
     oldest = project["requires-python"].removeprefix(">=")
     for head, *_ in lines:

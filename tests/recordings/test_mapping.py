@@ -397,8 +397,8 @@ def test_a_bag_in_a_case(tmp_path: Path) -> None:
 
 
 def test_the_example_of_the_page(tmp_path: Path) -> None:
-    """``docs/logs.md``: three lifts in one log, the encoder 40 ms behind, the tank on change."""
-    page = (Path(__file__).parents[2] / "docs" / "logs.md").read_text(encoding="utf-8")
+    """``docs/logs_mapping.md``: three lifts in one log, the encoder late, the tank on change."""
+    page = (Path(__file__).parents[2] / "docs" / "logs_mapping.md").read_text(encoding="utf-8")
     toml = page.split("```toml\n")[1].split("```")[0]
     data = signals()
     time = np.concatenate([data["t"] + 10.0 * k for k in range(3)])

@@ -17,11 +17,11 @@ from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 from tests.tables import text_of
 
-DOCS = Path(__file__).parents[2] / "docs" / "rigs.md"
+DOCS = Path(__file__).parents[2] / "docs" / "rigs" / "valves.md"
 
 
 def documented(title: str) -> str:
-    """The rig of a heading of docs/rigs.md: its only block with a name."""
+    """The rig of a heading of docs/rigs/valves.md: its only block with a name."""
     part = DOCS.read_text().split(f"## {title}\n")[1].split("\n## ")[0]
     blocks = re.findall(r"```toml\n(.*?)```", part, re.DOTALL)
     (text,) = [block for block in blocks if block.startswith("schema")]

@@ -11,13 +11,16 @@ needs it, so that ``pamrs --help`` answers at once.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from typing import Annotated, Final
 
 import typer
 
+from pamrs.cli._quiet import with_quiet
 from pamrs.cli._streams import guarded
+from pamrs.cli.completion import VARIABLE, completion_command
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
@@ -59,6 +62,7 @@ app = typer.Typer(
 app.add_typer(rig_app, name="rig")
 app.add_typer(fit_app, name="fit")
 app.add_typer(design_app, name="design")
+app.command("completion")(completion_command)
 app.command("simulate")(simulate_command)
 app.command("effects")(effects_command)
 app.command("example")(example_command)
@@ -70,6 +74,9 @@ app.command("replay")(replay_command)
 app.command("schema")(schema_command)
 app.command("size")(size_command)
 app.command("diagnose")(diagnose_command)
+for _group in (app, rig_app, fit_app, design_app):
+    for _command in _group.registered_commands:
+        _command.callback = _command.callback and with_quiet(_command.callback)
 
 
 def _print_version(wanted: bool) -> None:
@@ -138,8 +145,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(words: list[str]) -> int:
-    """Run a command; the exit code."""
+    """Run a command, or say to a shell how it may go on; the exit code."""
     command = typer.main.get_command(app)
+    if VARIABLE in os.environ:
+        from typer._completion_classes import completion_init
+
+        completion_init()
     try:
         code = command.main(args=words, prog_name="pamrs", standalone_mode=False)
         if code == _TYPER_INTERRUPTED:

@@ -1,5 +1,5 @@
 """What the commands of ``pamrs`` share: numbers with units, muscles by name, files to write,
-progress.
+progress, silence.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
@@ -29,13 +30,18 @@ if TYPE_CHECKING:
 __all__ = [
     "GEOMETRY",
     "QUANTITY",
+    "QUIET",
+    "STDOUT",
     "Contents",
     "as_given",
     "check_new",
     "check_writable",
     "document",
     "exact",
+    "file_of",
+    "json_help",
     "named_muscle",
+    "note",
     "progress",
     "quantity",
     "rig_named",
@@ -56,6 +62,26 @@ GEOMETRY: Final = {
     "braid_angle": "angle",
     "wall_thickness": "length",
 }
+#: Whether notes and progress are left out, by ``--quiet``.
+QUIET: Final = ContextVar("QUIET", default=False)
+#: What ``--json -`` names.
+STDOUT: Final = Path("-")
+
+
+def note(text: str) -> None:
+    """Say something on standard error that is no warning, unless ``--quiet`` is given."""
+    if not QUIET.get():
+        typer.echo(text, err=True)
+
+
+def file_of(path: Path | None) -> Path | None:
+    """The file that a path names; none where it is standard output."""
+    return None if path == STDOUT else path
+
+
+def json_help(schema: str) -> str:
+    """What ``--json`` of a command does."""
+    return f"Write the result (schema {schema}); -: to standard output, with nothing else on it."
 
 
 def check_new(path: Path) -> None:
@@ -180,6 +206,8 @@ def write(contents: Contents, told: str = "") -> None:
     """Write every file that is wanted and say so, then print what was found; a file that fails does
     not keep the others, or the text, from coming.
 
+    Text for :data:`STDOUT` goes there alone; what was found is then a note on standard error.
+
     Parameters
     ----------
     contents : dict of Path or None to str, bytes or callable
@@ -202,6 +230,9 @@ def write(contents: Contents, told: str = "") -> None:
     for path, content in contents.items():
         if path is None:
             continue
+        if path == STDOUT and isinstance(content, str):
+            typer.echo(content, nl=False)
+            continue
         try:
             if callable(content):
                 content(path)
@@ -213,8 +244,10 @@ def write(contents: Contents, told: str = "") -> None:
             why = getattr(error, "strerror", None) or str(error) or type(error).__name__
             failed.append(f"{path} ({why})")
         else:
-            typer.echo(f"written: {path}", err=True)
-    if told:
+            note(f"written: {path}")
+    if told and isinstance(contents.get(STDOUT), str):
+        note(told.removesuffix("\n"))
+    elif told:
         typer.echo(told.removesuffix("\n"))
     if refused is not None:
         raise refused
@@ -226,15 +259,18 @@ def write(contents: Contents, told: str = "") -> None:
 def progress(text: str) -> Iterator[Callable[[str], None]]:
     """Say on standard error what is going on, with a clock where a person is looking; what it gives
     takes lines, which are shown there with percent and time left.
+
+    With ``NO_COLOR`` or ``TERM=dumb`` in the environment a terminal gets plain lines.
     """
     started, text = time.perf_counter(), shown(text)
-    if sys.stderr.isatty():
+    plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
+    if sys.stderr.isatty() and not plain and not QUIET.get():
         from rich.console import Console
         from rich.text import Text
 
         with Console(file=terminal()).status(Text(text)) as status:
             yield lambda line: status.update(Text(shown(getattr(line, "whole", line))))
     else:
-        typer.echo(f"{text} ...", err=True)
+        note(f"{text} ...")
         yield lambda line: None
-    typer.echo(f"{text}: done in {time.perf_counter() - started:.1f} s", err=True)
+    note(f"{text}: done in {time.perf_counter() - started:.1f} s")

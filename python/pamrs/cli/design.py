@@ -11,7 +11,16 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import Contents, check_writable, document, exact, named_muscle, write
+from pamrs.cli._shared import (
+    Contents,
+    check_writable,
+    document,
+    exact,
+    file_of,
+    json_help,
+    named_muscle,
+    write,
+)
 from pamrs.cli._streams import terminal
 
 if TYPE_CHECKING:
@@ -83,7 +92,7 @@ def _joint(
     ] = False,
     seed: Annotated[int, typer.Option(help="The same seed gives the same result.")] = 0,
     png: Annotated[Path | None, typer.Option(help="Write the picture.")] = None,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+    json: Annotated[Path | None, typer.Option(help=json_help(SCHEMA))] = None,
     rig_joint: Annotated[
         Path | None, typer.Option(help="Write the block [joint] of a rig file.")
     ] = None,
@@ -91,7 +100,7 @@ def _joint(
     """Find the four lengths of a tendon joint that give a torque over a range of angles
     (dissertation 3.5).
     """
-    check_writable(png, json, rig_joint)
+    check_writable(png, file_of(json), rig_joint)
     if method not in _METHODS:
         raise typer.BadParameter(f"--method = {method!r} is not allowed: {', '.join(_METHODS)}")
     from pamrs._writing import write_atomically

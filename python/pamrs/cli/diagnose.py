@@ -10,9 +10,12 @@ import typer
 from pamrs._files import resolved
 from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
+    STDOUT,
     Contents,
     check_writable,
     exact,
+    file_of,
+    json_help,
     progress,
     rig_named,
     write,
@@ -45,9 +48,7 @@ def diagnose_command(
         ),
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
-    json: Annotated[
-        Path | None, typer.Option(help="Write the result (schema pamrs.diagnosis/2).")
-    ] = None,
+    json: Annotated[Path | None, typer.Option(help=json_help("pamrs.diagnosis/2"))] = None,
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[
         Path | None, typer.Option(help="Write the model: the rig with what was found in it.")
@@ -104,7 +105,7 @@ def diagnose_command(
     Files are written before the verdict is printed. Exit code 0: diagnosed; 2: not diagnosed; 4:
     diagnosed, but some file or the text could not be written.
     """
-    check_writable(report, json, png, model, experiment)
+    check_writable(report, file_of(json), png, model, experiment)
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
@@ -143,7 +144,7 @@ def diagnose_command(
         )
         experiment = None
     files: Contents = {
-        json: result.to_json,
+        json: result.to_json() if json == STDOUT else result.to_json,
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
         experiment: "" if protocol is None else protocol.to_csv(),
         png: result.figure,

@@ -6,6 +6,8 @@ from typing import Annotated
 
 import typer
 
+from pamrs.cli.completion import effect_ids
+
 __all__ = ["effects_command"]
 
 
@@ -13,7 +15,9 @@ def effects_command(
     effect: Annotated[
         str | None,
         typer.Argument(
-            metavar="ID", help="An effect of the catalogue; without it, all are listed."
+            metavar="ID",
+            help="An effect of the catalogue; without it, all are listed.",
+            autocompletion=effect_ids,
         ),
     ] = None,
 ) -> None:

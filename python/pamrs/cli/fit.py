@@ -17,6 +17,8 @@ from pamrs.cli._shared import (
     Contents,
     check_writable,
     document,
+    file_of,
+    json_help,
     named_muscle,
     progress,
     quantity,
@@ -116,7 +118,7 @@ _FittedRig = Annotated[
         )
     ),
 ]
-_Result = Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")]
+_Result = Annotated[Path | None, typer.Option(help=json_help(SCHEMA))]
 
 fit_app = typer.Typer(help="Fit models to measurements.")
 
@@ -154,7 +156,7 @@ def _muscle(
     allow_outside: _Outside = False,
 ) -> None:
     """Fit a muscle's force model to measured forces over length and pressure."""
-    check_writable(report, rig, json, png)
+    check_writable(report, rig, file_of(json), png)
     if per_level and rig is not None:
         raise typer.BadParameter(
             "a rig needs moduli linear in pressure: leave out --per-level or --rig"
@@ -207,15 +209,13 @@ def _map(
         Path | None,
         typer.Option(help="Write the rig with this table as its muscle, and the table's error."),
     ] = None,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {MAP_SCHEMA}).")] = (
-        None
-    ),
+    json: Annotated[Path | None, typer.Option(help=json_help(MAP_SCHEMA))] = (None),
     allow_outside: _Outside = False,
 ) -> None:
     """Make a table of forces of measurements alone, monotone in pressure and contraction: a muscle
     that no force model has to fit. Its geometry gives the volume only.
     """
-    check_writable(rig, json)
+    check_writable(rig, file_of(json))
     inputs = _inputs(context)
     from pamrs.fit import fit_map
 
@@ -245,16 +245,14 @@ def _friction(
     where: _Where = None,
     clipped: _Clipped = None,
     floor: Annotated[float, typer.Option(help="The least that c_F becomes.")] = 0.01,
-    json: Annotated[
-        Path | None, typer.Option(help=f"Write the result (schema {FRICTION_SCHEMA}).")
-    ] = None,
+    json: Annotated[Path | None, typer.Option(help=json_help(FRICTION_SCHEMA))] = None,
     png: _Picture = None,
     allow_outside: _Outside = False,
 ) -> None:
     """Fit the friction c_F = max(c0 + c1 P, floor) of a muscle to its hysteresis loops; of its
     geometry, the rest length is enough.
     """
-    check_writable(json, png)
+    check_writable(file_of(json), png)
     map_ = _loops(context).with_directions()
     from pamrs._writing import write_atomically
     from pamrs.fit import fit_friction

@@ -8,13 +8,18 @@ from typing import Annotated
 import typer
 
 from pamrs.cli._shared import check_writable, write
+from pamrs.cli.completion import muscle_names
 
 __all__ = ["library_command"]
 
 
 def library_command(
     name: Annotated[
-        str | None, typer.Argument(help="A muscle of the library; without it, all are listed.")
+        str | None,
+        typer.Argument(
+            help="A muscle of the library; without it, all are listed.",
+            autocompletion=muscle_names,
+        ),
     ] = None,
     rig: Annotated[
         Path | None, typer.Option(help="Write a rig file: a bench with this muscle.")

@@ -7,7 +7,16 @@ from typing import Annotated, Final
 
 import typer
 
-from pamrs.cli._shared import as_given, check_writable, document, exact, rig_named, write
+from pamrs.cli._shared import (
+    as_given,
+    check_writable,
+    document,
+    exact,
+    file_of,
+    json_help,
+    rig_named,
+    write,
+)
 
 __all__ = ["lift_command"]
 
@@ -32,12 +41,12 @@ def lift_command(
         ),
     ] = None,
     png: Annotated[Path | None, typer.Option(help="Write a picture.")] = None,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+    json: Annotated[Path | None, typer.Option(help=json_help(SCHEMA))] = None,
 ) -> None:
     """Say what an arm lifts and holds at a pressure, up to which angle, and how much it could lift
     at most.
     """
-    check_writable(png, json)
+    check_writable(png, file_of(json))
     from pamrs.design import lift
     from pamrs.errors import ParameterError
 

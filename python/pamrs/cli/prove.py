@@ -7,6 +7,8 @@ from typing import Annotated, Final
 
 import typer
 
+from pamrs.cli._shared import note
+
 __all__ = ["prove_command"]
 
 INCOMPLETE: Final = 3
@@ -47,9 +49,6 @@ def prove_command(
     """
     from pamrs.diagnosis.prove import prove
 
-    def say(text: str) -> None:
-        typer.echo(text, err=True)
-
     proof = prove(
         folder,
         results=results,
@@ -57,12 +56,12 @@ def prove_command(
         limit=limit,
         fresh=fresh,
         timeout=timeout,
-        say=say,
+        say=note,
         allow_outside=allow_outside,
     )
     typer.echo(proof.table())
     for name, error in proof.failed.items():
         typer.echo(f"{name}: {error}")
-    typer.echo(f"written: {proof.results}", err=True)
+    note(f"written: {proof.results}")
     if proof.failed:
         raise typer.Exit(INCOMPLETE)

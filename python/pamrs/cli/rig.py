@@ -10,6 +10,7 @@ import typer
 from pamrs import rigs
 from pamrs._files import resolved
 from pamrs.cli._shared import check_new, rig_named
+from pamrs.cli.completion import rig_names
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -83,7 +84,11 @@ def _of_effects(rig: Rig) -> dict[str, str]:
 def _rig_new(
     file: Annotated[Path, typer.Argument(help="The file to write; it must not be there yet.")],
     like: Annotated[
-        str, typer.Option(help=f"Rig of the package to begin with: {', '.join(rigs.names())}.")
+        str,
+        typer.Option(
+            help=f"Rig of the package to begin with: {', '.join(rigs.names())}.",
+            autocompletion=rig_names,
+        ),
     ] = "shoulder",
     name: Annotated[
         str | None,

@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from pamrs.cli._shared import note
+
 __all__ = ["schema_command"]
 
 
@@ -42,4 +44,4 @@ def schema_command(
     from pamrs._writing import write_atomically
 
     write_atomically(out, text)
-    typer.echo(f"written: {out}", err=True)
+    note(f"written: {out}")

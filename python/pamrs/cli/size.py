@@ -15,6 +15,8 @@ from pamrs.cli._shared import (
     check_writable,
     document,
     exact,
+    file_of,
+    json_help,
     named_muscle,
     write,
 )
@@ -69,12 +71,12 @@ def size_command(
         typer.Option(help='Diameter kept free in the middle of the bundle, like "40 mm".'),
     ] = None,
     max_count: Annotated[int, typer.Option(help="Largest bundle considered.")] = 100,
-    json: Annotated[Path | None, typer.Option(help=f"Write the result (schema {SCHEMA}).")] = None,
+    json: Annotated[Path | None, typer.Option(help=json_help(SCHEMA))] = None,
 ) -> None:
     """Count the muscles that a force over a stroke needs, and compare candidates (dissertation
     3.2.3).
     """
-    check_writable(json)
+    check_writable(file_of(json))
     from pamrs import library
     from pamrs.design.sizing import size
 

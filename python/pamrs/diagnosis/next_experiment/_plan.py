@@ -7,6 +7,7 @@ import textwrap
 from dataclasses import dataclass, field
 from typing import Any
 
+from pamrs.channels import read_in
 from pamrs.effects import CATALOGUE, Term, find_parameter
 from pamrs.errors import ParameterError
 
@@ -271,10 +272,10 @@ class Plan:
             rivals = [
                 b if a == sight.effect else a for a, b, _ in self.pairs if sight.effect in (a, b)
             ]
-            unit = find_parameter(sight.size).unit if sight.size else ""
-            typical = f"{sight.typical:.3g}" if math.isfinite(sight.typical) else ""
+            unit, factor = read_in(find_parameter(sight.size).unit if sight.size else "")
+            typical = f"{factor * sight.typical:.3g}" if math.isfinite(sight.typical) else ""
             unit = "" if unit == "1" else unit
-            smallest = f"{sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
+            smallest = f"{factor * sight.smallest:.2g}" if math.isfinite(sight.smallest) else ""
             where = f"{sight.block or '-':<{room}}{sight.recording or '-':<{long}}"
             if sight.verdict == "not seen":
                 rivals += [

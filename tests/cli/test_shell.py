@@ -1,0 +1,112 @@
+"""What holds for every command: silence, JSON on standard output, plain terminals, completion."""
+
+import json
+import os
+import subprocess
+import sys
+from io import StringIO
+
+import pytest
+import typer
+
+from pamrs import cli, library, rigs
+from pamrs.cli import _shared
+from pamrs.effects import CATALOGUE
+
+LIFT = ["lift", "elbow", "--pressure", "8 bar"]
+
+
+def leaves(command, name="pamrs"):
+    """Every command, by what is typed."""
+    below = getattr(command, "commands", None)
+    if below is None:
+        yield name, command
+        return
+    for word, one in below.items():
+        yield from leaves(one, f"{name} {word}")
+
+
+COMMANDS = dict(leaves(typer.main.get_command(cli.app)))
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_can_be_quiet_and_says_what_its_options_are(name):
+    command = COMMANDS[name]
+    options = {option for param in command.params for option in param.opts}
+    assert {"--quiet", "-q"} <= options
+    assert command.help
+    assert not [param.name for param in command.params if not param.help and param.name != "help"]
+
+
+def test_json_goes_to_standard_output_alone(capsys, tmp_path):
+    file = tmp_path / "a.json"
+    assert cli.main([*LIFT, "--json", str(file)]) == 0
+    text = capsys.readouterr().out
+    assert cli.main([*LIFT, "--json", "-"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out) == json.loads(file.read_text(encoding="utf-8"))
+    assert said.err == text
+    assert cli.main([*LIFT, "--json", "-", "--quiet"]) == 0
+    quiet = capsys.readouterr()
+    assert (quiet.out, quiet.err) == (said.out, "")
+
+
+def test_quiet_leaves_out_notes_and_keeps_errors(capsys, tmp_path):
+    picture = tmp_path / "lift.png"
+    assert cli.main([*LIFT, "--png", str(picture), "-q"]) == 0
+    said = capsys.readouterr()
+    assert said.err == ""
+    assert "elbow" in said.out
+    assert picture.exists()
+    assert cli.main(["lift", "no_such_rig", "-q"]) == 2
+    assert "no_such_rig" in capsys.readouterr().err
+    assert cli.main([*LIFT, "--png", str(picture)]) == 0
+    assert "written: " in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "plain"), [("NO_COLOR", "1", True), ("TERM", "dumb", True), ("X", "1", False)]
+)
+def test_a_plain_terminal_gets_plain_lines(monkeypatch, name, value, plain):
+    class Terminal(StringIO):
+        def isatty(self):
+            return True
+
+    terminal = Terminal()
+    for other in ("NO_COLOR", "TERM"):
+        monkeypatch.delenv(other, raising=False)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv(name, value)
+    monkeypatch.setattr(sys, "stderr", terminal)
+    with _shared.progress("working"):
+        pass
+    assert ("\x1b" not in terminal.getvalue()) == plain
+    assert "working: done" in terminal.getvalue()
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_gets_its_script(capsys, shell):
+    assert cli.main(["completion", shell]) == 0
+    script = capsys.readouterr().out
+    assert "_PAMRS_COMPLETE" in script
+    assert f"complete_{shell}" in script
+
+
+def completions(*words):
+    """What bash offers for the last word."""
+    asked = {"COMP_WORDS": " ".join(words), "COMP_CWORD": str(len(words) - 1)}
+    done = subprocess.run(
+        [sys.executable, "-c", "import sys; from pamrs.cli import main; sys.exit(main())"],
+        env={**os.environ, **asked, "_PAMRS_COMPLETE": "complete_bash"},
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    return done.stdout.split()
+
+
+def test_commands_options_and_names_are_completed():
+    assert completions("pamrs", "dia") == ["diagnose"]
+    assert completions("pamrs", "diagnose", "--pressure") == ["--pressure-noise"]
+    assert completions("pamrs", "effects", "leak_") == [i for i in CATALOGUE if i[:5] == "leak_"]
+    assert completions("pamrs", "library", "pam_") == [n for n in library.names() if "pam_" in n]
+    offered = completions("pamrs", "rig", "new", "a.toml", "--like", "t")
+    assert offered == [name for name in rigs.names() if name.startswith("t")]
