@@ -81,7 +81,7 @@ def test_measured_channels_are_marked_and_the_located_block_is_lit() -> None:
     ]
     svg = chain_svg(found(pamrs.rigs.shoulder(), "chamber", blocks)) or ""
     assert svg.count('stroke-width="2.4"') == 1  # one frame is lit
-    assert "misses 12 × noise" in svg
+    assert "misses 6.0 × noise" in svg  # the error of the channel in the table of errors
     assert svg.count("fits to the noise") == 2
     assert "missing: muscle" in svg
     dots = re.findall(r'<circle [^>]*r="4" fill="([^"]+)"', svg)

@@ -18,6 +18,7 @@ from typing import Annotated, Final
 import typer
 
 from pamrs.cli._streams import guarded
+from pamrs.cli.compare import compare_command
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
 from pamrs.cli.effects import effects_command
@@ -69,6 +70,7 @@ app.command("prove")(prove_command)
 app.command("replay")(replay_command)
 app.command("schema")(schema_command)
 app.command("size")(size_command)
+app.command("compare")(compare_command)
 app.command("diagnose")(diagnose_command)
 
 

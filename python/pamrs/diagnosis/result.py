@@ -81,6 +81,8 @@ class Diagnosis(Findings):
         ``recording``, ``role``, ``source``, ``samples``, ``sample_time``, ``averaged`` (recorded
         samples in each), ``used`` channels, ``unused`` {channel: why} and ``masked`` {channel:
         share}, of each recording that was used.
+    inputs : dict of str to str
+        SHA-256 of each file that the case was read from, by its name; empty for arrays.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -91,6 +93,9 @@ class Diagnosis(Findings):
         Final model, with what was found.
     traces : list of Trace
         Measured and simulated channels.
+    free_traces : list of Trace
+        Channels of the recording that the nominal model misses most from its commands alone:
+        ``measured``, ``before`` and ``after``.
     blocks : list of BlockVerdict
         The verdict of each group of blocks: ``blocks`` (their names), ``verdict``,
         ``probabilities``, ``effects``, ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for
@@ -204,6 +209,16 @@ class Diagnosis(Findings):
             The file.
         """
         return report.write_report(self, path)
+
+    def pdf(self, path: str | os.PathLike[str]) -> Path:
+        """Write the first screen of the report, one page of A4.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        """
+        return report.write_page(self, path)
 
     def figure(self, path: str | os.PathLike[str]) -> Path:
         """Write one picture of the diagnosis, a PNG of 1600 x 1000 pixels.

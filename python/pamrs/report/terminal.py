@@ -147,12 +147,6 @@ def _fit(diagnosis: Findings) -> list[str]:
         shown = [float(v) * factor if words.is_number(v) else None for v in entry.values()]
         cells = (f"{words.format_number(v, unicode=False):>11}" for v in shown)
         lines.append(f"{name:<22}{''.join(cells)}")
-    gap = diagnosis.fit.gap_closed
-    if words.is_number(gap):
-        lines.append(
-            f"gap to the noise closed over all channels, on {diagnosis.proof}: "
-            f"{100 * float(gap):.0f} %"
-        )
     return lines
 
 
@@ -167,13 +161,8 @@ def notebook(diagnosis: Findings) -> str:
             words.told_probabilities(diagnosis)[0].probabilities, 5
         )
     )
-    gap = diagnosis.fit.gap_closed
-    closed = (
-        f"<p>{100 * float(gap):.0f} % of the gap to the noise closed over all channels, on "
-        f"{diagnosis.proof}.</p>"
-        if words.is_number(gap)
-        else ""
-    )
+    mended = words.mended_sentence(diagnosis, "With what was found")
+    closed = f"<p>{html.escape(mended)}, on {diagnosis.proof}.</p>" if mended else ""
     where = html.escape(diagnosis.where.text)
     return (
         f"<div><p><b>{html.escape(words.headline(diagnosis))}.</b></p><p>{where}</p>"
