@@ -13,7 +13,7 @@ import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import same_data_in, starts_of
-from pamrs.effects import EFFECTS, Term
+from pamrs.effects import CATALOGUE, EFFECTS, Term
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.rig.schema import ACTS

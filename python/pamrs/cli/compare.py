@@ -17,7 +17,7 @@ def compare_command(
         Path,
         typer.Argument(metavar="A", help="A result (--json of diagnose), or a folder with it."),
     ],
-    second: Annotated[Path, typer.Argument(metavar="B", help="The other one.")],
+    second: Annotated[Path, typer.Argument(metavar="B", help="The result to compare it with.")],
     json: Annotated[
         Path | None, typer.Option(help="Write both (schema pamrs.comparison/1).")
     ] = None,

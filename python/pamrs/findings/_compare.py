@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 
 from pamrs.findings._entries import NOT_JUDGED
 from pamrs.findings._entry import to_plain
+from pamrs.units import with_unit
 
 _Value = TypeVar("_Value")
 
@@ -140,8 +141,9 @@ def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any
             told.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")
     for name, (old, new) in found.parameters.items():
         if old and new and (apart := _apart(old, new)) >= CLEARLY:
-            values = f"{old['value']:.4g} before, now {new['value']:.4g} {new['unit'] or ''}"
-            told.append(f"{name}: {values.strip()} ({apart:.1f} standard deviations)")
+            now_told = with_unit(f"{new['value']:.4g}", new["unit"] or "")
+            values = f"{old['value']:.4g} before, now {now_told}"
+            told.append(f"{name}: {values} ({apart:.1f} standard deviations)")
     for table, what in ((found.missed, "missed of"), (found.free_run, "free run of")):
         for name, (size, new_size) in table.items():
             if size and new_size and not 1.0 / FARTHER < new_size / size < FARTHER:

@@ -430,7 +430,12 @@ def separating_panels(own: Curves) -> list[Panel]:
     found = []
     for time, values, what, noise in (
         (own.time, own.predicted, spoken_name(own.channel), 0.0),
-        (own.bin_time, own.left, f"left if it is {hypothesis_label(own.leading)}", own.noise),
+        (
+            own.bin_time,
+            own.left,
+            f"cannot explain if it is {hypothesis_label(own.leading)}",
+            own.noise,
+        ),
     ):
         unit, factor = display_unit(own.unit, _largest(*values.values()))
         # the leading one is broad, the others are dashed over it: they often lie on it

@@ -76,13 +76,13 @@ def title(diagnosis: Findings) -> str:
         told = " and ".join(_settled(diagnosis, b) for b in groups[:2])
         if len(groups) == 2 and len(told.split()) <= LONGEST - 4:
             return f"The model leaves out {told}"
-    for most in (3, 2, 1):
-        told = _phrase(diagnosis, groups[0], most)
-        others = [words.blocks_label(b) for b in groups[1:]]
-        told += f"; something else in the {_listed(others, most, 'and')}" if others else ""
-        if len(told.split()) <= LONGEST:
-            return told
-    return _phrase(diagnosis, groups[0], 0) if len(told.split()) > LONGEST else told
+    others = _listed([words.blocks_label(b) for b in groups[1:]], 2, "and")
+    for end in (f"; something else in the {others}", "") if groups[1:] else ("",):
+        for most in (3, 2, 1):
+            told = _phrase(diagnosis, groups[0], most) + end
+            if len(told.split()) <= LONGEST:
+                return told
+    return _phrase(diagnosis, groups[0], 0)
 
 
 def _settled(diagnosis: Findings, block: BlockVerdict) -> str:
@@ -135,18 +135,26 @@ def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
     left = _answer(block)
     place = _place(diagnosis, block)
     named = [h for h in left if h.terms]
-    doubt = bool(diagnosis.off) or NONE in left or PARAMETERS in left
+    # what the whole rig still misses says nothing against names that are open anyway
+    doubt = NONE in left or PARAMETERS in left or (bool(diagnosis.off) and len(left) == 1)
     values = [term.is_value for h in named for term in h.terms]
     if len(left) == 1 and values and all(values):
         wrong = [w for w in diagnosis.wrong_parameters if w.name in left[0].words]
         return f"The rig file is wrong: {' and '.join(map(words.sentence_of, wrong))}"
     if not named:
+        if _chance(diagnosis, block, left[0]) < words.SETTLED:
+            return f"Something acts in the {place}, and nothing is probable enough to be named"
         return f"Something acts in the {place} that no effect of the catalogue explains"
     kinds = [{EFFECTS[t.id].shares for t in h.terms if not t.is_value} for h in named]
     shared = sorted(set.intersection(*kinds) - {""})
-    if any(values):
+    if left[0] in (NONE, PARAMETERS):
+        head = f"Values may explain what the {place} misses; not ruled out"
+        head = (
+            f"The model of the {place} may be complete; not ruled out" if left[0] == NONE else head
+        )
+    elif any(values):
         file = f"The rig file {'may be' if doubt else 'is'} wrong about the {place}"
-        head = f"The {place} {'may not be' if doubt else 'is not'} as model and rig file have it"
+        head = f"The {place} {'may differ' if doubt else 'differs'} from model and rig file"
         head = file if all(values) and UNLISTED not in left else head
     elif shared and UNLISTED not in left:
         head = f"The model of the {place} {'may leave' if doubt else 'leaves'} out {shared[0]}"
@@ -171,6 +179,11 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     """What the first screen says in numbers: the block with its own probability, the name with its,
     the size on the bench, and what the model misses with what was found.
     """
+    if diagnosis.misread:
+        return [
+            (f"{m.likely}, not {m.said}", ", ".join(map(words.spoken_name, m.channels)))
+            for m in diagnosis.misread
+        ]
     found = []
     groups = _answering(diagnosis)
     if groups and groups[0].probabilities:
@@ -187,24 +200,32 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     if not groups:
         answer_told, p = words.leading(diagnosis)
         found.append((answer_told, f"probability {words.format_probability(p)}"))
-    for effect in diagnosis.effects if diagnosis.verdict == "effects" else ():
+    named = diagnosis.effects if diagnosis.verdict == "effects" else []
+    for effect in sorted(named, key=lambda e: bool(groups) and e.term not in groups[0].effects):
         told = bench_value(effect)[:1]
         found += [(value, f"{words.label(effect.term)}: {name}") for name, value in told]
-    channel = diagnosis.where.channel or next(iter(diagnosis.fit.channels), None)
-    last = words.miss(diagnosis, channel, "after")
-    if channel and last:
-        noises = words.format_number(last.noises, 2)
-        what = f"{words.spoken_name(channel)} missed by the mended model ({last.size})"
+    errors = diagnosis.fit.held_out or diagnosis.fit.channels
+    sizes = {n: last for n in errors if (last := words.miss(diagnosis, n, "after"))}
+    if sizes:
+        worst = max(sizes, key=lambda n: sizes[n].noises)
+        noises = words.format_number(sizes[worst].noises, 2)
+        model = (
+            "the mended model" if diagnosis.effects or diagnosis.wrong_parameters else "the model"
+        )
+        what = f"{words.spoken_name(worst)} missed by {model} ({sizes[worst].size}), worst channel"
         found.append((f"{noises} × noise", what))
     return found
 
 
-def bench_value(effect: EffectFound) -> list[tuple[str, str]]:
+def bench_value(effect: EffectFound, *, own_units: bool = False) -> list[tuple[str, str]]:
     """The parameters of an effect that the recordings determine, as a bench has them: name, and
-    value with its 95 % interval and unit (``5.2 (4.9 to 5.5) l/min at 3 bar``).
+    value with its 95 % interval and unit (``5.2 (4.9 to 5.5) l/min at 3 bar``); with ``own_units``
+    those alone that have a unit of their own there.
     """
-    found = []
+    found, info = [], EFFECTS.get(effect.id)
     for name, own in effect.parameters.items():
+        if own_units and not (info and info.on_bench(name, effect.form)):
+            continue
         if own.identifiable is not False and words.is_number(own.value) and own.std:
             found.append((words.label(name), _on_bench(effect, name, own)))
     return found

@@ -7,6 +7,7 @@ import textwrap
 from typing import Final
 
 from pamrs.findings import Findings
+from pamrs.report import story
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
@@ -31,10 +32,13 @@ def summary(diagnosis: Findings) -> str:
     for effect in diagnosis.effects:
         lines.append("")
         lines.append(words.effect_heading(diagnosis, effect))
+        bench = dict(story.bench_value(effect, own_units=True))
         for name, own in effect.parameters.items():
             if own.identifiable is not False:
                 value = words.format_uncertain(own.value, own.std, unicode=False)
-                lines.append(with_unit(f"  {name} = {value}", own.unit))
+                told = with_unit(f"  {name} = {value}", own.unit)
+                usual = bench.get(words.label(name))
+                lines.append(f"{told}: {usual}" if usual else told)
             else:
                 lines.append(f"  {name}: these recordings do not determine it")
     for wrong in diagnosis.wrong_parameters:

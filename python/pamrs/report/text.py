@@ -30,6 +30,7 @@ from pamrs.units import with_unit
 __all__ = [
     "blocks_label",
     "BUDGET_NOTE",
+    "SETTLED",
     "budget_sentence",
     "budget_sentences",
     "budgets",
