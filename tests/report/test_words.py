@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pamrs.diagnosis.explain._conditions import _sign
+from pamrs.diagnosis.explain._conditions import _shares, _sign
 from pamrs.findings import (
     BlockMismatch,
     BlockVerdict,
@@ -138,3 +138,18 @@ def test_residuals_of_both_signs_do_not_cancel() -> None:
     assert _sign(np.abs(swings), rising=False) == ", where the measurement lies above the model"
     assert _sign(-np.abs(swings), rising=True) == ", where the measurement falls against the model"
     assert _sign(0.01 * swings, rising=False) == ""  # noise has no side
+
+
+def test_conditions_count_nothing_twice() -> None:
+    z = np.concatenate([np.full(20, 3.0), np.full(20, 2.0), np.full(60, 1.0)])  # excess 8, 3 and 0
+    at = np.arange(100)
+    masks = {"closed": at < 30, "at rest": at < 40, "open": at >= 30, "seldom": at < 5}
+    found = _shares(masks, z, rising=False)
+    assert [c.name for c in found] == ["at rest", "open"]  # "closed" is inside of "at rest"
+    assert [c.share for c in found] == pytest.approx([1.0, 0.0])
+    found = _shares({"closed": at < 30, "at rest": (at >= 10) & (at < 40)}, z, rising=False)
+    # 160 + 30 of 220 are in the first; of the second 30 are left that the first has not
+    assert [(c.name, c.time) for c in found] == [("closed", 0.3), ("at rest", 0.1)]
+    assert [c.share for c in found] == pytest.approx([190 / 220, 30 / 220])
+    assert found[1].text.startswith("otherwise at rest: 14 % of the excess over the noise, in 10 %")
+    assert not _shares(masks, np.zeros(100), rising=False)
