@@ -158,6 +158,9 @@ class FakeDiagnosis:
     def report(self, path):
         Path(path).write_text("<html>", encoding="utf-8")
 
+    def pdf(self, path):
+        Path(path).write_bytes(b"pdf")
+
     def figure(self, path):
         Path(path).write_bytes(b"png")
 
@@ -172,7 +175,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
 
     monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder, **options: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())
-    options = ("report", "json", "png", "model", "experiment")
+    options = ("report", "json", "pdf", "png", "model", "experiment")
     paths = {word: tmp_path / f"out.{word}" for word in options}
     options = [part for word, path in paths.items() for part in (f"--{word}", path)]
     code, out, err = run(capsys, "diagnose", tmp_path, *options)

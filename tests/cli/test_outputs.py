@@ -34,6 +34,9 @@ class Done:
     def report(self, path):
         return write_atomically(path, "<html>")
 
+    def pdf(self, path):
+        return write_atomically(path, b"%PDF")
+
     def figure(self, path):
         return write_atomically(path, b"png")
 
@@ -60,7 +63,9 @@ def run(capsys, *words):
     return code, captured.out, captured.err
 
 
-@pytest.mark.parametrize("option", ["--report", "--json", "--png", "--model", "--experiment"])
+@pytest.mark.parametrize(
+    "option", ["--report", "--json", "--pdf", "--png", "--model", "--experiment"]
+)
 def test_what_cannot_be_written_is_refused_before_the_work(capsys, tmp_path, diagnosed, option):
     for path, part in (
         (tmp_path / "absent" / "a", "does not exist"),

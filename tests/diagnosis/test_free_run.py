@@ -45,7 +45,7 @@ def test_the_true_model_runs_freely_to_the_noise_and_the_nominal_one_drifts() ->
     true = rig.with_effect("leak_muscle", {"conductance": 3e-9})
     problem = problem_of(rig, [recorded(true, "a", "held_out")])
     found = {"before": residuals(problem, rig), "after": residuals(problem, true)}
-    runs, note = _free_run.free_run(problem, found, rig, true, None)
+    runs, note, curves = _free_run.free_run(problem, found, rig, true, None)
     assert note == ""
     assert runs is not None
     (run,) = runs
@@ -59,6 +59,12 @@ def test_the_true_model_runs_freely_to_the_noise_and_the_nominal_one_drifts() ->
     assert error.cut_after is not None
     assert error.cut_before is not None
     assert error.cut_after < error.cut_before
+    drawn = next(c for c in curves if c.channel == "muscle_pressure")
+    assert (drawn.recording, drawn.role, drawn.unit) == ("a", "held_out", "Pa")
+    for curve, size in ((drawn.before, error.before), (drawn.after, error.after)):
+        assert curve is not None
+        missed = float(np.sqrt(np.nanmean((drawn.measured - curve) ** 2)))
+        assert missed == pytest.approx(size, rel=1e-9)
 
 
 def test_without_a_command_there_is_no_free_run_and_it_is_said_why() -> None:
@@ -67,13 +73,13 @@ def test_without_a_command_there_is_no_free_run_and_it_is_said_why() -> None:
     whole = recorded(rig, "whole", "held_out", seed=2)
     problem = problem_of(rig, [silent])
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
-    runs, note = _free_run.free_run(problem, found, rig, rig, None)
+    runs, note, _ = _free_run.free_run(problem, found, rig, rig, None)
     assert runs is None
     assert "silent" in note
     assert "valve_command" in note
     both = problem_of(rig, [silent, whole])
     found = {"before": residuals(both, rig), "after": residuals(both, rig)}
-    runs, note = _free_run.free_run(both, found, rig, rig, None)
+    runs, note, _ = _free_run.free_run(both, found, rig, rig, None)
     assert [r.recording for r in runs or []] == ["whole"]
     assert "silent" in note
 
@@ -99,7 +105,7 @@ def test_a_gas_with_a_temperature_is_judged_as_others(
         begun = recordings[0].temperatures.get("muscle_pressure", 293.15)
         assert leak or begun == pytest.approx(293.15 + told, abs=1.0)
         found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
-        runs, _ = _free_run.free_run(problem, found, rig, rig, None, file)
+        runs, *_ = _free_run.free_run(problem, found, rig, rig, None, file)
         assert runs is not None
         off[leak] = {name for name, error in runs[0].channels.items() if error.off}
         errors[leak] = runs[0].channels["muscle_pressure"].after
@@ -117,7 +123,7 @@ def test_of_a_long_log_the_first_part_is_asked_and_said(monkeypatch: pytest.Monk
     runs = []
     for samples in (_free_run._OFF_SAMPLES, 1000):
         monkeypatch.setattr(_free_run, "_OFF_SAMPLES", samples)
-        (run,), _ = _free_run.free_run(problem, found, rig, rig, None, told)
+        (run,), *_ = _free_run.free_run(problem, found, rig, rig, None, told)
         assert run.channels["muscle_pressure"].off
         runs.append(run)
     whole, part = runs
@@ -136,11 +142,11 @@ def test_means_run_freely_under_the_commands_of_their_log() -> None:
     means = averaged(fast, 5)
     problem = problem_of(rig, [means])
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
-    runs, _ = _free_run.free_run(problem, found, rig, rig, None)
+    runs, *_ = _free_run.free_run(problem, found, rig, rig, None)
     assert runs is not None
     assert runs[0].channels["muscle_pressure"].before < 300.0
     problem = problem_of(rig, [replace(means, commands={})])
-    runs, _ = _free_run.free_run(problem, found, rig, rig, None)
+    runs, *_ = _free_run.free_run(problem, found, rig, rig, None)
     assert runs is not None
     assert runs[0].channels["muscle_pressure"].before > 1000.0
 
@@ -160,7 +166,7 @@ def test_a_model_that_leaves_its_range_has_no_number_and_stops_nothing(
         return honest(model, recording, **options)
 
     monkeypatch.setattr(_free_run, "replay", left)
-    runs, _ = _free_run.free_run(problem, found, rig, worse, None)
+    runs, *_ = _free_run.free_run(problem, found, rig, worse, None)
     assert runs is not None
     (run,) = runs
     assert run.note == "with what was found: contraction left the table"
@@ -178,7 +184,7 @@ def test_what_happened_in_one_recording_is_in_its_free_run_only() -> None:
     problem = problem_of(rig, records)
     found = {"before": residuals(problem, rig), "after": residuals(problem, rig)}
     events = Events(Term("external_torque"), {"a": event})
-    runs, _ = _free_run.free_run(problem, found, rig, final, events)
+    runs, *_ = _free_run.free_run(problem, found, rig, final, events)
     assert runs is not None
     pushed, quiet = (run.channels["joint_angle"] for run in runs)
     assert pushed.after != pushed.before

@@ -13,7 +13,7 @@ import pamrs
 from pamrs import _core
 from pamrs.control.linear import linearise
 from pamrs.diagnosis.fit import same_data_in, starts_of
-from pamrs.effects import EFFECTS, Term
+from pamrs.effects import CATALOGUE, EFFECTS, Term
 from pamrs.errors import ParameterError, RigError
 from pamrs.rig import parse_rig
 from pamrs.rig.schema import ACTS
@@ -337,3 +337,19 @@ def test_a_late_clock_is_the_dead_time_of_what_the_commands_go_to() -> None:
         "input_path_lag",
         "supply_regulator_delay",
     ]
+
+
+@pytest.mark.parametrize("effect", CATALOGUE.values(), ids=list(CATALOGUE))
+def test_every_effect_says_what_to_do_on_the_bench(effect):
+    assert effect.shares
+    assert not effect.shares.endswith(".")
+    assert effect.bench.endswith((".", "?"))
+    assert len(effect.bench.split()) <= 30
+    forms = {form.name: {p.name for p in form.parameters} for form in effect.forms}
+    every = set().union(*forms.values())
+    for own in effect.bench_units:
+        assert own.parameter in (forms[own.form] if own.form else every)
+        assert own.factor > 0.0
+        assert bool(own.mixed_by) == bool(own.mixed)
+        assert not own.mixed_by or own.mixed_by in every
+    assert effect.on_bench("no such parameter") is None

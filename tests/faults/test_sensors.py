@@ -88,7 +88,7 @@ def _says_first(found: pamrs.Diagnosis, claim: str) -> None:
     assert claim in found.headline[: len(claim) + 60]
     assert found.summary().splitlines()[1].startswith(found.headline[:60])
     page = html.unescape(render_html(found))
-    heading = page[page.index("<h1>") : page.index("</h1>")]
+    heading = page[page.index("<h1>") : page.index('<ul class="facts">')]
     assert claim.replace("_", " ") in heading.replace("_", " ").replace("²", "2")
     written = json.loads(found.to_json())
     jsonschema.validate(written, schema())

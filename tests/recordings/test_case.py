@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +11,7 @@ import pytest
 
 import pamrs
 from pamrs.errors import CaseError
-from pamrs.recordings import load_case
+from pamrs.recordings import digests, load_case
 from tests.tables import rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -30,6 +32,18 @@ def folder(path: Path, toml: str = TOML) -> Path:
         (home / name).write_text("time [s],muscle_pressure [bar]\n" + rows)
     (home / "case.toml").write_text(toml)
     return home
+
+
+def test_every_file_of_a_case_has_its_digest(tmp_path: Path) -> None:
+    case = load_case(folder(tmp_path))
+    names = ["case.toml", "rig.toml", "run.csv"]
+    found = digests(case)
+    assert list(found) == names
+    for name in names:
+        assert found[name] == hashlib.sha256((case.path / name).read_bytes()).hexdigest()
+    (case.path / "run.csv").unlink()
+    assert list(digests(case)) == names[:2]
+    assert digests(replace(case, path=Path("absent"))) == {}
 
 
 def refused(home: Path) -> str:

@@ -6,6 +6,7 @@ import re
 import xml.etree.ElementTree as ElementTree
 
 import pytest
+from matplotlib.figure import Figure
 
 import pamrs
 from pamrs.diagnosis.result import Diagnosis
@@ -20,7 +21,7 @@ from pamrs.findings import (
     WrongParameter,
 )
 from pamrs.report import render_html
-from pamrs.report.chain import chain_svg
+from pamrs.report.chain import chain_svg, draw_chain
 from tests.diagnosis import synthetic
 
 
@@ -73,6 +74,17 @@ def test_every_rig_is_drawn_with_its_blocks_beside_each_other(name: str) -> None
     assert all(x + w <= width and y + h <= height for x, y, w, h in boxes)
 
 
+@pytest.mark.parametrize("name", ["shoulder", "antagonistic_joint"])
+def test_the_same_chain_is_drawn_on_a_picture(name: str) -> None:
+    rig, axes = pamrs.rigs.named(name), Figure().subplots()
+    judged = [verdict("supply", "supply_pressure")]
+    draw_chain(axes, found(rig, "supply", judged))
+    white = [p for p in axes.patches if p.get_facecolor()[:3] == (1.0, 1.0, 1.0)]
+    kinds = ("supply", "valve", "line", "chamber", "muscle", "joint", "load")
+    assert len(white) == sum(len(rig.tables(kind)) for kind in kinds)
+    assert "fits to the noise" in [text.get_text() for text in axes.texts]
+
+
 def test_measured_channels_are_marked_and_the_located_block_is_lit() -> None:
     blocks = [
         verdict("supply", "supply_pressure"),
@@ -81,7 +93,7 @@ def test_measured_channels_are_marked_and_the_located_block_is_lit() -> None:
     ]
     svg = chain_svg(found(pamrs.rigs.shoulder(), "chamber", blocks)) or ""
     assert svg.count('stroke-width="2.4"') == 1  # one frame is lit
-    assert "misses 12 × noise" in svg
+    assert "misses 6.0 × noise" in svg  # the error of the channel in the table of errors
     assert svg.count("fits to the noise") == 2
     assert "missing: muscle" in svg
     dots = re.findall(r'<circle [^>]*r="4" fill="([^"]+)"', svg)

@@ -1,4 +1,4 @@
-"""What a reader is told of shares, gaps and noise, and of one cause that several groups see."""
+"""What a reader is told of shares, sizes and noise, and of one cause that several groups see."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pamrs.diagnosis.explain._conditions import _sign
+from pamrs.diagnosis.explain._conditions import _shares, _sign
 from pamrs.findings import (
     BlockMismatch,
     BlockVerdict,
@@ -16,6 +16,7 @@ from pamrs.findings import (
     MismatchStages,
     Unexplained,
 )
+from pamrs.report import render_html
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
 
@@ -80,7 +81,7 @@ def test_noise_that_is_left_is_not_called_unexplained(tmp_path: Any) -> None:
     assert told == "parameters inside tolerance 99 % (99 to 99); only noise is left."
     assert "unexplained" not in words.budget_sentences(found)[0][1]
     # where it is more than noise, or a result does not say, the size is told
-    assert "1 % unexplained: 0.029 noise levels" in words.budget_sentence(terms)
+    assert "1 % unexplained" in words.budget_sentence(terms)
 
 
 def test_shares_are_explained_where_they_can_be_misread() -> None:
@@ -105,10 +106,10 @@ def test_a_size_says_which_recordings_it_is_of(role: str, where: str) -> None:
     assert f"is 21 times the noise level (0.40 deg){where} and" in words.kept_sentence(kept)
 
 
-def test_a_gap_says_which_channels_it_is_over() -> None:
+def test_one_size_of_a_mismatch_stands_everywhere() -> None:
     errors = {
-        "muscle_pressure": (100.0, 500.0, 500.0, 400.0),  # refit 4, closes 1 of them
-        "joint_angle": (0.001, 0.02, 0.011, 0.001),  # 10, closes all
+        "muscle_pressure": (100.0, 500.0, 500.0, 400.0),
+        "joint_angle": (0.001, 0.02, 0.011, 0.001),
     }
     fit = {
         "channels": {},
@@ -116,15 +117,18 @@ def test_a_gap_says_which_channels_it_is_over() -> None:
         "gap_closed": 11.0 / 14.0,
     }
     found = seen(group("arm", "joint_angle", 0.9, effects=["muscle_creep"]), fit=fit)
-    assert words.gap_sentence(found, "With it,") == (
-        "With it, 79 % of the gap between refitted model and noise closes over all channels "
-        "(muscle pressure, joint angle) and 100 % in joint angle alone"
+    told = "11 noise levels (0.63 deg)"
+    assert str(words.miss(found, "joint_angle", "refit")) == told
+    assert words.mended_sentence(found, "With it,") == (
+        f"With it, the model misses joint angle by 1.0 noise levels (0.057 deg) instead of {told}"
     )
-    assert "gap to the noise closed over all channels, on held-out recordings: 79 %" in (
-        found.summary()
-    )
-    none = seen(group("arm", "joint_angle", 0.9), fit={**fit, "gap_closed": None})
-    assert words.gap_sentence(none, "With it,") == ""
+    other = group("chamber", "muscle_pressure", 0.9)
+    page = render_html(seen(other, found.judged[0], fit=fit, traces=[]))
+    assert "11× noise" in page  # the table of errors
+    assert "11 noise levels (0.63 deg)" in page  # block by block, and why parameters lost
+    assert words.miss(found, "force", "refit") is None
+    none = seen(group("arm", "joint_angle", 0.9), fit={**fit, "held_out": {}})
+    assert words.mended_sentence(none, "With it,") == ""
 
 
 def test_residuals_of_both_signs_do_not_cancel() -> None:
@@ -134,3 +138,18 @@ def test_residuals_of_both_signs_do_not_cancel() -> None:
     assert _sign(np.abs(swings), rising=False) == ", where the measurement lies above the model"
     assert _sign(-np.abs(swings), rising=True) == ", where the measurement falls against the model"
     assert _sign(0.01 * swings, rising=False) == ""  # noise has no side
+
+
+def test_conditions_count_nothing_twice() -> None:
+    z = np.concatenate([np.full(20, 3.0), np.full(20, 2.0), np.full(60, 1.0)])  # excess 8, 3 and 0
+    at = np.arange(100)
+    masks = {"closed": at < 30, "at rest": at < 40, "open": at >= 30, "seldom": at < 5}
+    found = _shares(masks, z, rising=False)
+    assert [c.name for c in found] == ["at rest", "open"]  # "closed" is inside of "at rest"
+    assert [c.share for c in found] == pytest.approx([1.0, 0.0])
+    found = _shares({"closed": at < 30, "at rest": (at >= 10) & (at < 40)}, z, rising=False)
+    # 160 + 30 of 220 are in the first; of the second 30 are left that the first has not
+    assert [(c.name, c.time) for c in found] == [("closed", 0.3), ("at rest", 0.1)]
+    assert [c.share for c in found] == pytest.approx([190 / 220, 30 / 220])
+    assert found[1].text.startswith("otherwise at rest: 14 % of the excess over the noise, in 10 %")
+    assert not _shares(masks, np.zeros(100), rising=False)

@@ -20,6 +20,7 @@ import typer
 
 from pamrs.cli._quiet import with_quiet
 from pamrs.cli._streams import guarded
+from pamrs.cli.compare import compare_command
 from pamrs.cli.completion import VARIABLE, completion_command
 from pamrs.cli.design import design_app
 from pamrs.cli.diagnose import diagnose_command
@@ -73,6 +74,7 @@ app.command("prove")(prove_command)
 app.command("replay")(replay_command)
 app.command("schema")(schema_command)
 app.command("size")(size_command)
+app.command("compare")(compare_command)
 app.command("diagnose")(diagnose_command)
 for _group in (app, rig_app, fit_app, design_app):
     for _command in _group.registered_commands:

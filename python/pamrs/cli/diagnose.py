@@ -49,6 +49,9 @@ def diagnose_command(
     ] = None,
     report: Annotated[Path | None, typer.Option(help="Write the report, one HTML file.")] = None,
     json: Annotated[Path | None, typer.Option(help=json_help("pamrs.diagnosis/2"))] = None,
+    pdf: Annotated[
+        Path | None, typer.Option(help="Write the first screen of the report, one page of A4.")
+    ] = None,
     png: Annotated[Path | None, typer.Option(help="Write the summary picture.")] = None,
     model: Annotated[
         Path | None, typer.Option(help="Write the model: the rig with what was found in it.")
@@ -105,13 +108,13 @@ def diagnose_command(
     Files are written before the verdict is printed. Exit code 0: diagnosed; 2: not diagnosed; 4:
     diagnosed, but some file or the text could not be written.
     """
-    check_writable(report, file_of(json), png, model, experiment)
+    check_writable(report, file_of(json), pdf, png, model, experiment)
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
         if consider:
             raise typer.BadParameter("--consider needs a case: --plan has no recordings to judge")
-        if any(path is not None for path in (report, png, model, experiment)):
+        if any(path is not None for path in (report, pdf, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, force_noise, json)
         return
@@ -148,6 +151,7 @@ def diagnose_command(
         model: lambda path: write_atomically(path, _model_text(result, loaded, path)),
         experiment: "" if protocol is None else protocol.to_csv(),
         png: result.figure,
+        pdf: result.pdf,
         report: result.report,
     }
     write(files, result.summary())

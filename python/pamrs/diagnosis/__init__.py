@@ -66,7 +66,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty, NextExperiment
-from pamrs.recordings import Case, Recording, is_table, load_case
+from pamrs.recordings import Case, Recording, digests, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
@@ -281,6 +281,7 @@ def diagnose(
         faulty=[*dead, *clipped],
         warnings=warnings,
         data=data,
+        inputs=digests(case),
         seconds=round(time.perf_counter() - began, 3),
     )
 

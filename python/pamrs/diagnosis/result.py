@@ -94,6 +94,8 @@ class Diagnosis(View, Findings):
         ``recording``, ``role``, ``source``, ``samples``, ``sample_time``, ``averaged`` (recorded
         samples in each), ``used`` channels, ``unused`` {channel: why} and ``masked`` {channel:
         share}, of each recording that was used.
+    inputs : dict of str to str
+        SHA-256 of each file that the case was read from, by its name; empty for arrays.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -104,6 +106,9 @@ class Diagnosis(View, Findings):
         Final model, with what was found.
     traces : list of Trace
         Measured and simulated channels.
+    free_traces : list of Trace
+        Channels of the recording that the nominal model misses most from its commands alone:
+        ``measured``, ``before`` and ``after``.
     blocks : list of BlockVerdict
         The verdict of each group of blocks: ``blocks`` (their names), ``verdict``,
         ``probabilities``, ``effects``, ``wrong_parameters``, ``ambiguity``, and ``mismatch``: for
@@ -218,6 +223,16 @@ class Diagnosis(View, Findings):
         """
         return report.write_report(self, path)
 
+    def pdf(self, path: str | os.PathLike[str]) -> Path:
+        """Write the first screen of the report, one page of A4.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        """
+        return report.write_page(self, path)
+
     def figure(self, path: str | os.PathLike[str]) -> Path:
         """Write one picture of the diagnosis, a PNG of 1600 x 1000 pixels.
 
@@ -284,6 +299,9 @@ class _Read(Diagnosis):
         return self.to_json() == other.to_json()
 
 
+_NEEDED: Final = ("verdict", "where", "effects", "probabilities", "parameters", "fit")
+
+
 def load_result(path: str | os.PathLike[str]) -> Diagnosis:
     """Read a result that `Diagnosis.to_json` or ``pamrs diagnose --json`` wrote.
 
@@ -324,6 +342,9 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
         raise DiagnosisError(
             f"{file}: schema = {given!r} is not allowed: {' or '.join(READABLE)} is needed"
         )
+    missing = [key for key in _NEEDED if key not in found]
+    if missing:
+        raise DiagnosisError(f"{file}: is no complete result ({', '.join(missing)} is missing)")
     settings = found.pop("settings", {})
     try:
         values = {"case": file.parent.name} | fields_from(Diagnosis, found)

@@ -9,7 +9,15 @@ from importlib import resources
 from typing import Any, Final
 
 from pamrs import _core
-from pamrs.effects._info import ClosureTerm, EffectInfo, EffectParameter, Form, SameData, Words
+from pamrs.effects._info import (
+    BenchUnit,
+    ClosureTerm,
+    EffectInfo,
+    EffectParameter,
+    Form,
+    SameData,
+    Words,
+)
 
 
 def _words(effect: str) -> dict[str, Any]:
@@ -77,9 +85,10 @@ def _info(told: dict[str, Any]) -> EffectInfo:
         rivals=tuple(words.get("rivals", ())),
         stated_by=tuple(words.get("stated_by", ())),
         like_values=tuple(words.get("like_values", ())),
+        bench_units=tuple(BenchUnit(**unit) for unit in words.get("bench_units", ())),
         **{key: told[key] for key in _TOLD},
         **{key: words[key] for key in ("name", "equation", "fingerprint", "separates")},
-        **{key: words.get(key, "") for key in ("label", "experiment")},
+        **{key: words.get(key, "") for key in ("label", "experiment", "shares", "bench")},
     )
 
 

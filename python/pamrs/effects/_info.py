@@ -220,6 +220,32 @@ class Form:
 
 
 @dataclass(frozen=True, slots=True)
+class BenchUnit:
+    """How a parameter is told on a bench.
+
+    Attributes
+    ----------
+    parameter, form : str
+        The parameter, and the form of the effect for which it holds; empty for all others.
+    unit : str
+        ``l/min at 3 bar``.
+    factor : float
+        Value in it over that in SI.
+    mixed_by : str
+        Parameter that is 0 where `factor` holds and 1 where `mixed` does; linear between.
+    mixed : float
+        The other factor.
+    """
+
+    parameter: str
+    unit: str
+    factor: float
+    form: str = ""
+    mixed_by: str = ""
+    mixed: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class EffectInfo:
     """One effect of the catalogue.
 
@@ -262,6 +288,12 @@ class EffectInfo:
     experiment : str
         What to record to tell it from what looks like it, with numbers; empty where ``separates``
         says it.
+    shares : str
+        What it has in common with others, as the end of "the model leaves out": ``a leak``.
+    bench : str
+        What to do on the bench to see it or to be rid of it.
+    bench_units : tuple of BenchUnit
+        How its parameters are told on a bench, where not in the usual units.
     excitation : tuple of (str, value)
         The same for a program: ``kind`` and numbers with their unit in the name.
     last_only : bool
@@ -301,6 +333,9 @@ class EffectInfo:
     like_values: tuple[str, ...] = ()
     acts_in: tuple[str, ...] = ()
     experiment: str = ""
+    shares: str = ""
+    bench: str = ""
+    bench_units: tuple[BenchUnit, ...] = ()
     excitation: tuple[tuple[str, str | int | float | tuple[float, ...]], ...] = ()
     last_only: bool = False
     on_loads: bool = False
@@ -336,6 +371,11 @@ class EffectInfo:
         if found is None:
             raise KeyError(name)
         return found
+
+    def on_bench(self, parameter: str, form: str = "") -> BenchUnit | None:
+        """How a parameter of one of its forms is told on a bench; None for the usual unit."""
+        own = {u.form: u for u in self.bench_units if u.parameter == parameter}
+        return own.get(form, own.get(""))
 
     @property
     def everywhere(self) -> str:

@@ -5,12 +5,13 @@ below reports and diagnosis, so that neither has to know the other to name what 
 
 Public: `Findings` and the entries it is made of (`Where`, `EffectFound`, `BlockVerdict`,
 `WrongParameter`, `Unexplained`, ...), `Trace`, `Entry`, `VERDICTS`, `HEALTHY`, `NOT_JUDGED`;
-`channels_off` (of free runs); `to_plain`, by which they become JSON, and `fields_from`, which reads
-it.
+`channels_off` (of free runs); `compare_results` of two results, and `Compared`; `to_plain`, by
+which they become JSON, and `fields_from`, which reads it.
 """
 
 from __future__ import annotations
 
+from pamrs.findings._compare import Compared, compare_results
 from pamrs.findings._details import (
     BlockResidual,
     ConditionMap,
@@ -62,6 +63,7 @@ __all__ = [
     "BlockVerdict",
     "BudgetTerm",
     "ChannelError",
+    "Compared",
     "Condition",
     "ConditionMap",
     "Considered",
@@ -93,6 +95,7 @@ __all__ = [
     "Where",
     "WrongParameter",
     "channels_off",
+    "compare_results",
     "fields_from",
     "to_plain",
 ]

@@ -601,6 +601,12 @@ class FreeRunError(Entry):
         """`after` in units of the noise; NaN where that is not known."""
         return self.after / self.noise if self.noise else math.nan
 
+    @property
+    def times_before(self) -> float:
+        """`before` in units of the noise; nothing where that is not known."""
+        times = self.before / self.noise if self.noise else 0.0
+        return times if math.isfinite(times) else 0.0
+
 
 @dataclass(frozen=True, eq=False)
 class FreeRun(Entry):

@@ -86,6 +86,9 @@ class Findings:
         fitted one where none was held out); None where no recording has the commands.
     free_run_note : str
         Why there is no free run, or of some recordings none; empty where nothing is missing.
+    free_traces : list of Trace
+        Channels of the recording that the nominal model misses most from its commands alone, as
+        measured and as both models give them (``before``, ``after``).
     parameters : dict of str to ParameterFound
         Parameters of the baseline, SI.
     fit : FitErrors
@@ -94,6 +97,8 @@ class Findings:
         What to record next.
     data : list of RecordingUsed
         What of each recording the answer rests on, and which channels were not used, and why.
+    inputs : dict of str to str
+        SHA-256 of each file that the case was read from, by its name.
     warnings : list of str
         What the user should know before trusting the rest.
     seconds : float
@@ -197,11 +202,16 @@ class Findings:
         default_factory=list,
         metadata=told("what the caller asked to be judged in addition", required=False),
     )
+    inputs: dict[str, str] = field(
+        default_factory=dict,
+        metadata=told("SHA-256 of each file that the case was read from", required=False),
+    )
     warnings: list[str] = field(default_factory=list)
     seconds: float = 0.0
     text: str = field(default="", metadata=told("the verdict in words", required=False))
     rig: ModelFile | None = field(default=None, metadata=told(json=False))
     traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
+    free_traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
     measured: list[str] = field(default_factory=list, metadata=told(json=False))
     residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
     condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))

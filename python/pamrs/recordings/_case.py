@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
@@ -38,7 +39,7 @@ from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
 
-__all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
+__all__ = ["SCHEMA", "Case", "digests", "load_case", "model_and_case"]
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
 _RIG: Final = "rig.toml"
@@ -261,6 +262,33 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
     return Case(texts["name"], rig, recordings, home, texts["description"])
+
+
+def digests(case: Case) -> dict[str, str]:
+    """SHA-256 of each file that a case was read from.
+
+    Parameters
+    ----------
+    case : Case
+        The case.
+
+    Returns
+    -------
+    dict of str to str
+        By the file's name in ``case.toml``; without files that are not there any more, or folders,
+        and empty for a case of arrays.
+    """
+    if not (case.path / "case.toml").is_file():
+        return {}
+    document = toml_document(case.path / "case.toml", CaseError)
+    logs = [own.get("file") for own in document.get("recording", [])]
+    names = ["case.toml", document.get("rig", _RIG), document.get("source"), *logs]
+    found = {}
+    for name in dict.fromkeys(name for name in names if isinstance(name, str)):
+        if (case.path / name).is_file():
+            with (case.path / name).open("rb") as file:
+                found[name] = hashlib.file_digest(file, "sha256").hexdigest()
+    return found
 
 
 def model_and_case(file: Path) -> tuple[Rig, Path]:

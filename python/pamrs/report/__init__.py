@@ -1,4 +1,4 @@
-"""Report of a diagnosis: one offline HTML page and one PNG."""
+"""Report of a diagnosis: one offline HTML page, its first screen as PDF, and one PNG."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pamrs.findings import Findings
 
-__all__ = ["render_html", "write_figure", "write_report"]
+__all__ = ["render_html", "write_figure", "write_page", "write_report"]
 
 
 def render_html(diagnosis: Findings) -> str:
@@ -24,9 +24,17 @@ def write_report(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     return write_atomically(path, render_html(diagnosis))
 
 
+def write_page(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
+    """Write the first screen of the report, one page of A4 as PDF, and return the path."""
+    from pamrs._writing import write_atomically
+    from pamrs.report.pictures import one_page_pdf
+
+    return write_atomically(path, one_page_pdf(diagnosis))
+
+
 def write_figure(diagnosis: Findings, path: str | os.PathLike[str]) -> Path:
     """Write the one-picture summary, a PNG of 1600 x 1000 pixels, and return the path."""
     from pamrs._writing import write_atomically
-    from pamrs.report.figures import summary_png
+    from pamrs.report.pictures import summary_png
 
     return write_atomically(path, summary_png(diagnosis))

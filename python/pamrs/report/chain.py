@@ -10,15 +10,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from matplotlib.axes import Axes
+from matplotlib.patches import Rectangle
+
 from pamrs.channels import dotted
 from pamrs.effects import EFFECTS
 from pamrs.findings import BlockMismatch, Findings
 from pamrs.report.figures import COLOURS
 from pamrs.report.page import render_page
-from pamrs.report.text import format_number, label
+from pamrs.report.text import format_number, label, miss
 from pamrs.rig import Rig
 
-__all__ = ["chain_svg"]
+__all__ = ["chain_svg", "draw_chain"]
 
 COLUMN, BOX, LINE, PAD, GAP = 186.0, 134.0, 17.0, 14.0, 34.0
 """Distance of columns, width of a box, height of a line of text, margin of a frame and distance of
@@ -111,10 +114,70 @@ def chain_svg(diagnosis: Findings) -> str | None:
     rig = diagnosis.rig
     if not isinstance(rig, Rig):
         return None
+    return render_page(
+        Path(__file__).with_name("chain.svg.j2"),
+        **_Drawing(_marked(rig, diagnosis), diagnosis, rig).content(),
+        box=BOX,
+        line=LINE,
+        symbols=SYMBOLS,
+        found=COLOURS["before"],
+        dot=COLOURS["after"],
+        px="{:.1f}".format,
+        wrap=textwrap.wrap,
+    )
+
+
+def draw_chain(axes: Axes, diagnosis: Findings) -> None:
+    """The same on matplotlib's axes; nothing where the diagnosis has no rig.
+
+    Parameters
+    ----------
+    axes : Axes
+        Where.
+    diagnosis : Findings
+        As of :func:`chain_svg`.
+    """
+    axes.set_axis_off()
+    rig = diagnosis.rig
+    if not isinstance(rig, Rig):
+        return
+    own = _Drawing(_marked(rig, diagnosis), diagnosis, rig).content()
+    scale = 540.0 / float(own["width"])  # points of a page over those of the drawing
+    small = 11.0 * scale
+    for frame in own["frames"]:
+        x, y, colour = frame["x"], frame["y"], frame["colour"]
+        size = (frame["right"] - x, frame["low"] - y)
+        fill = "#fdebdd" if frame["lit"] else "#f6f7f9"
+        axes.add_patch(Rectangle((x, y), *size, facecolor=fill, edgecolor=colour))
+        axes.text(x + 8, frame["title"], frame["text"], color=colour, size=small)
+    for start, y, stop, end in own["arrows"]:
+        arrow: dict[str, Any] = {
+            "arrowstyle": "-|>",
+            "color": "#6b7280",
+            "shrinkA": 0,
+            "shrinkB": 0,
+        }
+        axes.annotate("", (stop, end), (start, y), arrowprops=arrow)
+    for box in own["boxes"]:
+        x, y = box["x"], box["y"]
+        edge = COLOURS["before"] if box["part"].found else "#aeb5bf"
+        axes.add_patch(Rectangle((x, y), BOX, box["height"], facecolor="white", edgecolor=edge))
+        axes.text(x + 9, y + 28, box["part"].title, size=1.1 * small, fontweight="bold")
+        for row, (text, kind) in enumerate(box["lines"]):
+            sign = {"measured": "● ", "unmeasured": "○ ", "found": ""}[kind]
+            colour = COLOURS["before"] if kind == "found" else "#1b1f24"
+            axes.text(x + 9, y + 54 + LINE * row, sign + text, size=small, color=colour)
+    axes.set_xlim(0.0, own["width"])
+    axes.set_ylim(own["tall"], 0.0)
+    axes.set_aspect("equal")
+
+
+def _marked(rig: Rig, diagnosis: Findings) -> dict[str, _Part]:
+    """The blocks that are drawn, in their places, with what was found."""
     parts = _parts(rig)
     _place(parts, rig)
     _mark(parts, diagnosis)
-    return _Drawing(parts, diagnosis, rig).svg()
+    return parts
 
 
 def _title(rig: Rig, kind: str, name: str) -> str:
@@ -223,8 +286,8 @@ class _Drawing:
     diagnosis: Findings
     rig: Rig
 
-    def svg(self) -> str:
-        """The element."""
+    def content(self) -> dict[str, Any]:
+        """Sizes, frames, arrows and boxes."""
         parts = self.parts.values()
         lines = {p.full: self._lines(p) for p in parts}
         height = {p.full: 46.0 + LINE * len(lines[p.full]) for p in parts}
@@ -239,8 +302,7 @@ class _Drawing:
         judged = self._judged()
         tall = max(y + height[full] for full, (_, y) in place.items()) + PAD + 6.0
         tall += 20.0 if any(n.partition(".")[0] in UNDER for n, *_ in judged) else 0.0
-        return render_page(
-            Path(__file__).with_name("chain.svg.j2"),
+        return dict(
             width=max(x for x, _ in place.values()) + BOX + PAD + 5.0,
             tall=tall,
             spoken=self._spoken(),
@@ -250,13 +312,6 @@ class _Drawing:
                 dict(part=self.parts[full], x=x, y=y, height=height[full], lines=lines[full])
                 for full, (x, y) in place.items()
             ],
-            box=BOX,
-            line=LINE,
-            symbols=SYMBOLS,
-            found=COLOURS["before"],
-            dot=COLOURS["after"],
-            px="{:.1f}".format,
-            wrap=textwrap.wrap,
         )
 
     def _spoken(self) -> str:
@@ -328,11 +383,12 @@ class _Drawing:
         verdict = next(
             (b.verdict for b in self.diagnosis.judged if name in b.blocks), "effects" if lit else ""
         )
-        exceeds = mismatch is not None and mismatch.fitted.refit.more_than_noise
+        part = None if mismatch is None else mismatch.held_out or mismatch.fitted
+        exceeds = part is not None and part.refit.more_than_noise
         size = "" if mismatch is None else "fits to the noise"
-        residual = self.diagnosis.residuals.get(name)
-        if exceeds and residual is not None:
-            size = f"misses {format_number(residual.excess, 2)} × noise"
+        missed = mismatch and miss(self.diagnosis, mismatch.channel, "refit")
+        if exceeds and missed:
+            size = f"misses {format_number(missed.noises, 2)} × noise"
         colour = COLOURS["before"] if lit or (exceeds and verdict != "none") else "#8a94a3"
         text = textwrap.shorten(size, int((right - x) / 6.4), placeholder=" …")
         return dict(x=x, y=y, right=right, low=low, title=title, lit=lit, colour=colour, text=text)

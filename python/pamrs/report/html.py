@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+import textwrap
 from collections.abc import Callable, Mapping
+from datetime import datetime
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
@@ -12,24 +14,22 @@ from typing import Any, Final
 from markupsafe import Markup
 
 from pamrs._losses import Losses
-from pamrs.channels import UNITS, channel_of
 from pamrs.findings import (
     BlockMismatch,
     BlockVerdict,
     ChannelError,
     Findings,
-    StageError,
     Trace,
 )
-from pamrs.report import figures
+from pamrs.report import figures, story
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
 
 __all__ = ["render"]
 
-HELD_OUT_SHOWN = 2
-WARNINGS_SHOWN = 6
+TRACES = 3
+"""Channels of a recording that are drawn."""
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
@@ -97,42 +97,15 @@ def _verdict(block: BlockVerdict) -> tuple[str, str, str]:
     return _badge(block.verdict, wrong=wrong, is_open=is_open), named, told
 
 
-def _missed(block: BlockMismatch) -> list[str]:
-    """What a block misses above the noise, refitted and with what was found."""
+def _missed(diagnosis: Findings, block: BlockMismatch) -> list[str]:
+    """What a block misses, refitted and with what was found."""
     part = block.held_out or block.fitted
-    unit, factor = words.display_unit(block.unit, abs(part.refit.size))
-    return [
-        f"{words.format_number(s.noises, 2)} ({words.format_number(s.size * factor, 2)} {unit})"
-        if s.more_than_noise
-        else "noise only"
-        for s in (part.refit, part.after)
-    ]
-
-
-def _mended(errors: Mapping[str, StageError]) -> str:
-    """What a wrong value does to the errors of the held-out recordings."""
     told = []
-    for channel, error in errors.items():
-        shown, scale = words.display_unit(UNITS.get(channel_of(channel), ""), max(error.values()))
-        before, after = (words.format_number(error[key] * scale) for key in ("refit", "after"))
-        told.append(f"{words.spoken_name(channel)}: {before} to {after} {shown}")
-    return "; ".join(told)
-
-
-def _wrong(diagnosis: Findings) -> list[tuple[str, ...]]:
-    """Values of the rig file that are wrong, as cells."""
-    rows: list[tuple[str, ...]] = []
-    for entry in diagnosis.wrong_parameters:
-        unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
-        low, high = (float(v) * factor for v in entry.interval)
-        stated = words.format_uncertain(entry.nominal * factor, entry.tolerance * factor)
-        value = words.format_uncertain(entry.value * factor, entry.std * factor)
-        chance, errors = words.name_chance(diagnosis, entry), _mended(entry.held_out)
-        moved = _signed(entry.moved_sigmas)
-        rows.append(
-            (entry.name, stated, value, _span((low, high), 4), _unit(unit), moved, chance, errors)
-        )
-    return rows
+    for stage in ("refit", "after"):
+        missed = words.miss(diagnosis, block.channel, stage)
+        noise = "" if part[stage].more_than_noise else ", noise only"
+        told.append(f"{_typeset(str(missed))}{noise}" if missed else "–")
+    return told
 
 
 def _signed(moved: float) -> str:
@@ -212,18 +185,6 @@ def _fits(diagnosis: Findings) -> list[tuple[str, list[Any]]]:
     return [(title, rows) for title, rows in tables if rows]
 
 
-def _chance(diagnosis: Findings, names: list[str]) -> str:
-    """Probability of a set that is left: as the headline has it, by the one group of blocks that is
-    open, else that of the case.
-    """
-    is_open = [b for b in diagnosis.judged if len(b.ambiguity) > 1]
-    own = words.chance_of(is_open[0].probabilities if len(is_open) == 1 else {}, names)
-    known = words.is_number(own)
-    return words.format_probability(
-        own if known else words.chance_of(diagnosis.probabilities, names)
-    )
-
-
 def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
     """Errors of free runs beside those of the cut chain, channel by channel."""
     rows = []
@@ -237,10 +198,67 @@ def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
     return rows
 
 
-def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
-    """One fitted and up to two held-out recordings with their figure, and how many are not
-    shown.
+def _budget(diagnosis: Findings) -> list[tuple[str, list[dict[str, str]]]]:
+    """The terms of each block's budget as bars from nothing, each with its interval where the text
+    beside it says.
     """
+    blocks = {name: words.told_terms(own) for name, own in words.budgets(diagnosis).items()}
+    every = [v for own in blocks.values() for _, t in own for v in (t.share, *t.interval)]
+    low, high = max(-1.0, min([0.0, *every])), min(2.5, max([1.0, *every]))
+
+    def at(share: float) -> float:
+        return 100.0 * (min(high, max(low, share)) - low) / (high - low)
+
+    found = []
+    for block, own in blocks.items():
+        rows = []
+        for name, term in own:
+            rest = term.kind == "unexplained" and words.noise_alone(diagnosis, block)
+            ends = sorted((at(0.0), at(term.share)))
+            first, last = at(term.interval[0]), at(term.interval[1])
+            rows.append(
+                {
+                    "name": "left, no more than noise" if rest else name,
+                    "kind": term.kind,
+                    "text": words.format_share(term.share),
+                    "interval": words.format_interval(term.interval),
+                    "bar": f"left:{ends[0]:.2f}%;width:{ends[1] - ends[0]:.2f}%",
+                    "whisker": f"left:{first:.2f}%;width:{last - first:.2f}%",
+                }
+            )
+        found.append((words.spoken_name(block), rows))
+    return found
+
+
+def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
+    """What was found, as cells: name, in the rig file, on the bench, value and interval, unit."""
+    rows: list[tuple[str, ...]] = []
+    for effect in diagnosis.effects:
+        bench = dict(story.bench_value(effect))
+        for name, own in effect.parameters.items():
+            title = f"{words.label(effect.term)}: {words.label(name)}"
+            if own.identifiable is False or not words.is_number(own.value):
+                rows.append((title, "these recordings do not determine it"))
+                continue
+            told = _typeset(bench.get(words.label(name), ""))
+            value = words.format_uncertain(own.value, own.std)
+            rows.append((title, "", told, value, _span(words.span95(own)), _unit(own.unit)))
+    for entry in diagnosis.wrong_parameters:
+        unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
+        low, high = (float(v) * factor for v in entry.interval)
+        stated = words.format_uncertain(entry.nominal * factor, entry.tolerance * factor)
+        value = words.format_uncertain(entry.value * factor, entry.std * factor)
+        far = f"{stated} ({_signed(entry.moved_sigmas)} tolerances)"
+        rows.append((entry.name, far, "", value, _span((low, high), 4), _unit(unit)))
+    return rows
+
+
+def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
+    return Markup(figures.curves(panels, prefix)) if panels else None  # noqa: S704
+
+
+def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
+    """One fitted and one held-out recording with their figure, and how many are not shown."""
     telling = figures.telling_trace(diagnosis)
     groups: dict[tuple[str, str], list[Trace]] = {}
     for trace in diagnosis.traces:
@@ -248,76 +266,27 @@ def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
     keys = list(groups)
     if telling is not None:
         keys.sort(key=lambda k: k != (telling.role, telling.recording))
-    chosen = [k for k in keys if k[0] != "held_out"][:1] + [k for k in keys if k[0] == "held_out"][
-        :HELD_OUT_SHOWN
-    ]
+    held = [k for k in keys if k[0] == "held_out"]
+    chosen = [k for k in keys if k not in held][:1] + held[:1]
     shown = []
     for i, key in enumerate(chosen):
-        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)
+        traces = sorted(groups[key], key=lambda t: t.channel != diagnosis.where.channel)[:TRACES]
         shown.append(
             {
                 "name": key[1],
                 "role": "held out" if key[0] == "held_out" else "used for the fit",
-                "svg": Markup(figures.traces_svg(diagnosis, traces, f"rec{i}")),  # noqa: S704
+                "curves": _curves(figures.trace_panels(diagnosis, traces), f"rec{i}"),
             }
         )
     return shown, len(groups) - len(shown)
 
 
-def _probabilities(diagnosis: Findings) -> list[tuple[str, list[dict[str, Any]]]]:
-    """The bars of each group of blocks with a mismatch, under its name where there are several
-    groups.
-    """
-    several = len(diagnosis.judged) > 1
-    return [
-        (
-            words.blocks_label(block) if several else "",
-            [
-                {
-                    "name": words.hypothesis_label(name),
-                    "text": words.format_probability(p),
-                    "width": f"{100 * max(0.0, min(1.0, p)):.1f}",
-                    "named": words.is_named(block, name),
-                }
-                for name, p in words.ranked_probabilities(block.probabilities, 8)
-            ],
-        )
-        for block in words.told_probabilities(diagnosis)
-        if block.probabilities
-    ]
+def _first(diagnosis: Findings) -> Markup | None:
+    return _curves(figures.free_panels(diagnosis), "free")
 
 
 def _markup(svg: str | None) -> Markup | None:
     return None if svg is None else Markup(svg)  # noqa: S704
-
-
-def _facts(diagnosis: Findings) -> list[tuple[str, str]]:
-    """The few numbers under the headline."""
-    facts = []
-    answer, chance = words.leading(diagnosis)
-    if words.is_number(chance):
-        facts.append((words.format_probability(chance), f"probability: {answer}"))
-    gap = diagnosis.fit.gap_closed
-    if words.is_number(gap):
-        facts.append(
-            (
-                f"{100 * float(gap):.0f} %".replace("-", "−"),
-                f"of the gap to the noise closed over all channels on {diagnosis.proof}",
-            )
-        )
-    if diagnosis.where.block:
-        channel = diagnosis.where.channel
-        seen = f"block; seen in {words.spoken_name(channel)}" if channel else "block"
-        facts.append((words.spoken_name(diagnosis.where.block), seen))
-    facts.append(
-        (
-            f"{diagnosis.seconds:.0f} s"
-            if diagnosis.seconds >= 10
-            else f"{diagnosis.seconds:.1f} s",
-            "computing time",
-        )
-    )
-    return facts
 
 
 def _value(value: object) -> str:
@@ -329,10 +298,15 @@ def _value(value: object) -> str:
     return str(value)
 
 
-def _separating(diagnosis: Findings) -> str | None:
+def _separating(diagnosis: Findings) -> Markup | None:
     """The curves of the next experiment, where it was simulated."""
-    curves = diagnosis.next_experiment.curves
-    return figures.separating_curves(curves) if curves else None
+    own = diagnosis.next_experiment.curves
+    return _curves(figures.separating_panels(own), "next") if own else None
+
+
+def _sentence(text: str) -> str:
+    """The first sentence of an instruction, no longer than a glance."""
+    return textwrap.shorten(re.split(r"(?<=[a-z)%])[.:;] ", text)[0].rstrip("."), 180) + "."
 
 
 def render(diagnosis: Findings) -> str:
@@ -361,10 +335,12 @@ def render(diagnosis: Findings) -> str:
         "the pictures of the recordings", partial(_recordings, diagnosis), ([], 0)
     )
     bits = diagnosis.next_experiment.expected_information_bits
-    shown = diagnosis.condition_map.block if diagnosis.condition_map else ""
+    proposed = diagnosis.next_experiment
+    settings = getattr(diagnosis, "settings", None)
     page = partial(
         render_page,
         Path(__file__).with_name("template.html.j2"),
+        script=Path(__file__).with_name("curves.js").read_text(encoding="utf-8"),
         d=diagnosis,
         w=words,
         badge=_badge(
@@ -372,48 +348,51 @@ def render(diagnosis: Findings) -> str:
             wrong=bool(diagnosis.wrong_parameters),
             is_open=words.is_open(diagnosis),
         ),
-        headline=_typeset(words.claim(diagnosis)),
+        title=_typeset(story.title(diagnosis)),
+        headline=_typeset(words.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
-        map_block=words.spoken_name(shown or diagnosis.where.block or ""),
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",
         recordings=recordings,
         hidden=hidden,
+        free_head=figures.free_head(diagnosis),
+        record=_sentence(proposed.text) if proposed.excitation else "",
+        settings=settings.to_dict() if settings is not None else {},
+        date=datetime.now().astimezone().isoformat(" ", "minutes"),
         data=". ".join(
             text
             for text in (words.data_sentence(diagnosis), words.left_out_sentence(diagnosis))
             if text
         ),
         guarded=lambda what, caller: losses.part(f"the table of {what}", caller, ""),
-        cells={"unit": _unit, "span": _span, "share": _share, "value": _value},
+        cells={"share": _share, "value": _value, "typeset": _typeset},
         verdict=_verdict,
-        missed=_missed,
-        chance=partial(_chance, diagnosis),
+        missed=partial(_missed, diagnosis),
         **pictures,
         **tables,
     )
     known = len(losses.told)
-    text = page(warnings=[*losses.told, *diagnosis.warnings], most=WARNINGS_SHOWN)
+    text = page(warnings=[*losses.told, *diagnosis.warnings])
     if len(losses.told) == known:
         return text
-    return page(warnings=[*losses.told, *diagnosis.warnings], most=WARNINGS_SHOWN)
+    return page(warnings=[*losses.told, *diagnosis.warnings])
 
 
 #: What the template calls each, and what makes it.
 _PICTURES: Final[dict[str, Callable[[Findings], str | None]]] = {
     "chain": chain_svg,
-    "blocks": figures.blocks_svg,
-    "map": figures.map_svg,
-    "budget": figures.budget_svg,
+    "first": _first,
     "separating": _separating,
 }
 _TABLES: Final[dict[str, Callable[[Findings], list[Any]]]] = {
-    "facts": _facts,
+    "facts": story.facts,
+    "to_do": story.to_do,
+    "rivals": story.rivals,
+    "found": _found,
+    "budget": _budget,
     "intervals": _intervals,
     "free_run": _free_run,
-    "probabilities": _probabilities,
-    "wrong": _wrong,
     "fits": _fits,
     "parameters": _parameters,
 }

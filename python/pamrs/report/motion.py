@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
-from pamrs.report.figures import COLOURS, STYLE, decimate, legend_above, png_bytes
+from pamrs.report.figures import COLOURS, STYLE, decimate, png_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -90,7 +90,7 @@ def channels_png(
             axes.set_title(title)
             axes.set_ylabel(laboratory_unit(names[0])[0])
             if len(axes.lines) > 1:
-                legend_above(axes, columns=6)
+                _legend_above(axes)
         rows[-1].set_xlabel("time [s]")
         return png_bytes(figure)
 
@@ -350,3 +350,9 @@ class _Scene:
         )
         self.text.set_text(f"{self.result.time[row]:.2f} s    {said}    {bars} bar")
         return self.arm, self.payload, self.text, *(group.line for group in self.groups)
+
+
+def _legend_above(axes: Axes) -> None:
+    """Legend in one line above the axes, flush right."""
+    place: dict[str, Any] = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0)}
+    axes.legend(ncols=6, borderaxespad=0.1, handlelength=1.8, columnspacing=1.3, **place)

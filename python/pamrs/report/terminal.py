@@ -7,6 +7,7 @@ import textwrap
 from typing import Final
 
 from pamrs.findings import Findings
+from pamrs.report import story
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
@@ -31,10 +32,13 @@ def summary(diagnosis: Findings) -> str:
     for effect in diagnosis.effects:
         lines.append("")
         lines.append(words.effect_heading(diagnosis, effect))
+        bench = dict(story.bench_value(effect, own_units=True))
         for name, own in effect.parameters.items():
             if own.identifiable is not False:
                 value = words.format_uncertain(own.value, own.std, unicode=False)
-                lines.append(with_unit(f"  {name} = {value}", own.unit))
+                told = with_unit(f"  {name} = {value}", own.unit)
+                usual = bench.get(words.label(name))
+                lines.append(f"{told}: {usual}" if usual else told)
             else:
                 lines.append(f"  {name}: these recordings do not determine it")
     for wrong in diagnosis.wrong_parameters:
@@ -147,12 +151,6 @@ def _fit(diagnosis: Findings) -> list[str]:
         shown = [float(v) * factor if words.is_number(v) else None for v in entry.values()]
         cells = (f"{words.format_number(v, unicode=False):>11}" for v in shown)
         lines.append(f"{name:<22}{''.join(cells)}")
-    gap = diagnosis.fit.gap_closed
-    if words.is_number(gap):
-        lines.append(
-            f"gap to the noise closed over all channels, on {diagnosis.proof}: "
-            f"{100 * float(gap):.0f} %"
-        )
     return lines
 
 
@@ -167,13 +165,8 @@ def notebook(diagnosis: Findings) -> str:
             words.told_probabilities(diagnosis)[0].probabilities, 5
         )
     )
-    gap = diagnosis.fit.gap_closed
-    closed = (
-        f"<p>{100 * float(gap):.0f} % of the gap to the noise closed over all channels, on "
-        f"{diagnosis.proof}.</p>"
-        if words.is_number(gap)
-        else ""
-    )
+    mended = words.mended_sentence(diagnosis, "With what was found")
+    closed = f"<p>{html.escape(mended)}, on {diagnosis.proof}.</p>" if mended else ""
     where = html.escape(diagnosis.where.text)
     return (
         f"<div><p><b>{html.escape(words.headline(diagnosis))}.</b></p><p>{where}</p>"

@@ -7,7 +7,7 @@ import os
 import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, TypeGuard
+from typing import Any, NamedTuple, TypeGuard
 
 from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis, Term, effect_of
@@ -30,10 +30,12 @@ from pamrs.units import with_unit
 __all__ = [
     "blocks_label",
     "BUDGET_NOTE",
+    "SETTLED",
     "budget_sentence",
     "budget_sentences",
     "budgets",
     "chance_of",
+    "chance_of_named",
     "claim",
     "considered_sentence",
     "data_sentence",
@@ -41,11 +43,11 @@ __all__ = [
     "effect_heading",
     "effect_name",
     "effect_title",
+    "format_interval",
     "format_number",
     "format_probability",
     "format_share",
     "format_uncertain",
-    "gap_sentence",
     "headline",
     "hypothesis_label",
     "is_named",
@@ -57,15 +59,20 @@ __all__ = [
     "label",
     "leading",
     "left_out_sentence",
+    "mended_sentence",
+    "miss",
+    "miss_of",
     "moved_parameters",
     "name_chance",
     "noise_alone",
     "not_judged_words",
+    "open_chances",
     "off_sentence",
     "ranked_probabilities",
     "sentence_of",
     "shown_errors",
     "set_label",
+    "sized",
     "span95",
     "spoken_block",
     "spoken_name",
@@ -108,7 +115,7 @@ _INSTRUCTION = 40
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DISPLAY = {
-    "Pa": (("kPa", 1e-3, 1e3), ("Pa", 1.0, 0.0)),
+    "Pa": (("kPa", 1e-3, 1e2), ("Pa", 1.0, 0.0)),
     "rad": (("°", 180.0 / math.pi, 0.0),),
     "m": (("m", 1.0, 1.0), ("mm", 1e3, 0.0)),
     "m2": (("m2", 1.0, 1e-2), ("mm2", 1e6, 0.0)),
@@ -325,8 +332,6 @@ def kept_sentence(kept: Unexplained) -> str:
     """What is left in a block: ``the residual of the arm is 15 times the noise level (0.4 deg) on
     held-out recordings, and no listed effect explains it``.
     """
-    unit, factor = display_unit(kept.unit, abs(kept.size))
-    size = format_number(kept.size * factor, 2, unicode=False)
     why = (
         "no listed effect explains it"
         if kept.verdict == "unlisted"
@@ -335,9 +340,9 @@ def kept_sentence(kept: Unexplained) -> str:
     times = format_number(kept.noises, 2, unicode=False)
     on = {"held_out": " on held-out recordings", "fit": " on the fitted recordings"}
     return (
-        f"the residual of the {spoken_name(kept.block)} is {times} times the noise level ({size} "
-        f"{unit}){on.get(kept.role, '')}, and {why}"
-    ).replace("°", "deg")
+        f"the residual of the {spoken_name(kept.block)} is {times} times the noise level "
+        f"({sized(kept.size, kept.unit)}){on.get(kept.role, '')}, and {why}"
+    )
 
 
 def kept_details(kept: Unexplained) -> str:
@@ -346,7 +351,7 @@ def kept_details(kept: Unexplained) -> str:
     if is_number(kept.share) and kept.interval is not None and _tellable(kept.share):
         text += (
             f"; {format_share(kept.share)} of what the nominal model misses "
-            f"({_span(kept.interval)})"
+            f"({format_interval(kept.interval)})"
         )
     if kept.conditions:
         text += f"; largest under: {'; '.join(c.text for c in kept.conditions[:2])}"
@@ -493,13 +498,11 @@ def off_sentence(diagnosis: Findings) -> str:
     """
     told = []
     for channel, error in diagnosis.off.items():
-        unit, factor = display_unit(error.unit, error.after)
-        size = f"{format_number(error.after * factor, 2, unicode=False)} {unit}"
-        times = format_number(error.noises, 2, unicode=False)
+        size, times = sized(error.after, error.unit), format_number(error.noises, 2, unicode=False)
         told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level)")
     if not told:
         return ""
-    return f"the whole rig from its commands alone misses {' and '.join(told)}".replace("°", "deg")
+    return f"the whole rig from its commands alone misses {' and '.join(told)}"
 
 
 def not_judged_words(diagnosis: Findings) -> list[str]:
@@ -585,9 +588,9 @@ def _seen_in(diagnosis: Findings, block: BlockVerdict, others: Sequence[BlockVer
     """How sure a group is of what it names, and each other one that names the same: ``, probability
     0.99, and in the chamber, probability 0.93``.
     """
-    told = _how_sure(_of_names(diagnosis, block))
+    told = _how_sure(chance_of_named(diagnosis, block))
     for other in others:
-        told += f", and{_place(diagnosis, other)}{_how_sure(_of_names(diagnosis, other))}"
+        told += f", and{_place(diagnosis, other)}{_how_sure(chance_of_named(diagnosis, other))}"
     return told
 
 
@@ -621,7 +624,7 @@ def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float
     return next((p for p in found if is_number(p)), math.nan)
 
 
-def _of_names(diagnosis: Findings, block: BlockVerdict) -> float:
+def chance_of_named(diagnosis: Findings, block: BlockVerdict) -> float:
     """Probability of what a block names: of that set of names where it leads, else of the least
     probable of the names, whatever else acts beside it.
     """
@@ -637,6 +640,14 @@ def _of_names(diagnosis: Findings, block: BlockVerdict) -> float:
     return min((e.probability for e in every if is_number(e.probability)), default=math.nan)
 
 
+def open_chances(diagnosis: Findings) -> Mapping[str, float]:
+    """Probabilities of the sets that are left: those of the one group of blocks that is open, as
+    the headline has them, else those of the case.
+    """
+    is_open = [b for b in diagnosis.judged if len(b.ambiguity) > 1]
+    return is_open[0].probabilities if len(is_open) == 1 else diagnosis.probabilities
+
+
 def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str:
     """Probability of one name, and that it counts sets with others where these make a
     difference: ``0.93, alone or with others``; where several groups of blocks name it, that of
@@ -647,11 +658,12 @@ def name_chance(diagnosis: Findings, entry: EffectFound | WrongParameter) -> str
     naming = [b for b in told_blocks(diagnosis) if name in (*b.effects, *b.wrong_parameters)]
     if len(naming) > 1 and all(len((*b.effects, *b.wrong_parameters)) == 1 for b in naming):
         return ", ".join(
-            f"{format_probability(_of_names(diagnosis, b))}{_place(diagnosis, b)}" for b in naming
+            f"{format_probability(chance_of_named(diagnosis, b))}{_place(diagnosis, b)}"
+            for b in naming
         )
     for block in told_blocks(diagnosis):
         named = [*block.effects, *block.wrong_parameters]
-        if name in named and format_probability(_of_names(diagnosis, block)) != text:
+        if name in named and format_probability(chance_of_named(diagnosis, block)) != text:
             return f"{text}, alone or with others"
     return text
 
@@ -672,7 +684,7 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
         return answer, sum(known) if known else math.nan
     own = [b for b in told_blocks(diagnosis) if b.effects or b.wrong_parameters]
     if len(own) == 1:
-        return set_label(names), _of_names(diagnosis, own[0])
+        return set_label(names), chance_of_named(diagnosis, own[0])
     whole = BlockVerdict(
         blocks=[],
         verdict="",
@@ -681,40 +693,87 @@ def leading(diagnosis: Findings) -> tuple[str, float]:
         wrong_parameters=wrong,
         ambiguity=[],
     )
-    return set_label(names), _of_names(diagnosis, whole)
+    return set_label(names), chance_of_named(diagnosis, whole)
 
 
-def gap_sentence(diagnosis: Findings, by: str) -> str:
-    """How much of the gap between the refitted model and the noise closes, over which channels, and
-    over those of the blocks with a name where these are fewer.
+class Miss(NamedTuple):
+    """Root mean square error of a channel on the recordings of the proof, noise included.
+
+    Attributes
+    ----------
+    noises : float
+        In noise levels: 1 is what noise alone leaves.
+    size : str
+        With its unit.
+    """
+
+    noises: float
+    size: str
+
+    def __str__(self) -> str:
+        return f"{format_number(self.noises, 2, unicode=False)} noise levels ({self.size})"
+
+
+def miss(diagnosis: Findings, channel: str | None, stage: str) -> Miss | None:
+    """What a block misses of its channel: the one size of a mismatch that text and page tell.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        What was found.
+    channel : str or None
+        The channel.
+    stage : str
+        ``before`` (the model of the rig file), ``refit`` (values inside their tolerances) or
+        ``after`` (with what was found).
+
+    Returns
+    -------
+    Miss or None
+        On held-out recordings, on the fitted ones where there are none; None where a result does
+        not say.
+    """
+    errors = diagnosis.fit.held_out or diagnosis.fit.channels
+    return None if channel not in errors else miss_of(errors[channel], channel, stage)
+
+
+def miss_of(error: ChannelError, channel: str, stage: str) -> Miss | None:
+    """The same of an entry of the table of errors."""
+    value = error[stage]
+    if not is_number(value) or not is_number(error.noise) or not error.noise > 0.0:
+        return None
+    return Miss(value / error.noise, sized(value, unit_of(channel)))
+
+
+def sized(value: float, unit: str) -> str:
+    """A size with its unit, as a terminal has it: ``0.85 kPa``."""
+    shown, factor = display_unit(unit, abs(value))
+    size = format_number(value * factor, 2, unicode=False)
+    return with_unit(size, shown.replace("°", "deg"))
+
+
+def mended_sentence(diagnosis: Findings, by: str) -> str:
+    """What the channels of the blocks with a name are missed by, before and after.
 
     Parameters
     ----------
     diagnosis : Findings
     by : str
-        What closes it, as the begin of the sentence: ``With it``.
+        What mends it, as the begin of the sentence: ``With it``.
 
     Returns
     -------
     str
-        Empty where the gap is not known.
+        Empty where the errors are not known, and where nothing is mended.
     """
-    gap, errors = diagnosis.fit.gap_closed, diagnosis.fit.held_out or diagnosis.fit.channels
-    if not is_number(gap):
-        return ""
     named = [b for b in diagnosis.judged if b.effects or b.wrong_parameters]
-    own = [m.channel for b in named for m in b.mismatch if m.channel in errors]
-    every = ", ".join(map(spoken_name, errors))
-    text = (
-        f"{by} {100.0 * gap:.0f} % of the gap between refitted model and noise closes over all "
-        f"channels ({every})"
-    )
-    room = sum(errors[c].refit / errors[c].noise - 1.0 for c in own)
-    if own and len(own) < len(errors) and room > 0.0:
-        closed = sum((errors[c].refit - errors[c].after) / errors[c].noise for c in own) / room
-        alone = " and ".join(map(spoken_name, own))
-        text += f" and {100.0 * min(1.0, max(0.0, closed)):.0f} % in {alone} alone"
-    return text
+    own = [m.channel for b in named for m in b.mismatch if m.block == diagnosis.where.block]
+    told = []
+    for channel in own or [diagnosis.where.channel or ""]:
+        before, after = (miss(diagnosis, channel, stage) for stage in ("refit", "after"))
+        if before and after and after.noises < before.noises:
+            told.append(f"{spoken_name(channel)} by {after} instead of {before}")
+    return f"{by} the model misses {' and '.join(told)}" if told else ""
 
 
 def is_open(diagnosis: Findings) -> bool:
@@ -773,7 +832,8 @@ def _unnamed(diagnosis: Findings) -> str:
     block = diagnosis.where.block
     place = f" in the {spoken_name(block)}" if block else ""
     doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
-    rivals = " or ".join(_answer(s, chance_of(diagnosis.probabilities, s)) for s in doubtful)
+    chances = open_chances(diagnosis)
+    rivals = " or ".join(_answer(s, chance_of(chances, s)) for s in doubtful)
     if diagnosis.verdict == "none" and doubtful:
         return (
             "The model explains these recordings down to the noise level, but they cannot rule out "
@@ -798,7 +858,7 @@ def _unnamed(diagnosis: Findings) -> str:
             f"No physics is missing{place}{beside}; parameter values explain the difference{which}"
         )
     if len(doubtful) > 1:
-        apart = told_apart(doubtful, diagnosis.probabilities)
+        apart = told_apart(doubtful, chances)
         return f"Physics is missing{place}: these recordings cannot tell {apart}"
     return _outside(diagnosis, place)
 
@@ -895,18 +955,12 @@ def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) ->
     """The budget of one block in words; what is left is told as noise where it is no more."""
     *before, (_, last) = told_terms(terms)
     told = [
-        f"{name} {format_share(term.share)} ({_span(term.interval)})"
+        f"{name} {format_share(term.share)} ({format_interval(term.interval)})"
         for name, term in before
         if _tellable(term.share)
     ]
-    unit, factor = display_unit(last.unit, abs(last.size))
     share = format_share(last.share) if _tellable(last.share) else "more than the nominal model has"
-    left = (
-        f"{share} unexplained: {format_number(last.noises, 2)} noise levels, "
-        f"{format_number(last.size * factor, 2)} {unit}"
-        if last.noises > 0.0 and not noise_only
-        else "only noise is left"
-    )
+    left = f"{share} unexplained" if last.noises > 0.0 and not noise_only else "only noise is left"
     return "; ".join([*told, left]) + "."
 
 
@@ -948,8 +1002,8 @@ def _percent(share: float) -> str:
     return "0" if text == "-0" else text.replace("-", "\u2212")
 
 
-def _span(interval: Sequence[float]) -> str:
-    """An interval in percent."""
+def format_interval(interval: Sequence[float]) -> str:
+    """An interval of shares in percent: ``11 to 41``."""
     return " to ".join(_percent(share) for share in interval)
 
 

@@ -10,15 +10,16 @@ from pamrs.report.text import (
     effect_name,
     format_number,
     format_probability,
-    gap_sentence,
     is_number,
     is_open,
     judged_place,
     kept_sentence,
     leading,
+    mended_sentence,
     name_chance,
     not_judged_words,
     off_sentence,
+    open_chances,
     sentence_of,
     spoken_name,
     told_apart,
@@ -152,8 +153,8 @@ def _outside(chance: float) -> str:
 
 
 def _closed(diagnosis: Findings, by: str, case: Case) -> str:
-    """How much of the gap closes; empty where that is not known."""
-    told = gap_sentence(diagnosis, by)
+    """What the model misses then; empty where that is not known."""
+    told = mended_sentence(diagnosis, by)
     return f" {told}, on {_proof(case)}." if told else ""
 
 
@@ -224,7 +225,7 @@ def _unsettled(diagnosis: Findings) -> str:
     """The sets that are left, as a sentence; empty where the answer is settled."""
     if len(diagnosis.ambiguity) < 2:
         return ""
-    apart = told_apart(diagnosis.ambiguity, diagnosis.probabilities)
+    apart = told_apart(diagnosis.ambiguity, open_chances(diagnosis))
     return f" It is not settled: these recordings cannot tell {apart}."
 
 

@@ -121,7 +121,7 @@ def assemble(
     diagnosis = Diagnosis(
         case=case.name,
         verdict=verdict,
-        where=words.where(located, fitted, judged, picture),
+        where=words.where(located, fitted, judged, picture, found.errors),
         effects=effects,
         ambiguity=[hypothesis.words for hypothesis in found.ambiguity],
         probabilities={str(h): p for h, p in found.probabilities.items()},
@@ -147,6 +147,7 @@ def assemble(
         tested=part("the list of what was tested", lambda: _tested(groups), []),
         free_run=found.runs,
         free_run_note=found.runs_note,
+        free_traces=found.curves,
         settings=fitted.settings,
     )
     return _worded(diagnosis, case, judged, forms)

@@ -192,21 +192,36 @@ def describe(
         if len(parts) == len(recordings)
     }
     z = np.concatenate(scaled)
-    total = float(np.sum(np.maximum(z**2 - 1.0, 0.0)))
-    for name, mask in _regimes(joined).items():
-        if mask.sum() < 10 or total <= 0:
-            continue
-        share = float(np.sum(np.maximum(z[mask] ** 2 - 1.0, 0.0))) / total
-        time = float(mask.mean())
-        mean = float(z[mask].mean())
-        text = (
-            f"{name}: {100 * share:.0f} % of the excess over the noise, in {100 * time:.0f} % of "
-            f"the time{_sign(z[mask], rising=block.window is not None)}"
-        )
-        picture.conditions.append(Condition(name, share, time, mean, text))
-    picture.conditions.sort(key=lambda c: -c.share / max(0.02, c.time) * c.share)
+    picture.conditions = _shares(_regimes(joined), z, rising=block.window is not None)
     picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)
     return picture
+
+
+def _shares(regimes: dict[str, NDArray[np.bool_]], z: Array, *, rising: bool) -> list[Condition]:
+    """What of the excess each condition carries that none before it has, the most telling first: no
+    bin is counted twice, so that shares add up to at most all of it.
+    """
+    excess = np.maximum(z**2 - 1.0, 0.0)
+    total, found = float(np.sum(excess)), list[Condition]()
+    rest, waiting = np.ones(z.size, dtype=bool), dict(regimes)
+    while total > 0.0:
+        waiting = {name: own for name, mask in waiting.items() if (own := mask & rest).sum() >= 10}
+        if not waiting:
+            break
+
+        def telling(mask: NDArray[np.bool_]) -> float:
+            return float(np.sum(excess[mask])) ** 2 / max(0.02, float(mask.mean()))
+
+        name = max(waiting, key=lambda name: telling(waiting[name]))
+        mask = waiting.pop(name)
+        rest &= ~mask
+        share, time = float(np.sum(excess[mask])) / total, float(mask.mean())
+        text = (
+            f"{'otherwise ' if found else ''}{name}: {100 * share:.0f} % of the excess over the "
+            f"noise, in {100 * time:.0f} % of the time{_sign(z[mask], rising=rising)}"
+        )
+        found.append(Condition(name, share, time, float(z[mask].mean()), text))
+    return found
 
 
 _ONE_SIDED = 0.5

@@ -15,6 +15,7 @@ from pamrs.recordings import Case
 from pamrs.report.text import (
     display_unit,
     format_number,
+    miss_of,
     spoken_block,
     spoken_name,
 )
@@ -36,21 +37,30 @@ _NO_MISMATCH_PROBABILITY = 0.1
 TELLING_CONDITION = 1.15
 
 
-def where(located: str | None, problem: Problem, judged: list[Judged], picture: Picture) -> Where:
-    """The ``where`` entry: block, channel, intervals, conditions and a sentence."""
+def where(
+    located: str | None,
+    problem: Problem,
+    judged: list[Judged],
+    picture: Picture,
+    errors: dict[str, dict[str, ChannelError]],
+) -> Where:
+    """The ``where`` entry: block, channel, intervals, conditions and a sentence, which has the
+    block's error of the table of ``errors`` that proves the answer.
+    """
     groups = [j.group for j in judged]
     if located is None:
         text = "After the refit, no block's residual is above the noise level."
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
-    found = next(g.baseline[located] for g in groups if located in g.baseline)
+    proof = errors["held_out"] or errors["fit"]
+    on = "held-out recordings" if errors["held_out"] else "the fitted recordings"
+    missed = miss_of(proof[block.channel], block.channel, "refit")
     place = spoken_block(located)
     parts = "" if block.covers == located else f" ({block.covers})"
     text = (
         f"The mismatch lies in the {place}{parts}. With the measured signals of its "
-        f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)}: what "
-        f"exceeds the noise is {found.systematic:.2g} times the noise level on the fitted "
-        "recordings."
+        f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)} by "
+        f"{missed} on {on}."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
@@ -78,7 +88,7 @@ def where(located: str | None, problem: Problem, judged: list[Judged], picture: 
     elif group is not None and group.probabilities.get(UNDECIDED, 0.0) > _NO_MISMATCH_PROBABILITY:
         text = (
             f"The residual of the {place}{parts} is barely above the noise level "
-            f"({found.systematic:.2g} times it in {spoken_name(block.channel)}). "
+            f"(it misses {spoken_name(block.channel)} by {missed}). "
             "The noise level may have been estimated too low."
         )
     elif all(g.mismatch is None for g in groups):

@@ -52,7 +52,7 @@ from pamrs.diagnosis.noise import NoiseLevel
 from pamrs.diagnosis.prepare import Residual
 from pamrs.effects import CATALOGUE, NONE, PARAMETERS, Hypothesis, Term
 from pamrs.errors import SimulationError
-from pamrs.findings import BudgetTerm, ChannelError, FreeRun, channels_off
+from pamrs.findings import BudgetTerm, ChannelError, FreeRun, Trace, channels_off
 from pamrs.rig import Rig
 
 # [tolerances] of two groups about one sensor's zero that refits the vaguer (decision 22)
@@ -137,6 +137,8 @@ class Conclusion:
         Simulations of each recording from its commands alone, and a note on them.
     runs_note : str
         What is to be said beside them.
+    curves : list of Trace
+        Those of the recording that the nominal model misses most.
     """
 
     models: Models
@@ -149,6 +151,7 @@ class Conclusion:
     budget: list[BudgetTerm]
     runs: list[FreeRun] | None
     runs_note: str
+    curves: list[Trace]
 
     @property
     def judged(self) -> list[Judged]:
@@ -190,9 +193,9 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
     budgeted = partial(budget, judged, held, outside, noise_level, nominal)
     known = _known(models)
     running = partial(free_run, held, outside, nominal, models.final, models.events, known)
-    nothing: tuple[list[FreeRun] | None, str] = (None, "the free run failed")
+    nothing: tuple[list[FreeRun] | None, str, list[Trace]] = (None, "the free run failed", [])
     terms = part("the budget", lambda: budgeted(models.final, models.events), [])
-    runs, note = part("the free run", running, nothing)
+    runs, note, curves = part("the free run", running, nothing)
     return Conclusion(
         models,
         case_probabilities(judged),
@@ -204,6 +207,7 @@ def conclude(nominal: Rig, fitted: Problem, held: Problem, groups: list[BlockGro
         terms,
         runs,
         note,
+        curves,
     )
 
 

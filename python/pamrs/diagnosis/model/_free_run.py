@@ -20,10 +20,10 @@ from pamrs.diagnosis.fit import Events, Key, Problem, with_known
 from pamrs.diagnosis.prepare import Prepared, Residual
 from pamrs.effects import EFFECTS
 from pamrs.errors import PamrsError, RecordingError
-from pamrs.findings import FreeRun, FreeRunError
+from pamrs.findings import FreeRun, FreeRunError, Trace
 from pamrs.recordings import Recording
 from pamrs.rig import Rig
-from pamrs.simulation import core_rig, differences, replay
+from pamrs.simulation import Simulation, core_rig, differences, replay
 
 # times more than its block that the whole rig misses of a freed constant before that is said
 _FAR_ALONE = 5.0
@@ -80,7 +80,7 @@ def free_run(
     final: Rig,
     events: Events | None,
     known: KnownValues | None = None,
-) -> tuple[list[FreeRun] | None, str]:
+) -> tuple[list[FreeRun] | None, str, list[Trace]]:
     """Errors of free-running simulations of every recording.
 
     A simulation begins at the recording's first usable values, its gases as warm as the room or as
@@ -103,22 +103,26 @@ def free_run(
 
     Returns
     -------
-    tuple of (list of FreeRun or None, str)
+    tuple of (list of FreeRun or None, str, list of Trace)
         One entry for each recording that could be simulated, and what is to be said beside them;
-        None and the reason where no recording has the commands that the rig needs.
+        None and the reason where no recording has the commands that the rig needs. The curves of
+        the recording that the nominal model misses most, in noise levels, channel by channel.
     """
-    runs, missing = [], []
+    runs, missing, curves, most = [], [], list[Trace](), -1.0
     for prepared in problem.recordings:
         recording = prepared.recording
         try:
             there = _with(final, events, recording)
-            run = _of(prepared, problem, found, nominal, there)
+            run, drawn = _of(prepared, problem, found, nominal, there)
             runs.append(_judged(run, prepared, there, known))
+            missed = max((e.times_before for e in run.channels.values()), default=0.0)
+            if missed > most:
+                most, curves = missed, drawn
         except RecordingError as error:  # it lacks a command
             missing.append(str(error))
     if not runs:
-        return None, "no free run: " + "; ".join(missing)
-    return runs, "without a free run: " + "; ".join(missing) if missing else ""
+        return None, "no free run: " + "; ".join(missing), []
+    return runs, "without a free run: " + "; ".join(missing) if missing else "", curves
 
 
 def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
@@ -126,11 +130,15 @@ def _with(rig: Rig, events: Events | None, recording: Recording) -> Rig:
     return rig if events is None else events.put_into(rig, recording.name)
 
 
-def _of(prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final: Rig) -> FreeRun:
-    """The free run of one recording."""
+def _of(
+    prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final: Rig
+) -> tuple[FreeRun, list[Trace]]:
+    """The free run of one recording, and its curves."""
     recording = prepared.recording
-    before, why = _errors(nominal, prepared)
-    after, why_after = (before, why) if final is nominal else _errors(final, prepared)
+    logged = _as_logged(recording)
+    first = _errors(nominal, prepared, logged)
+    last = first if final is nominal else _errors(final, prepared, logged)
+    (before, why, one), (after, why_after, other) = first, last
     notes = [f"nominal model: {why}"] if why else []
     notes += [f"with what was found: {why_after}"] if why_after and final is not nominal else []
     covering = {b.channel: b.name for b in problem.blocks}
@@ -143,7 +151,9 @@ def _of(prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final
         values = residual.value[residual.rows]
         return math.sqrt(float(np.mean(values**2))) if values.size else None
 
-    return FreeRun(
+    channels = list(before | after)
+    curves = [_curves(logged, channel, one, other) for channel in channels]
+    entry = FreeRun(
         recording=recording.name,
         role=recording.role,
         seconds=float(recording.time[-1] - recording.time[0]),
@@ -156,10 +166,11 @@ def _of(prepared: Prepared, problem: Problem, found: Stages, nominal: Rig, final
                 cut_after=cut("after", channel),
                 noise=prepared.noise.get(recorded_as(channel)),
             )
-            for channel in before | after
+            for channel in channels
         },
         note="; ".join(notes),
     )
+    return entry, curves
 
 
 def _judged(
@@ -370,14 +381,32 @@ def _as_logged(recording: Recording) -> Recording:
     )
 
 
-def _errors(rig: Rig, prepared: Prepared) -> tuple[dict[str, float], str]:
-    """Root mean square error of each measured channel, and why there is none."""
-    logged = _as_logged(prepared.recording)
+def _curves(
+    logged: Recording, channel: str, before: Simulation | None, after: Simulation | None
+) -> Trace:
+    """A channel as it was measured and as both models give it."""
+    own, nothing = recorded_as(channel), np.full(len(logged), np.nan)
+    return Trace(
+        logged.name,
+        logged.role,
+        channel,
+        unit_of(channel),
+        logged.time,
+        np.where(logged.mask[own], logged.channels[own], np.nan),
+        nothing if before is None else before[channel],
+        after=None if after is None else after[channel],
+    )
+
+
+def _errors(
+    rig: Rig, prepared: Prepared, logged: Recording
+) -> tuple[dict[str, float], str, Simulation | None]:
+    """Root mean square error of each measured channel, and why there is none; the simulation."""
     try:
         begins = {name: begin.kelvin for name, begin in _begun(rig, prepared).items()}
         run = replay(rig, logged, temperatures=begins, record=_measured(rig, logged))
-        return differences(run, logged), ""
+        return differences(run, logged), "", run
     except RecordingError:
         raise
     except (PamrsError, ArithmeticError) as error:
-        return {}, str(error)
+        return {}, str(error), None

@@ -1,0 +1,55 @@
+"""``pamrs compare``: two results of diagnoses side by side."""
+
+from __future__ import annotations
+
+from json import loads
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from pamrs.cli._shared import check_writable, document, file_of, json_help, write
+
+__all__ = ["compare_command"]
+
+
+def compare_command(
+    first: Annotated[
+        Path,
+        typer.Argument(metavar="A", help="A result (--json of diagnose), or a folder with it."),
+    ],
+    second: Annotated[Path, typer.Argument(metavar="B", help="The result to compare it with.")],
+    json: Annotated[Path | None, typer.Option(help=json_help("pamrs.comparison/1"))] = None,
+    out: Annotated[Path | None, typer.Option(help="Write a page, one HTML file.")] = None,
+) -> None:
+    """Set two results of diagnose side by side: verdict, block, candidates with probabilities,
+    parameters, what the models miss, and what changed.
+    """
+    check_writable(file_of(json), out)
+    from pamrs.findings import compare_results
+    from pamrs.report.compare import comparison_html, comparison_text
+
+    results = _read(first), _read(second)
+    found = compare_results(_names(first, second), *results)
+    write(
+        {
+            json: document("pamrs.comparison/1", **found.to_dict()),
+            out: comparison_html(found),
+        },
+        comparison_text(found),
+    )
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """What two results are called: their files or folders, in full where these are the same."""
+    short = [path.stem if path.stem != "result" else path.parent.name for path in (first, second)]
+    one, other = short if short[0] != short[1] else (str(first), str(second))
+    return one, other
+
+
+def _read(path: Path) -> dict[str, Any]:
+    """A result as a table, by its file or the folder with ``result.json``."""
+    from pamrs.diagnosis.result import load_result
+
+    told: dict[str, Any] = loads(load_result(path).to_json())
+    return told

@@ -1,0 +1,168 @@
+"""Two results side by side, and what changed from one to the other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from pamrs.findings._entries import NOT_JUDGED
+from pamrs.findings._entry import to_plain
+from pamrs.units import with_unit
+
+_Value = TypeVar("_Value")
+
+CLEARLY = 2.0
+"""[standard deviations] Difference of two values from which one is said to have changed."""
+LIKELY = 0.1
+"""Difference of two probabilities from which that is said."""
+LEAST = 0.005
+"""Probability below which in both results a candidate is left out."""
+FARTHER = 1.1
+"""Ratio of two errors from which that is said."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Two results side by side: of everything what the first and what the second has, None where it
+    has nothing of it.
+
+    Attributes
+    ----------
+    names : (str, str)
+        Of the results.
+    verdict, block : (str or None, str or None)
+        The verdicts, and the blocks with the mismatch.
+    candidates : dict of str to pair of float
+        Probability of each hypothesis about that block.
+    parameters : dict of str to pair of dict
+        ``value``, ``std``, ``unit`` of parameters of effects and of the rig, SI.
+    missed : dict of str to pair of float
+        Root mean square error of each channel with what was found, in noise levels, on held-out
+        recordings (fitted ones where there are none).
+    free_run : dict of str to pair of float
+        The same of the whole rig from its commands alone, by ``recording: channel``, SI.
+    changed : list of str
+        What changed, in words; empty where nothing that counts did.
+    """
+
+    names: tuple[str, str]
+    verdict: tuple[str | None, str | None]
+    block: tuple[str | None, str | None]
+    candidates: dict[str, tuple[float | None, float | None]]
+    parameters: dict[str, tuple[dict[str, Any] | None, dict[str, Any] | None]]
+    missed: dict[str, tuple[float | None, float | None]]
+    free_run: dict[str, tuple[float | None, float | None]]
+    changed: list[str] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The same as JSON has it."""
+        return {key: to_plain(value) for key, value in vars(self).items()}
+
+
+def compare_results(
+    names: tuple[str, str], first: Mapping[str, Any], second: Mapping[str, Any]
+) -> Compared:
+    """Set two results side by side.
+
+    Parameters
+    ----------
+    names : (str, str)
+        What they are called.
+    first, second : mapping
+        Contents of their JSON files.
+    """
+
+    def each(of: Callable[[Mapping[str, Any]], dict[str, _Value]]) -> dict[str, Any]:
+        one, other = of(first), of(second)
+        return {name: (one.get(name), other.get(name)) for name in one | other}
+
+    ranked = sorted(each(_candidates).items(), key=lambda item: -max(v or 0.0 for v in item[1]))
+    found = Compared(
+        names=names,
+        verdict=(first["verdict"], second["verdict"]),
+        block=(first["where"]["block"], second["where"]["block"]),
+        candidates={n: pair for n, pair in ranked if max(v or 0.0 for v in pair) >= LEAST},
+        parameters=each(_parameters),
+        missed=each(_missed),
+        free_run=each(_free_run),
+    )
+    found.changed.extend(_changed(found, first, second))
+    return found
+
+
+def _candidates(result: Mapping[str, Any]) -> dict[str, float]:
+    """Probabilities of the group of blocks with the mismatch; those of the case where none has."""
+    located = result["where"]["block"]
+    judged = (b for b in result["blocks"] if b["verdict"] != NOT_JUDGED and located in b["blocks"])
+    return dict(next((b["probabilities"] for b in judged), result["probabilities"]))
+
+
+def _parameters(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Parameters of what is named, then of the rig."""
+    named = result["effects"] if result["verdict"] == "effects" else []
+    found = {
+        f"{effect['id']}{'@' * bool(effect.get('at'))}{effect.get('at', '')}.{name}": own
+        for effect in named
+        for name, own in effect["parameters"].items()
+    }
+    found |= {own["name"]: own for own in result["wrong_parameters"]}
+    every = result["parameters"] | found
+    keys = ("value", "std", "unit")
+    return {n: {k: every[n].get(k) for k in keys} for n in [*found, *every]}
+
+
+def _missed(result: Mapping[str, Any]) -> dict[str, float]:
+    errors = result["fit"]["held_out"] or result["fit"]["channels"]
+    return {n: e["after"] / e["noise"] for n, e in errors.items() if e["after"] and e["noise"]}
+
+
+def _free_run(result: Mapping[str, Any]) -> dict[str, float]:
+    return {
+        f"{run['recording']}: {channel}": error["after"]
+        for run in result["free_run"] or []
+        for channel, error in run["channels"].items()
+        if error["after"] is not None
+    }
+
+
+def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
+    """What changed, in words."""
+    told = []
+    for what, (one, other) in (("verdict", found.verdict), ("block", found.block)):
+        if one != other:
+            told.append(f"{what}: {one or 'none'} before, now {other or 'none'}")
+    before, now = _named(first), _named(second)
+    told += [f"{name} is named now" for name in sorted(now - before)]
+    told += [f"{name} is not named any more" for name in sorted(before - now)]
+    for name, (p, q) in found.candidates.items():
+        if abs((p or 0.0) - (q or 0.0)) >= LIKELY:
+            told.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")
+    for name, (old, new) in found.parameters.items():
+        if old and new and (apart := _apart(old, new)) >= CLEARLY:
+            now_told = with_unit(f"{new['value']:.4g}", new["unit"] or "")
+            values = f"{old['value']:.4g} before, now {now_told}"
+            told.append(f"{name}: {values} ({apart:.1f} standard deviations)")
+    for table, what in ((found.missed, "missed of"), (found.free_run, "free run of")):
+        for name, (size, new_size) in table.items():
+            if size and new_size and not 1.0 / FARTHER < new_size / size < FARTHER:
+                told.append(f"{what} {name}: {new_size / size:.2g} times what it was")
+    for key in ("inputs", "settings", "version"):
+        one, other = first.get(key), second.get(key)
+        if one != other and one is not None and other is not None:
+            told.append(f"{key} differ" if key != "version" else f"version {one} and {other}")
+    return told
+
+
+def _named(result: Mapping[str, Any]) -> set[str]:
+    """Effects and parameters that a result names."""
+    effects = {e["id"] for e in result["effects"] if result["verdict"] == "effects"}
+    return effects | {w["name"] for w in result["wrong_parameters"]}
+
+
+def _apart(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
+    """Distance of two values in their joint standard deviation; 0 where it is not known."""
+    std = math.hypot(old["std"] or 0.0, new["std"] or 0.0)
+    known = std > 0.0 and old["value"] is not None and new["value"] is not None
+    return abs(new["value"] - old["value"]) / std if known else 0.0

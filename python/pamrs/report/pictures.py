@@ -1,0 +1,114 @@
+"""The first screen of a report as one picture: PNG, or one page of A4."""
+
+from __future__ import annotations
+
+import io
+import textwrap
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from pamrs.findings import Findings
+from pamrs.report import story
+from pamrs.report.chain import draw_chain
+from pamrs.report.figures import (
+    COLOURS,
+    STYLE,
+    draw_panel,
+    free_head,
+    free_panels,
+    legend_below,
+    summary_figure,
+)
+from pamrs.rig import Rig
+
+__all__ = ["one_page_pdf", "summary_png"]
+
+
+def summary_png(diagnosis: Findings) -> bytes:
+    """One picture: the chain, the free run of the worst recording, and the probabilities.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        Result to draw; parts that it lacks are left out.
+
+    Returns
+    -------
+    bytes
+        PNG of 1600 x 1000 pixels.
+    """
+    with summary_figure(story.title(diagnosis), 78) as (figure, finished):
+        heights = [1.5, 4.2] if isinstance(diagnosis.rig, Rig) else [0.01, 4.2]
+        upper, lower = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
+        draw_chain(upper.add_axes((0.02, 0.0, 0.96, 1.0), frameon=False), diagnosis)
+        left, right = lower.subfigures(1, 2, width_ratios=[1.6, 1.0])
+        _draw_first(left, diagnosis, 2)
+        _draw_rivals(right, diagnosis)
+        return finished()
+
+
+def one_page_pdf(diagnosis: Findings) -> bytes:
+    """The first screen of the report on one page of A4.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        Result to draw; parts that it lacks are left out.
+
+    Returns
+    -------
+    bytes
+        PDF.
+    """
+    with mpl.rc_context(STYLE | {"pdf.fonttype": 42}):
+        figure = Figure(figsize=(8.27, 11.69))
+        figure.set_layout_engine("constrained", w_pad=0.35, h_pad=0.12)
+        heights = [2.5, 1.4, 5.0, 2.4]
+        parts = figure.subfigures(4, 1, height_ratios=heights, squeeze=False)[:, 0]
+        top, chain, curves, bars = parts
+        told = [f"{value} – {what}" for value, what in story.facts(diagnosis)]
+        lines = [textwrap.fill(text, 100) for text in [*told, *story.to_do(diagnosis)]]
+        title = textwrap.fill(story.title(diagnosis), 60)
+        style: dict[str, Any] = {"ha": "left", "va": "top"}
+        top.text(0.05, 0.9, title, size=15, fontweight="bold", **style)
+        top.text(0.05, 0.58, "\n".join(lines), size=9, linespacing=1.5, **style)
+        draw_chain(chain.add_axes((0.05, 0.0, 0.9, 1.0), frameon=False), diagnosis)
+        _draw_first(curves, diagnosis, 3)
+        _draw_rivals(bars, diagnosis)
+        stream = io.BytesIO()
+        figure.savefig(stream, format="pdf", metadata={"Title": f"Diagnosis of {diagnosis.case}"})
+        return stream.getvalue()
+
+
+def _draw_first(part: Any, diagnosis: Findings, most: int) -> None:
+    """The free run, with one legend for all of its panels."""
+    panels = free_panels(diagnosis)[:most]
+    if not panels:
+        return
+    every = part.subplots(len(panels), 1, sharex=True, squeeze=False)[:, 0]
+    for axes, panel in zip(every, panels, strict=True):
+        draw_panel(axes, panel, 0.9)
+    legend_below(part, every)
+    every[-1].set_xlabel("time [s]")
+    part.suptitle(free_head(diagnosis), x=0.03, ha="left", fontsize=9.5, fontweight="bold")
+
+
+def _draw_rivals(part: Any, diagnosis: Findings) -> None:
+    """The ranked bar of the explanations."""
+    rows = story.rivals(diagnosis)
+    if not rows:
+        return
+    axes = part.subplots()
+    places = list(range(len(rows)))
+    colours = [COLOURS["after" if row.named else "quiet"] for row in rows]
+    axes.barh(places, [row.probability for row in rows], color=colours, height=0.62)
+    for place, row in zip(places, rows, strict=True):
+        axes.text(row.probability + 0.015, place, row.told, va="center", fontsize="small")
+    axes.set_yticks(places, [textwrap.shorten(row.name, 34, placeholder=" …") for row in rows])
+    axes.set_xlim(0.0, 1.16)
+    axes.set_xticks([0.0, 0.5, 1.0])
+    axes.set_ylim(max(len(rows), 5) - 0.4, -0.6)
+    axes.grid(axis="y", visible=False)
+    part.suptitle("What else it could be", x=0.03, ha="left", fontsize=9.5, fontweight="bold")

@@ -1,0 +1,100 @@
+"""``pamrs compare``: two results side by side."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pamrs import cli
+from pamrs.findings import FreeRun, FreeRunError
+from tests.diagnosis import synthetic
+
+
+def result(path: Path, **changes: Any) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    error = FreeRunError("Pa", 22800.0, changes.pop("free", 610.0), 900.0, 400.0, 400.0)
+    run = FreeRun("random", "held_out", 30.0, {"muscle_pressure": error})
+    synthetic.diagnosis(free_run=[run], **changes).to_json(path)
+    return path
+
+
+def told(capsys: pytest.CaptureFixture[str], *words: object) -> tuple[int, str, str]:
+    code = cli.main(["compare", *map(str, words)])
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def test_two_results_are_set_side_by_side(tmp_path: Path, capsys: Any) -> None:
+    first = result(tmp_path / "first" / "result.json")
+    parameters = {"conductance": {"value": 3e-10, "std": 1e-11, "unit": "m3/(s Pa)"}}
+    second = result(
+        tmp_path / "second" / "result.json",
+        effects=[{"id": "leak_muscle", "probability": 0.9, "parameters": parameters}],
+        probabilities={"leak_muscle": 0.9, "heat_transfer": 0.06, "unlisted": 0.04},
+        parameters={
+            "chamber.dead_volume": {
+                "nominal": 6.4e-05,
+                "value": 7.61e-05,
+                "std": 4e-07,
+                "unit": "m3",
+                "moved_sigmas": 3.0,
+            }
+        },
+        free=6100.0,
+    )
+    out, page = tmp_path / "both.json", tmp_path / "both.html"
+    code, text, err = told(capsys, first.parent, second, "--json", out, "--out", page)
+    assert (code, f"written: {page}" in err) == (0, True)
+    both = json.loads(out.read_text(encoding="utf-8"))
+    assert both["schema"] == "pamrs.comparison/1"
+    assert both["names"] == ["first", "second"]
+    assert both["candidates"]["leak_muscle"] == [0.021, 0.9]
+    assert both["candidates"]["heat_transfer+leak_muscle"] == [0.012, None]
+    assert both["parameters"]["leak_muscle.conductance"][0] is None
+    assert both["parameters"]["chamber.dead_volume"][1]["value"] == 7.61e-05
+    assert both["free_run"] == {"random: muscle_pressure": [610.0, 6100.0]}
+    assert both["missed"]["muscle_pressure"] == pytest.approx([1.05, 1.05])
+    assert both["changed"] == [
+        "leak_muscle is named now",
+        "heat_transfer is not named any more",
+        "probability of heat_transfer: 0.96 before, now 0.06",
+        "probability of leak_muscle: 0.02 before, now 0.90",
+        # (7.61 - 6.61) cm3 over the root of two squares of 0.4 mm3 each
+        "chamber.dead_volume: 6.61e-05 before, now 7.61e-05 m3 (17.7 standard deviations)",
+        "free run of random: muscle_pressure: 10 times what it was",
+    ]
+    lines = [line.split() for line in text.splitlines()]
+    assert ["muscle", "leak", "0.02", "0.90"] in lines
+    assert ["random:", "muscle_pressure", "0.61", "kPa", "6.1", "kPa"] in lines
+    html = page.read_text(encoding="utf-8")
+    assert all(change in html for change in both["changed"])
+    assert "src=" not in html
+
+
+def test_the_same_result_twice_changed_nothing(tmp_path: Path, capsys: Any) -> None:
+    one = result(tmp_path / "a.json")
+    other = result(tmp_path / "b.json")
+    code, text, _ = told(capsys, one, other)
+    assert code == 0
+    assert text.endswith("changed\n  nothing that counts\n")
+
+
+@pytest.mark.parametrize(
+    ("content", "why"),
+    [
+        ("{", "is not the JSON of a result"),
+        ('{"schema": "pamrs.fit/1"}', "pamrs.diagnosis/1 or pamrs.diagnosis/2 is needed"),
+        ('{"schema": "pamrs.diagnosis/2", "verdict": "none"}', "is no complete result"),
+    ],
+)
+def test_what_is_no_result_is_refused(tmp_path: Path, capsys: Any, content: str, why: str) -> None:
+    good, bad = result(tmp_path / "good.json"), tmp_path / "bad.json"
+    bad.write_text(content, encoding="utf-8")
+    code, out, err = told(capsys, good, bad)
+    assert (code, out) == (2, "")
+    assert str(bad) in err
+    assert why in err
+    assert told(capsys, good, tmp_path / "absent")[0] == 2
