@@ -142,8 +142,9 @@ def draw_chain(axes: Axes, diagnosis: Findings) -> None:
     if not isinstance(rig, Rig):
         return
     own = _Drawing(_marked(rig, diagnosis), diagnosis, rig).content()
-    scale = 540.0 / float(own["width"])  # points of a page over those of the drawing
-    small = 11.0 * scale
+    room = axes.get_window_extent()  # in pixels, a letter's size in points
+    scale = min(room.width / own["width"], room.height / own["tall"])
+    small = 10.5 * scale * 72.0 / axes.figure.dpi
     for frame in own["frames"]:
         x, y, colour = frame["x"], frame["y"], frame["colour"]
         size = (frame["right"] - x, frame["low"] - y)
@@ -162,7 +163,9 @@ def draw_chain(axes: Axes, diagnosis: Findings) -> None:
         x, y = box["x"], box["y"]
         edge = COLOURS["before"] if box["part"].found else "#aeb5bf"
         axes.add_patch(Rectangle((x, y), BOX, box["height"], facecolor="white", edgecolor=edge))
-        axes.text(x + 9, y + 28, box["part"].title, size=1.1 * small, fontweight="bold")
+        title = "\n".join(textwrap.wrap(box["part"].title, 16)[:2])
+        style: dict[str, Any] = {"size": 1.1 * small, "fontweight": "bold", "va": "center"}
+        axes.text(x + 9, y + 23, title, **style)
         for row, (text, kind) in enumerate(box["lines"]):
             sign = {"measured": "● ", "unmeasured": "○ ", "found": ""}[kind]
             colour = COLOURS["before"] if kind == "found" else "#1b1f24"

@@ -204,16 +204,16 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     for effect in sorted(named, key=lambda e: bool(groups) and e.term not in groups[0].effects):
         told = bench_value(effect)[:1]
         found += [(value, f"{words.label(effect.term)}: {name}") for name, value in told]
-    errors = diagnosis.fit.held_out or diagnosis.fit.channels
-    sizes = {n: last for n in errors if (last := words.miss(diagnosis, n, "after"))}
-    if sizes:
-        worst = max(sizes, key=lambda n: sizes[n].noises)
-        noises = words.format_number(sizes[worst].noises, 2)
-        model = (
-            "the mended model" if diagnosis.effects or diagnosis.wrong_parameters else "the model"
-        )
-        what = f"{words.spoken_name(worst)} missed by {model} ({sizes[worst].size}), worst channel"
-        found.append((f"{noises} × noise", what))
+    left = [m for b in diagnosis.judged for m in b.mismatch]
+    left = [m for m in left if (m.held_out or m.fitted).after.more_than_noise]
+    worst = max(left, key=lambda m: (m.held_out or m.fitted).after.noises, default=None)
+    channel = worst.channel if worst else diagnosis.where.channel
+    channel = channel or next(iter(diagnosis.fit.held_out or diagnosis.fit.channels), None)
+    last = words.miss(diagnosis, channel, "after")
+    if channel and last:
+        model = "mended model" if diagnosis.effects or diagnosis.wrong_parameters else "model"
+        what = f"{words.spoken_name(channel)} missed by the {model} ({last.size})"
+        found.append((f"{words.format_number(last.noises, 2)} × noise", what))
     return found
 
 
