@@ -1,4 +1,4 @@
-"""What only a long or a wide run shows: energy over 1,000 swings, a muscle contracted to its end."""
+"""What long runs show: energy over 1,000 swings, and a muscle contracted to its end."""
 
 from __future__ import annotations
 
