@@ -106,6 +106,7 @@ def test_every_chapter_has_its_files():
         files = {Path(part).name for part in store.inputs(name)}
         assert {f"{module}.py", "drawing.py", "shoulder.toml"} <= files
         assert any(part.startswith("_core") for part in files)
+        assert "recruitment.py" in files
         assert all(part.startswith(module) for part in files if part.startswith("chapter"))
 
 

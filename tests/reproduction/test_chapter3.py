@@ -84,7 +84,7 @@ def test_a_fact_needs_a_source_and_a_criterion():
 
 def test_text_markdown_and_csv_have_every_fact():
     made = [
-        judge("first", "a | b", "Table 3.2", 100.0, 90.0, "lbf", tolerance=1.0, note="because"),
+        judge("first", "a | b", "Table 3.2", 100.0, 90.0, "lbf", tolerance=1.0, reason="because"),
         judge("second", "c", "3.4", 1.0, 2.0, relation="above", basis="construction"),
         judge("second", "d", "3.5", 0.5, math.nan, "in", cannot_tell="no section"),
     ]
