@@ -85,11 +85,14 @@ def _judged(ratios: dict[float, float], *, above: bool = False) -> str:
 
 
 def _restless(runs: dict[str, Track], plan: Plan) -> str:
-    """What the loops without a payload do above 1.5 Hz, in words: they alone have no margin."""
-    row = _bare(plan)[0.0]
-    found = _numbers(lambda run: run.ripple(0.0), runs, row)
+    """What the loops without a payload do above 1.5 Hz, in words: they alone have no margin; empty
+    where none has no payload.
+    """
+    if 0.0 not in _bare(plan):
+        return ""
+    found = _numbers(lambda run: run.ripple(0.0), runs, _bare(plan)[0.0])
     return (
-        "with 0 lb the whole loops have no margin but for dry friction (table of the rig): above "
+        "; with 0 lb the whole loops have no margin but for dry friction (table of the rig): above "
         f"1.5 Hz {found} deg"
     )
 
@@ -107,7 +110,7 @@ def compound(plan: Plan) -> list[Comparison]:
     for fact, ratios in _by_payload(plan).items():
         if fact.startswith("compound"):
             name = fact.removeprefix("compound: ")
-            note = f"{_judged(ratios)}; {_restless(runs, plan)}"
+            note = _judged(ratios) + _restless(runs, plan)
             rows.say("compound_order", max(ratios.values()), name, note, _why(name))
     end = float(runs["neural"].time[-1])
     rows.say(
@@ -174,7 +177,7 @@ def lift(plan: Plan) -> list[Comparison]:
         if not fact.startswith("lift"):
             continue
         which = next(name for name in numbers if name in fact)
-        note = f"{_judged(ratios)}; {MIDDLE:g} lb: {_numbers(numbers[which], runs, k, 3)}; "
+        note = f"{_judged(ratios)}; {MIDDLE:g} lb: {_numbers(numbers[which], runs, k, 3)}"
         note += _restless(runs, plan)
         if fact.startswith("lift: sliding"):
             later = {kind: run.rms(2.0)[k] for kind, run in runs.items()}
