@@ -30,6 +30,8 @@ from tests.runs import FRICTIONLESS, RUNS, Run, misses
 
 USUAL = 1e-3
 HALVINGS = 6
+#: Steps of the table of hard runs [ms].
+_MS = ("1", "0.5", "0.25")
 #: Fraction of a range below which an error is that of rounding, for channels whose magnitude is at
 #: most so many ranges.
 ROUNDING, RANGES = 1e-12, 50.0
@@ -192,6 +194,70 @@ def stiff() -> dict[str, Run]:
             f'{nozzle}\ninlet_volume = {{ value = {volume}, unit = "cm3" }}'
         )
     return found
+
+
+def hard() -> dict[str, list[Run]]:
+    """Runs on which no step is at its best: muscles that pass their rest length, and the two-joint
+    arm driven hard, 2 s of sines on both valves, thirty times.
+    """
+    length = pamrs.rigs.hanging_mass().parameter("muscle.rest_length").value
+    through = {
+        "hanging_mass, longer than at rest": (1.002, 0.02, 6e4),
+        "hanging_mass, lengthens through its rest length": (0.998, 0.25, 6e4),
+        "hanging_mass, shortens through its rest length": (1.006, -0.2, 2e5),
+    }
+    found = {
+        name: [
+            steady(
+                "hanging_mass",
+                21,
+                {"length": share * length, "length_rate": rate, "muscle_pressure": pressure},
+                valve=5.0,
+            )
+        ]
+        for name, (share, rate, pressure) in through.items()
+    }
+    rng = np.random.default_rng(1)
+    return found | {"two_joint_arm, driven hard": [driven(rng) for _ in range(30)]}
+
+
+def driven(rng: np.random.Generator) -> Run:
+    """The two-joint arm from somewhere, with a sine at either valve."""
+    time_ = 0.005 * np.arange(401)
+    size, often, phase = (rng.uniform(*span, 2) for span in ((0.3, 3.0), (0.3, 3.0), (0.0, 6.28)))
+    commands = {
+        f"valve_command.{joint}": 5.0
+        + size[k] * np.sin(2.0 * math.pi * often[k] * time_ + phase[k])
+        for k, joint in enumerate(("elbow", "wrist"))
+    }
+    initial = {
+        "joint_angle.elbow": rng.uniform(20.0, 80.0) * DEGREE,
+        "joint_angle.wrist": rng.uniform(20.0, 80.0) * DEGREE,
+        "muscle_pressure.elbow": rng.uniform(1e5, 5e5),
+        "muscle_pressure.wrist": rng.uniform(5e4, 4e5),
+    }
+    return Run("two_joint_arm", 0.005, 401, initial, commands)
+
+
+def rows_of_hard() -> list[list[str]]:
+    """Errors of the hard runs at 1, 0.5 and 0.25 ms, median and largest, and the order."""
+    rows = []
+    for name, runs in hard().items():
+        errors = []
+        for run in runs:
+            fine = run.core(usual(run) / 64.0)
+            steps = [usual(run) / 2**k for k in range(3)]
+            errors.append([max(errors_of(run.core(step), fine).values()) for step in steps])
+        order = curve_of(runs[0]).order if len(runs) == 1 else math.nan
+        rows.append(
+            [
+                name,
+                "" if math.isnan(order) else f"{order:.2f}",
+                *map(number, np.median(errors, axis=0)),
+                *map(number, np.max(errors, axis=0)),
+            ]
+        )
+    return rows
 
 
 # ------------------------------------------------------------------ measuring
@@ -389,7 +455,16 @@ def main() -> None:
         ],
         rows,
     )
-    text = written("convergence", packaged="\n".join(packaged), stiff="\n".join(volumes))
+    worst = table(
+        ["run", "order", *(f"{kind}, {step} ms" for kind in ("median", "largest") for step in _MS)],
+        rows_of_hard(),
+    )
+    text = written(
+        "convergence",
+        packaged="\n".join(packaged),
+        hard="\n".join(worst),
+        stiff="\n".join(volumes),
+    )
     (out / "convergence.md").write_text(text, encoding="utf-8")
     draw(
         smooth,

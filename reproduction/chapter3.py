@@ -307,6 +307,15 @@ def _torque_overall(rows: Lines) -> None:
     rotation = np.linspace(0.0, 100.0, 401)
     torque = elbow.elbow_torque(np.radians(rotation)) / FOOT_POUND
     rows.say("largest_torque", float(torque.max()), rotation[torque.argmax()])
+    within, end = rotation <= _RANGE, np.radians(rotation[rotation <= _RANGE])
+    printed = elbow.elbow_torque(end, law="printed") / FOOT_POUND
+    rows.say(
+        "torque_level",
+        float(torque[within].min() / torque[within].max()),
+        float(printed.min() / printed.max()),
+        float(torque[within].min()),
+        float(torque[within].max()),
+    )
     ends = {
         n: np.degrees(elbow.torque_range(partial(elbow.elbow_torque, count=n), _LEAST))
         for n in (6, 7, 8, 10)
@@ -493,9 +502,10 @@ def _ramp() -> list[Comparison]:
             f"{min(angles):.0f} to {max(angles):.0f} deg with no to twice the rig's friction, all "
             "7 kg in the forearm, or hysteresis (2.36)"
         )
-        rows.say("largest_torque_2", torque, words, note)
+        why = "" if words else "the joint's torque: as printed in (3.6)-(3.8) it agrees, see below"
+        rows.say("largest_torque_2", torque, words, note, why)
         at_rest = math.degrees(elbow.rotation_reached(100.0, 145.0, law=law))
-        rows.say("rotation_largest_torque", rotation, words, at_rest)
+        rows.say("rotation_largest_torque", rotation, words, at_rest, why)
     static = (
         float(elbow.payload_torque(100.0, elbow.rest_angle() + math.radians(83.0))) / FOOT_POUND
     )
@@ -512,6 +522,7 @@ def _ramp() -> list[Comparison]:
 def _construction() -> list[Comparison]:
     """What is said of the arm as it was built."""
     rows = say.lines()
+    _multiplicity(rows)
     _payloads(rows)
     _bending(rows)
     _not_modelled(rows)
@@ -531,6 +542,23 @@ def _payloads(rows: Lines) -> None:
     wrist = float(elbow.payload_torque(380.0, 0.5 * math.pi, 7.0 * INCH)) / FOOT_POUND
     rows.say("payload_one_arm", limit / POUND, lever)
     rows.say("largest_payload_tested", math.nan, lifted, wrist)
+
+
+def _multiplicity(rows: Lines) -> None:
+    """What many small muscles are for: room, and that one may fail."""
+    wide = {}
+    for name, length in (("elbow_0625in", 0.63), ("large_2in_effective", 0.61)):
+        muscle = entry(name).muscle
+        shortest = min(1.0 - length, muscle.contraction_limits[1])
+        wide[name] = float(muscle.radius(shortest) / muscle.radius(0.0))
+    small, large = wide.values()
+    rows.say("triple", max(small, large), 1.75 / 0.625, 4.5 / 2.0, small, large)
+    end = math.radians(_RANGE)
+    left = [
+        float(elbow.elbow_torque(end, count=n - 1) / elbow.elbow_torque(end, count=n))
+        for n in (6, 2)
+    ]
+    rows.say("redundancy", left[0] / left[1], left[0], left[1])
 
 
 def _bending(rows: Lines) -> None:

@@ -18,16 +18,20 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs.comparison import Comparison
-from pamrs.control import metrics
+from pamrs.control import FUZZY_SETS, PID, fuzzy_rules, metrics
+from pamrs.design import lift as hold
+from pamrs.errors import ParameterError
+from pamrs.rig import Rig
 from reproduction import lift
-from reproduction.chapter4_statements import SERIES, say, statements
+from reproduction.chapter4_statements import SERIES, on_stop, restless, say, statements
 from reproduction.elbow import HYSTERESIS
 from reproduction.lift import Lifts, Map
+from reproduction.margins import loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import OTHER, OWN, TRIAL, Lines
 
 __all__ = ["DAMPED", "PRINTED", "RUBBING", "SMOOTH", "agreed", "experiments", "facts", "in_short"]
-__all__ += ["latest", "say"]
+__all__ += ["latest", "say", "tables"]
 
 
 #: Names of the plants, see :data:`reproduction.lift.VARIANTS`: the one of the score, the
@@ -177,6 +181,7 @@ def facts(*, search: bool = True, progress: Progress | None = None) -> list[Comp
     """
     done = experiments(search=search, progress=progress)
     rows = statements(say.groups["printed"], done.tuned[PRINTED]) + _pressures(done.lifts)
+    rows += _rig_alone()
     rows += apart(statements(say.groups["rubbing"], done.tuned[RUBBING]), OTHER)
     rows += _windup(done)
     rows += _maps(say.groups["printed maps"], done, PRINTED) + _lines(done)
@@ -209,6 +214,19 @@ def _pressures(found: Mapping[str, Mapping[str, Lifts]]) -> list[Comparison]:
     ]
 
 
+def _rig_alone() -> list[Comparison]:
+    """4.2.1 and 4.3.1.2: what the arm holds, and the rule that the text quotes."""
+    rig = lift.assumed()
+    pressure = rig.parameter("supply.initial_pressure").value
+    most = hold(rig, pressure=pressure, to=math.radians(lift.HIGH)).payload_limit or 0.0
+    small = FUZZY_SETS.index("NS"), FUZZY_SETS.index("PS")
+    centres = [float(3.0 * fuzzy_rules(name)[small]) for name in ("anti_diagonal", "quoted")]
+    return [
+        say("holds_50", most, lift.HIGH, 1e-6 * pressure),
+        say("quoted_rule", centres[0], centres[1]),
+    ]
+
+
 def _lines(done: Experiments) -> list[Comparison]:
     """4.5.1.2: kD and g2, each varied last."""
     kd, g2 = (
@@ -224,6 +242,7 @@ def _lines(done: Experiments) -> list[Comparison]:
             by_payload.format(*(x for pair in zip(kd, _KG, strict=True) for x in pair)),
             min(kp),
             max(kp),
+            _border(done.maps[PRINTED, "pid"], 0, 1, 2),
             tolerance=_DERIVATIVE[1],
         ),
         say(
@@ -258,6 +277,7 @@ def _windup(done: Experiments) -> list[Comparison]:
             name,
             plain.undershoot[2],
             change,
+            on_stop(clamped),
             apart="" if name == PRINTED else OTHER,
         )
     top = float(done.lifts[PRINTED]["PID"].between(5.0, 15.0).max(axis=1)[2])
@@ -299,16 +319,31 @@ class _OfMaps(Lines):
         return max(least, self.step[key] + 1e-9)
 
 
+def _border(gains: Map, *payloads: int) -> str:
+    """Why an optimum decides nothing: it lies on the border of the map; empty where it does not."""
+    best = gains.best(gains.j["rad"])
+    on = [
+        f"{name} {best[k][axis]:g} with {_KG[k]}"
+        for axis, (name, values) in enumerate(gains.axes.items())
+        for k in payloads
+        if best[k][axis] in (float(values[0]), float(values[-1]))
+    ]
+    return f"the optimum is on the border of the map, which is ours: {', '.join(on)}" if on else ""
+
+
 def _pid_map(rows: _OfMaps, pid: Map) -> None:
     """4.5.1.2: the gains of PID control, and the cost of the least error."""
     best = {unit: pid.best(j) for unit, j in pid.j.items()}
     other = "in degrees " + _told(best["deg"], ("kP", "kI"))
     told = _told(best["rad"], ("kP", "kI"))
-    rows.say("PID_kp_smallest", best["rad"][0][0], told, other, tolerance=rows.near(0.3, "kP"))
-    rows.say("PID_ki_smallest", best["rad"][0][1], tolerance=rows.near(0.8, "kI"))
-    rows.say("PID_kp_34", best["rad"][2][0] - best["rad"][0][0])
-    rows.say("PID_kp_smallest_J", best["rad"][1][0], tolerance=rows.near(0.3, "kP"))
-    rows.say("PID_ki_smallest_J", best["rad"][1][1], tolerance=rows.near(0.6, "kI"))
+    light, middle = _border(pid, 0), _border(pid, 1)
+    kp, ki = zip(*best["rad"], strict=True)
+    rows.say("PID_kp_smallest", kp[0], told, other, light, tolerance=rows.near(0.3, "kP"))
+    rows.say("PID_ki_smallest", ki[0], light, tolerance=rows.near(0.8, "kI"))
+    rows.say("PID_kp_34", kp[2] - kp[0])
+    rows.say("PID_ki_34", ki[2] - ki[1], _border(pid, 0, 1, 2), ki[1] - ki[0])
+    rows.say("PID_kp_smallest_J", kp[1], middle, tolerance=rows.near(0.3, "kP"))
+    rows.say("PID_ki_smallest_J", ki[1], middle, tolerance=rows.near(0.6, "kI"))
     least, smooth = pid.best(pid.nu)[1], pid.best(pid.omega["rad"])[1]
     at = {
         label: _at(pid, pid.omega["rad"], 1, gains)
@@ -321,15 +356,18 @@ def _fuzzy_map(rows: _OfMaps, fuzzy: Map) -> None:
     """4.4.1.2: the gains of fuzzy control, and the shape of J about them."""
     best = {unit: fuzzy.best(j) for unit, j in fuzzy.j.items()}
     told, other = _told(best["rad"], ("g1", "h")), "in degrees " + _told(best["deg"], ("g1", "h"))
-    rows.say("fuzzy_g1_smallest", best["rad"][1][0], told, other, tolerance=rows.near(0.1, "g1"))
-    rows.say("fuzzy_h_smallest", best["rad"][1][1], tolerance=rows.near(0.13, "h"))
-    rows.say("fuzzy_h_34", best["rad"][2][1] - best["rad"][0][1])
+    middle = _border(fuzzy, 1)
+    g1, h = zip(*best["rad"], strict=True)
+    rows.say("fuzzy_g1_smallest", g1[1], told, other, middle, tolerance=rows.near(0.1, "g1"))
+    rows.say("fuzzy_h_smallest", h[1], middle, tolerance=rows.near(0.13, "h"))
+    rows.say("fuzzy_h_34", h[2] - h[0], _border(fuzzy, 0, 2))
+    rows.say("fuzzy_h_near", h[2] / h[1], _border(fuzzy, 1, 2), h[1], h[2], rows.step["h"])
     one, two = fuzzy.best(fuzzy.nu)[1], fuzzy.best(fuzzy.omega["rad"])[1]
     apart = max(abs(one[0] - two[0]) / rows.step["g1"], abs(one[1] - two[1]) / rows.step["h"])
     rows.say("fuzzy_23_kg", apart, one[0], one[1], two[0], two[1])
-    rows.say("fuzzy_23_kg_J", float(fuzzy.smooth("rad")[1]))
+    rows.say("fuzzy_23_kg_J", float(fuzzy.smooth("rad")[1]), middle)
     quoted = _at(fuzzy, fuzzy.j["rad"], 1, (0.45, 0.65)) / float(np.nanmin(fuzzy.j["rad"][1]))
-    rows.say("fuzzy_23_kg_J_published", quoted)
+    rows.say("fuzzy_23_kg_J_published", quoted, middle)
 
 
 def _at(gains: Map, values: Any, payload: int, place: tuple[float, float]) -> float:
@@ -460,6 +498,58 @@ def _diagnoses(done: Experiments) -> list[Comparison]:
             for effect, values in hidden.items()
         ]
     return rows
+
+
+def tables() -> dict[str, str]:
+    """Which loops of which plants do not come to rest in the hold, as Markdown, by group."""
+    done = latest()
+    runs = dict(done.lifts)
+    runs |= {f"{name}, gains of its own maps": found for name, found in done.tuned.items()}
+    lines = [
+        "| plant | not at rest in the hold: peak to peak in its last 2 s [deg] |",
+        "|---|---|",
+        *(
+            f"| {name} | {'; '.join(told for told in map(restless, found, found.values()) if told)}"
+            " |"
+            for name, found in runs.items()
+        ),
+        "",
+        "*What moves by more than 2 deg and does not become less is in a limit cycle, as FF+PID "
+        "with its 20 deg and more, or settles too slowly, as FF, which has no feedback, and the "
+        "PID. All others come to rest, or move by less than a figure shows.*",
+        "",
+        "| payload | kP of the PID may grow by, printed gains | gains of its own map |",
+        "|--:|--:|--:|",
+        *(f"| {row} |" for row in _margins(done)),
+        "",
+        "*Of small motions about the hold, filling and venting, dry friction at rest and in "
+        f"motion, the plant {SMOOTH!r}: the printed muscle has a kink at rest. Below one they "
+        "grow.*",
+    ]
+    return {say.groups["effects"]: "\n".join(lines)}
+
+
+def _margins(done: Experiments) -> list[str]:
+    """Margins of the PID's loop, payload by payload."""
+    best = done.maps[PRINTED, "pid"].best(done.maps[PRINTED, "pid"].j["rad"])
+    found = []
+    for k, (gains, name) in enumerate(zip(best, _KG, strict=True)):
+        rig = lift.plant(lift.VARIANTS[SMOOTH], lift.PAYLOADS[k])
+        tried = (lift.GAINS["PID"][1:], gains)
+        at = [_pid_margin(rig, kp, ki) for kp, ki in tried]
+        found.append(f"{name} | {at[0]} | {at[1]}")
+    return found
+
+
+def _pid_margin(rig: Rig, kp: float, ki: float) -> str:
+    """A margin in words."""
+    try:
+        value = loop_margin(
+            rig, lambda: PID(kp, ki, period=lift.PERIOD), math.radians(lift.HIGH), steepest=1.5
+        )
+    except ParameterError:
+        return "no linear model"
+    return f"{value:.2f}"
 
 
 def in_short(rows: list[Comparison]) -> list[str]:

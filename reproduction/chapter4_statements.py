@@ -4,7 +4,8 @@ which physics, is the caller's.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -14,7 +15,7 @@ from reproduction.elbow import PSI
 from reproduction.lift import Lifts
 from reproduction.statements import Statements
 
-__all__ = ["SERIES", "say", "statements"]
+__all__ = ["SERIES", "on_stop", "restless", "say", "statements"]
 
 #: The statements of the chapter.
 say: Final = Statements("chapter4")
@@ -49,10 +50,68 @@ def statements(group: str, runs: Mapping[str, Lifts]) -> list[Comparison]:
     -------
     list of Comparison
     """
-    return [
-        say(*row, group=group)
-        for row in (*_simulated(runs), *_feedback(runs), *_model(runs), *_compared(runs))
+    rows = [*_simulated(runs), *_feedback(runs), *_model(runs), *_compared(runs)]
+    return [_said(say(*row, group=group), runs, _behind(row)) for row in rows]
+
+
+#: Of each statement the runs behind it, where its row does not name them.
+_BEHIND: Final[Mapping[str, tuple[str, ...]]] = {
+    "error_return_FF": ("FF+PID", "FF+fuzzy"),
+    **dict.fromkeys(
+        ("fuzzy_lag_mean", "fuzzy_largest_overshoot", "fuzzy_spread_lag", "fuzzy_error_end"),
+        ("fuzzy",),
+    ),
+    **dict.fromkeys(
+        ("PID_23_kg", "PID_delay", "PID_nu_34", "PID_34_kg", "PID_34_kg_error"), ("PID",)
+    ),
+    **dict.fromkeys(("lift_23_kg", "return_23_kg", "lift_23_kg_reversals"), ("PID", "fuzzy")),
+    **dict.fromkeys(("pressure_rest_45", "FF_fuzzy_km"), ("FF+fuzzy, kM 0.5",)),
+    **dict.fromkeys(
+        ("km_smallest_RMS", "error_rest_km", "error_rest_km_1", "lag_km_0"),
+        tuple(SERIES.values()),
+    ),
+    "omega_with_feedforward": ("PID", "FF+PID, PID's gains", "FF+PID, kM 0.5"),
+}
+
+
+def _behind(row: tuple[Any, ...]) -> tuple[str, ...]:
+    """Names of the runs behind a row."""
+    if row[0] == "error_with_feedforward":
+        return next(pair for pair in _PAIRS if pair[0] == row[2])
+    return _BEHIND[row[0]] if row[0] in _BEHIND else (str(row[2]),)
+
+
+def _said(row: Comparison, runs: Mapping[str, Lifts], names: Sequence[str]) -> Comparison:
+    """A statement, with what of its runs does not come to rest in the remark."""
+    told = [text for text in (restless(name, runs[name]) for name in names) if text]
+    if not told:
+        return row
+    note = f"not at rest in the hold (limit cycle, or too slow to settle): {'; '.join(told)}"
+    return replace(row, note="; ".join(part for part in (row.note, note) if part))
+
+
+def restless(name: str, run: Lifts) -> str:
+    """Where a run does not come to rest in the hold, in words; empty where it does."""
+    found = [
+        f"{swing:.1f} ({kg} kg)"
+        for swing, going, kg in zip(run.swing, run.restless, _KG, strict=False)
+        if going
     ]
+    return f"{name} {', '.join(found)}" if found else ""
+
+
+#: How far the stop is below the angle of rest, less what it gives way [deg].
+_STOP: Final = 5.5
+
+
+def on_stop(run: Lifts) -> str:
+    """Why an overshoot below rest decides nothing: the arm falls onto its stop with any payload."""
+    if float(run.undershoot[:3].min()) < _STOP:
+        return ""
+    return (
+        "the arm falls onto its stop at 5.5 deg below rest with every payload, wound up or not: "
+        + _list(run.undershoot[:3])
+    )
 
 
 #: Id, our number, and what stands in the places.
@@ -122,7 +181,8 @@ def _pid_alone(pid: Lifts) -> list[Row]:
     return [
         ("PID_23_kg", float(pid.delay[1])),
         ("PID_nu_34", float(nu[2] / nu[0])),
-        ("PID_34_kg", float(pid.undershoot[2]), _list(pid.undershoot)),
+        ("PID_delay", float(pid.delay[2] / pid.delay[0]), _list(pid.delay[:3], 2)),
+        ("PID_34_kg", float(pid.undershoot[2]), _list(pid.undershoot), on_stop(pid)),
         ("PID_34_kg_error", float(pid.error("return")[2] / pid.error("lift")[2])),
     ]
 

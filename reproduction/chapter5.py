@@ -19,12 +19,13 @@ from pamrs.comparison import Comparison
 from pamrs.rigs import shoulder
 from reproduction import chapter5_comparison, tracking
 from reproduction.chapter5_statements import listed, say
+from reproduction.margins import inner_margin, loop_margin
 from reproduction.statement_tables import Told
 from reproduction.statements import Lines
 from reproduction.tracking import KINDS, PAYLOADS, SETTLED, Track
 from reproduction.tracking_runs import FULL, MIDDLE, STARTS, TRIALS, WRONG, Plan
 
-__all__ = ["chosen", "facts", "in_short", "say", "share_by_angle"]
+__all__ = ["chosen", "facts", "in_short", "say", "share_by_angle", "tables"]
 
 #: Mean squared error at the top of the axis of Fig. 5.8(c), as an rms [deg].
 _AXIS: Final = math.sqrt(400.0)
@@ -107,9 +108,9 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
     inertia = np.asarray(arm.inertia)
     rows.say("inertia_50_lb", inertia[-1] / inertia[0])
     wanted = np.degrees(tracking.waves(plan.record).sampled(tracking.PERIOD)[1].angle)
-    low, high = (float(limit) for limit in (wanted.min(), wanted.max()))
-    rows.say("smallest_angle_5", low)
-    rows.say("largest_angle_5", high)
+    printed = _phase_zero(plan)
+    rows.say("smallest_angle_5", printed.min(), wanted.min())
+    rows.say("largest_angle_5", printed.max(), wanted.max())
     fastest = max(w for _, w in _table())
     rows.say("largest_frequency", fastest / (2.0 * math.pi))
     torque: Any = arm.torque
@@ -129,6 +130,14 @@ def _rig(plan: Plan, search: bool) -> list[Comparison]:
                 tracking.MOST_J,
             )
     return rows
+
+
+def _phase_zero(plan: Plan) -> Array:
+    """(5.24) with a triangle of phase 0, which begins at its mean and rises [deg]."""
+    time = np.arange(0.0, plan.record + 0.5 * tracking.PERIOD, tracking.PERIOD)
+    cosines = sum(a * np.cos(w * time) for a, w in _table())
+    triangle = 20.0 / math.pi * np.arcsin(np.sin(2.0 * math.pi * 0.16 * time))
+    return np.asarray(60.0 + cosines + triangle)
 
 
 def _table() -> Any:
@@ -180,7 +189,7 @@ def _why_far(factor: str, payload: float, error: float) -> str:
         return ""
     weight = float(np.asarray(tracking.arm_model([payload]).weight)[0])
     return (
-        f"; nine weights too many, {9.0 * weight:.0f} N m, are more than the muscles have (890 N m "
+        f"nine weights too many, {9.0 * weight:.0f} N m, are more than the muscles have (890 N m "
         "at 13 bar and 90 deg, chapter 3), so that full pressure is asked for and the arm lies "
         "near its upper stop: the published curve is that of a light arm, as ours is with 0 lb"
     )
@@ -231,15 +240,22 @@ def _learning(rows: Lines, run: Track) -> None:
     end = float(run.time[-1])
     early, late = run.rms(min(SETTLED, 0.1 * end), 0.3 * end), run.rms(0.8 * end)
     ripple = run.ripple(0.8 * end)
-    for k, name in enumerate(TRIALS):
-        text = (
-            f"{early[k]:.2f} deg to {0.3 * end:.0f} s, {late[k]:.2f} deg in the last fifth; above "
-            f"1.5 Hz {ripple[k]:.2f} deg"
-        )
-        if name.startswith("Trial"):
-            rows.say("late_error_early", late[k] / early[k], name, text)  # fmt: skip
-        else:
-            rows.say("late_error_early_error", late[k] / early[k], name, text)
+    text = {
+        name: f"{early[k]:.2f} deg to {0.3 * end:.0f} s, {late[k]:.2f} deg in the last fifth; "
+        f"above 1.5 Hz {ripple[k]:.2f} deg"
+        for k, name in enumerate(TRIALS)
+    }
+    grown = dict(zip(TRIALS, late / early, strict=True))
+    printed = [name for name in TRIALS if name.startswith("Trial")]
+    rows.say(
+        "late_error_early",
+        max(grown[name] for name in printed),
+        "; ".join(f"{name} {grown[name]:.2f}, {text[name]}" for name in printed),
+    )
+    rows.say("higher_gains", late[1] / late[0])
+    for name in TRIALS:
+        if name not in printed:
+            rows.say("late_error_early_error", grown[name], name, text[name])
 
 
 def _estimates(rows: Lines, run: Track, notes: dict[str, Array]) -> None:
@@ -382,6 +398,53 @@ def _visited(run: Track, row: int, nodes: int) -> NDArray[np.bool_]:
     place = np.clip((run.angle[row] - low) / (high - low) * (nodes - 1), 0.0, nodes - 1.0)
     samples = np.bincount(np.rint(place).astype(int), minlength=nodes)
     return np.asarray(samples >= 1.0 / tracking.PERIOD)
+
+
+def tables() -> dict[str, str]:
+    """How far the loops are from a limit cycle, as Markdown, by group."""
+    loop = {name: tracking.LOOP[name] for name in ("kp", "ki", "pressure_filter")}
+    null, steep = (
+        f"{inner_margin(tracking.plant(0.0), loop, tracking.PERIOD, slope):.2f}"
+        for slope in ("null", "steepest")
+    )
+    lines = [
+        "| payload | pressure loop next to the valve's null: gains may grow by "
+        "| where the valve is steepest | cascaded PID: gain may grow by "
+        "| sliding: gain may grow by |",
+        "|--:|--:|--:|--:|--:|",
+    ]
+    for payload in PAYLOADS:
+        whole = [_whole(kind, payload) for kind in ("cascaded PID", "sliding")]
+        lines.append(f"| {payload:g} lb | {null} | {steep} | {' | '.join(whole)} |")
+    lines += [
+        "",
+        "*The pressure loop at its fastest point: the source at its pressure, the muscles at rest "
+        "length. Above 1 next to the null there is no limit cycle; where the valve is steepest, "
+        "from a quarter to three quarters open, it passes in large moves only. Whole loops about "
+        "30, 60 and 90 deg, in small motions inside the boundary layer, where the valve is "
+        "steepest. Below 1, as without a payload, small motions grow that dry friction does not "
+        "hold: lines about 0 lb say what they do above 1.5 Hz. Adaptive sliding and the networks "
+        "are sliding with what they have learnt.*",
+    ]
+    return {say.groups["rig"]: "\n".join(lines)}
+
+
+def _whole(kind: str, payload: float) -> str:
+    """Least margin of a whole loop, in words."""
+    arm = tracking.arm_model([payload])
+    one = arm.replace(
+        **{
+            name: float(np.asarray(getattr(arm, name))[0])
+            for name in ("inertia", "viscous", "weight")
+        }
+    )
+    found = [
+        loop_margin(
+            tracking.plant(payload), lambda: tracking.controller(kind, one), math.radians(angle)
+        )
+        for angle in (30.0, 60.0, 90.0)
+    ]
+    return f"{min(found):.2f}"
 
 
 def in_short(rows: Lines) -> list[str]:

@@ -2,7 +2,9 @@
 gives.
 
 The score is of the shoulder rig as it is, with as many muscles as are recruited, the tank of 15 l
-and the gas of (6.4). What is read otherwise (the gas laws in gauge pressures, a heavier arm,
+and the gas of (6.4). The pressure loop has gains that the chamber allows
+(:mod:`reproduction.margins`), and the efficiencies stand beside a quasi-static balance of other
+code. What is read otherwise (the gas laws in gauge pressures, a heavier arm,
 another dead volume) stands apart, each on its own; what the text suspects behind its experiments'
 larger input is simulated one by one.
 """
@@ -22,12 +24,13 @@ from pamrs.design import lift
 from pamrs.library import entry
 from pamrs.library.evaluate import free_contraction
 from pamrs.library.published import compare_entry
-from pamrs.rig import Muscle
+from pamrs.rig import Joint, Muscle
+from reproduction import chapter6_loops as loops
 from reproduction import recruiting as rec
 from reproduction.recruiting import EXTENDED, MATRIX, MUSCLES, PAYLOADS, Case, Cycles
 from reproduction.rigs import with_struts
 from reproduction.statement_tables import Told
-from reproduction.statements import Statements
+from reproduction.statements import OTHER, Statements
 
 __all__ = ["experiments", "facts", "headings", "in_short", "latest", "say", "tables"]
 
@@ -39,6 +42,7 @@ Array = NDArray[np.float64]
 BAR: Final = 1e5
 #: Largest pressure of a muscle for which the source still has 2 bar to spare (6.6) [Pa].
 _SPARE: Final = 2.0 * BAR
+_GAUGE: Final = "gauge pressures in (6.4)"
 
 Progress = Callable[[str], None]
 
@@ -117,7 +121,7 @@ def _experiments(cycles: int, tell: Progress) -> Experiments:
     for name, changed in rec.READINGS.items():
         tell(f"chapter 6: reading {name}")
         with_, without = (
-            rec.lifting(short, 90.0, 2, elastic=elastic, changed=changed)
+            rec.lifting(short, 90.0, 2, elastic=elastic, changed=changed, known=True)
             for elastic in (True, False)
         )
         done.readings[name] = (with_, without)
@@ -216,6 +220,34 @@ def _joint() -> list[Comparison]:
         say("least_torque_six", float(full.torque.min())),
         say("most_lifted_90", full.payload_limit or 0.0),
         say("first_moment_arm", least, left, least, most, published=left),
+        *_shape_of_joint(),
+    ]
+
+
+def _shape_of_joint() -> list[Comparison]:
+    """6.4.1 and 6.3: the torque over the joint's range, and the room that the muscles need."""
+    rig = rec.plant(0.0, 6)
+    muscle, joint = rig.muscle, Joint.from_model(rig.model["joint"])
+    assert muscle is not None
+    angles = np.radians([15.0, 90.0, 120.0])
+    torque, braid = (
+        np.asarray(joint.torque(one, 13.0 * BAR, angles, count=6))
+        for one in (muscle, muscle.replace(model="gaylord", geometry="elliptic"))
+    )
+    most = float(joint.shortening(angles[-1])) / muscle.parameters["rest_length"]
+    bent, free = (
+        200.0 * float(muscle.radius(e)) for e in (most, free_contraction(muscle, 13.0 * BAR))
+    )
+    return [
+        say(
+            "torque_constant",
+            torque[2] / torque[0],
+            braid[2] / braid[0],
+            torque[0],
+            torque[1],
+            torque[2],
+        ),
+        say("room", bent, 100.0 * most, free),
     ]
 
 
@@ -246,21 +278,18 @@ def _of(done: Cycles, cases: tuple[Case, ...]) -> Array:
     return np.array([done.of(*case) for case in cases])
 
 
-def _trends(found: Cycles) -> list[Comparison]:
-    """What 6.4.3 says about payload and number of muscles, up to one angle."""
-    deg = f"{found.high:.0f} deg"
+def _trends(found: Cycles) -> tuple[float, float, float]:
+    """What 6.4.3 says about payload and number of muscles, up to one angle: least gain of
+    efficiency [%] by payload and by fewer muscles, and gain of fewer without over with payload.
+    """
     grid = 100.0 * _grid(found, PAYLOADS)
     gain = grid[:, 0] / grid[:, 2]
     below = grid[:, 1] / grid[:, 2]
-    return [
-        say("least_gain_efficiency", float(np.nanmin(np.diff(grid, axis=0))), deg),
-        say("least_gain_efficiency_number", float(np.nanmin(-np.diff(grid, axis=1))), deg),
-        say(
-            "gain_two_four",
-            float(gain[0] / gain[-1] if math.isfinite(gain[-1]) else below[0] / below[-1]),
-            deg,
-        ),
-    ]
+    return (
+        float(np.nanmin(np.diff(grid, axis=0))),
+        float(np.nanmin(-np.diff(grid, axis=1))),
+        float(gain[0] / gain[-1] if math.isfinite(gain[-1]) else below[0] / below[-1]),
+    )
 
 
 def _cycles(done: Experiments) -> list[Comparison]:
@@ -268,9 +297,11 @@ def _cycles(done: Experiments) -> list[Comparison]:
     assert done.plain is not None
     slow = done.plain.efficiency / _of(done.readings["as it is"][0], MATRIX[90.0])
     short = 90.0 - done.plain.tops()
+    payload, number, lightest = zip(_trends(done.flat), _trends(done.steep), strict=True)
     return [
-        *_trends(done.flat),
-        *_trends(done.steep),
+        say("least_gain_efficiency", min(payload), payload[0], payload[1]),
+        say("least_gain_efficiency_number", min(number), number[0], number[1]),
+        say("gain_two_four", min(lightest), lightest[0], lightest[1]),
         say("largest_overshoot_angle", over),
         say(
             "efficiency_slow_PI",
@@ -281,6 +312,32 @@ def _cycles(done: Experiments) -> list[Comparison]:
             short.max(),
         ),
         say("length_eight_cycles", 8.0 * rec.CYCLE),
+        *_beside_balance(done),
+        *_loops(done),
+    ]
+
+
+def _beside_balance(done: Experiments) -> list[Comparison]:
+    """Every efficiency of the two tables beside a quasi-static balance of other code."""
+    off = [
+        found.of(*case) / loops.balance(*case, found.high, found.count) - 1.0
+        for found in (done.flat, done.steep)
+        for case in loops.lasting(found)
+    ]
+    return [say("beside_balance", 100.0 * max(off, key=abs), 100.0 * min(off), 100.0 * max(off))]
+
+
+def _loops(done: Experiments) -> list[Comparison]:
+    """The margin of every loop behind the tables, and what their pressures do."""
+    found = loops.margins(done)
+    least = min(found, key=lambda one: one.inner)
+    slow = next(one.whole for one in found if one.name == loops.SLOW)
+    loose = min((one for one in found if one.name != loops.SLOW), key=lambda one: one.whole)
+    restless = max(found, key=lambda one: one.turning)
+    return [
+        say("inner_margin", least.inner, least.name, len(found)),
+        say("whole_margin", loose.whole, loose.name, slow),
+        say("pressure_turns", 100.0 * restless.turning, restless.name),
     ]
 
 
@@ -303,11 +360,16 @@ def _best(done: Experiments) -> list[Comparison]:
         f"{load:g} kg: {n}" + (f" ({k} of {done.cycles} cycles)" if k < done.cycles else "")
         for load, (n, k) in best.items()
     )
-    numbers = [n for n, _ in best.values()]
+    able = {load: n for load, (n, k) in best.items() if k == done.cycles}
+    last, followed = best[EXTENDED[-1]]
     return [
-        say("number_muscles_0", float(numbers[0])),
-        say("least_step_best", float(np.diff(numbers).min()), words),
-        say("number_muscles_63", float(numbers[-1])),
+        say("number_muscles_0", float(best[0.0][0])),
+        say("least_step_best", float(np.diff(list(able.values())).min()), words),
+        say(
+            "number_muscles_63",
+            float(able.get(EXTENDED[-1], math.nan)),
+            f"{last} muscles follow {followed} of {done.cycles} cycles",
+        ),
         *_limits(done, best),
     ]
 
@@ -436,11 +498,13 @@ def loop_width(found: Cycles, row: int) -> float:
     return abs(at[1] - at[0]) / float(torque[up | down].max())
 
 
+_VOLUME: Final = "volume of the tubing, 0.1 l"
 _SPREAD: Final = "largest spread of the work over the numbers of muscles"
 #: Which suspects the text names, and what counts for each.
 _NAMED: Final[Mapping[str, tuple[str, ...]]] = {
     "leakage": ("leakage of the muscles", "leakage of the valve", "leakage of the tank"),
-    "tubing": ("friction of the tubing", "volume of the tubing, 0.1 l"),
+    "tubing, by its friction": ("friction of the tubing",),
+    "tubing, by its volume": (_VOLUME,),
     "temperature": ("temperature of the muscles' air",),
 }
 
@@ -470,6 +534,7 @@ def _suspects(done: Experiments) -> list[Comparison]:
                 suspect,
                 "; ".join(told(name) for name in members),
                 best,
+                apart=OTHER if members == (_VOLUME,) else "",
             )
         )
     return rows + _unnamed(done, energy, told)
@@ -479,7 +544,7 @@ def _unnamed(done: Experiments, energy: Array, told: Callable[[str], str]) -> li
     """What else could make the input larger, each a check of our own."""
     base = done.readings["as it is"][0]
     rows_ = [base.row(*case) for case in MATRIX[90.0]]
-    gauge = energy / done.readings["gauge pressures in (6.4)"][0].energy[rows_]
+    gauge = energy / done.readings[_GAUGE][0].energy[rows_]
     tank = _tank(done)
     other = "hysteresis of the muscles (2.36)"
     return [
@@ -551,6 +616,15 @@ def tables() -> dict[str, str]:
         lines(done.steep, share, every),
         "",
         note,
+        "",
+        *head,
+        lines(done.flat, _balanced, PAYLOADS),
+        lines(done.steep, _balanced, PAYLOADS),
+        "",
+        "*The same by a quasi-static balance of other code (`tests/reference/recruitment.py`): no "
+        f"valve, no controller, no inertia, {done.cycles} cycles.*",
+        "",
+        *loops.table(done),
     ]
     bare = [
         *head,
@@ -572,6 +646,11 @@ def tables() -> dict[str, str]:
     }
 
 
+def _balanced(found: Cycles, row: int) -> str:
+    """Efficiency of a case by the quasi-static balance, in words."""
+    return f"{100.0 * loops.balance(*found.cases[row], found.high, found.count):.1f}"
+
+
 def in_short(rows: list[Comparison]) -> list[str]:
     """A few sentences about the statements."""
     done = latest()
@@ -583,12 +662,10 @@ def in_short(rows: list[Comparison]) -> list[str]:
             for values in (100.0 * _of(found, MATRIX[90.0]) for found in done.readings[name])
         )
 
-    own, gauge, heavy = (
-        spread(name) for name in ("as it is", "gauge pressures in (6.4)", "arm of 11 kg m")
-    )
+    own, gauge, heavy = (spread(name) for name in ("as it is", _GAUGE, "arm of 11 kg m"))
     loaded = tuple((p, n) for p, n in MATRIX[90.0] if p > 0.0)
     part = [100.0 * _of(found, loaded) for found in (done.steep, done.bare)]
-    volume = done.suspects["volume of the tubing, 0.1 l"]
+    volume = done.suspects[_VOLUME]
     base = done.readings["as it is"][0]
     rows_ = [base.row(*case) for case in MATRIX[90.0]]
     more = 100.0 * (volume.energy / base.energy[rows_] - 1.0)
@@ -599,11 +676,17 @@ def in_short(rows: list[Comparison]) -> list[str]:
     trends = [
         row for row in rows if row.group == say.groups["cycles"] and row.where.startswith("6.4.3")
     ]
+    bare = {name: done.readings[name][1] for name in ("as it is", _GAUGE)}
     could = [name for name, row in named.items() if row.verdict == "agree"]
     cannot = [name for name, row in named.items() if row.verdict != "agree"]
     return say.short(
         (own[0], own[1], part[0].min(), part[0].max(), part[1].min(), part[1].max()),
-        (_bound(done), gauge[0], gauge[1], _order(done), heavy[0], heavy[1]),
+        (_bound(done), gauge[0], gauge[1], heavy[0], heavy[1]),
+        (
+            _by_number(bare[_GAUGE], 0.0),
+            _by_number(bare[_GAUGE], 27.0),
+            *(loops.by_number(payload, rubber=False, gauge=True) for payload in (0.0, 27.0)),
+        ),
         (sum(row.verdict == "agree" for row in trends), told.ours("tests", _SPREAD, 2)),
         (
             " and ".join(could) if could else "none",
@@ -616,16 +699,9 @@ def in_short(rows: list[Comparison]) -> list[str]:
     )
 
 
-def _order(done: Experiments) -> str:
-    """What gauge pressures make of the order of the numbers of muscles without rubber, in words."""
-    found = done.readings["gauge pressures in (6.4)"][1]
-    empty, full = ([found.of(p, n) for n in MUSCLES] for p in (0.0, 27.0))
-    if empty[0] == max(empty) and full[0] == min(full):
-        return (
-            ", and two muscles without rubber are the best without and the worst with the largest "
-            "payload, as the text has it"
-        )
-    return ""
+def _by_number(found: Cycles, payload: float) -> str:
+    """Efficiency [%] of a payload with 2, 4 and 6 muscles, in words."""
+    return ", ".join(f"{100.0 * found.of(payload, n):.1f}" for n in MUSCLES)
 
 
 def _shown(suspect: str) -> str:

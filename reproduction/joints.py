@@ -154,12 +154,27 @@ def _torques(rows: Lines, case: PublishedCase, problem: JointProblem, printed: J
     torque, wanted = printed.scores.torque[0] / _FOOT_POUND, case.torque
     needed = _angle_needed(case, problem, torque[0])
     rows.say("joint_torque_at_rest", torque[0], needed, published=wanted)
-    rows.say("joint_least_torque", torque.min(), _MODULI[case.name], published=wanted)
-    for title, other in _others(case, problem):
-        least = case.design(other).scores.torque[0].min() / _FOOT_POUND
-        bound = title == _BRAID and least < wanted
-        note = "no rubber at all: with this braid angle no moduli give it" if bound else ""
-        rows.say("joint_torque_otherwise", least, title, note, published=wanted)
+    others = {
+        title: float(case.design(other).scores.torque[0].min() / _FOOT_POUND)
+        for title, other in _others(case, problem)
+    }
+    bound = others[_BRAID] < wanted
+    rows.say(
+        "joint_least_torque",
+        torque.min(),
+        "" if bound else _MODULI[case.name],
+        f"no moduli give it: without any rubber it is {others[_BRAID]:.0f} ft lbf" if bound else "",
+        published=wanted,
+    )
+    for title, least in others.items():
+        note = "no rubber at all: with this braid angle no moduli give it"
+        rows.say(
+            "joint_torque_otherwise",
+            least,
+            title,
+            note if title == _BRAID and bound else "",
+            published=wanted,
+        )
 
 
 def _pressures(rows: Lines, case: PublishedCase, problem: JointProblem) -> None:

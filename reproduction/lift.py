@@ -278,6 +278,14 @@ class Lifts:
         return np.asarray(np.ptp(self.between(13.0, 15.0), axis=1))
 
     @property
+    def restless(self) -> NDArray[np.bool_]:
+        """Whether it does not come to rest in the hold, in a limit cycle or too slow to settle: it
+        moves by more than a figure shows (2 deg), and no less than half as much as 2 s before.
+        """
+        before = np.ptp(self.between(11.0, 13.0), axis=1)
+        return np.asarray((self.swing > 2.0) & (self.swing > 0.5 * before))
+
+    @property
     def delay(self) -> Array:
         """From the begin of the lift until the arm has turned by 1 deg [s]."""
         since = self.between(5.0, 25.0)

@@ -16,30 +16,39 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs.control import PressureLoop, cascaded_pid, sweep
+from pamrs.control import Cascade, PressureLoop, cascaded_pid, sweep
 from pamrs.control.trajectories import Trajectory, cosine_cycles
 from pamrs.errors import ParameterError
 from pamrs.rig import Rig
 from pamrs.rigs import named
 from reproduction.elbow import HYSTERESIS, with_muscle
+from reproduction.margins import inner_gains, loop_margin
 from reproduction.rigs import with_struts
 
 __all__ = [
     "CYCLE",
     "EXTENDED",
+    "FILTER",
     "GAINS",
     "LOW",
     "MATRIX",
     "MUSCLES",
+    "NONE",
     "PAYLOADS",
     "READINGS",
     "SLOW",
+    "SLOWER",
     "SUSPECTS",
     "Case",
     "Cycles",
     "beside_idle",
+    "case_gains",
+    "controller",
+    "inner_loop",
     "lifting",
     "plant",
+    "rig_of",
+    "whole_margin",
 ]
 
 Array = NDArray[np.float64]
@@ -64,11 +73,24 @@ PERIOD: Final = 0.005
 #: Of the angle, for six muscles [Pa/rad, Pa/(rad s), Pa s/rad]; fewer ask for more pressure in
 #: proportion.
 GAINS: Final[Mapping[str, float]] = {"kp": 4e5, "ki": 6e5, "kd": 5e4}
+#: The same and slower ones, for arms that have neither payload nor rubber; of each rig the first
+#: with which its whole loop bears :data:`WHOLE` times its gain.
+SLOWER: Final[tuple[Mapping[str, float], ...]] = (
+    GAINS,
+    {"kp": 2e5, "ki": 3e5, "kd": 2.5e4},
+    {"kp": 1e5, "ki": 1e5, "kd": 2.5e4},
+    {"kp": 5e4, "ki": 2.5e4, "kd": 2.5e4},
+)
+WHOLE: Final = 1.5
+#: Angles about which whole loops are made linear, and how far below the largest one [deg].
+_ABOUT: Final = (16.0, 50.0)
+_CLOSE: Final = 2.0
 #: The same without the rate, as slow as the arm with 27 kg needs to rise smoothly.
 SLOW: Final[Mapping[str, float]] = {"kp": 1e5, "ki": 1e5, "kd": 0.0}
-_LOOP: Final[Mapping[str, Any]] = {"kp": 4e-4, "ki": 2e-4, "pressure_filter": 0.0025}
+#: Of the filters of the pressure and of the rate [s].
+FILTER: Final = 0.0025
 _CHANNELS: Final = ("joint_angle", "joint_torque", "muscle_pressure", "supply_pressure")
-_EVERY: Final = 2
+_EVERY: Final = 1  # a loop that is unstable changes its sign from sample to sample
 
 Changed = Callable[[Rig], Rig]
 
@@ -116,18 +138,18 @@ def _heavier(rig: Rig, moment: float) -> Rig:
 
 
 #: Ambient pressure [Pa] of gas laws that take gauge pressures for absolute ones: as good as none.
-_NONE: Final = 1e3
+NONE: Final = 1e3
 #: Other readings of what the text leaves open, each a change of the rig.
 READINGS: Final[Mapping[str, Changed]] = {
     "as it is": lambda rig: rig,
-    "gauge pressures in (6.4)": lambda rig: _gas(rig, _NONE),
+    "gauge pressures in (6.4)": lambda rig: _gas(rig, NONE),
     "arm of 5 kg m": lambda rig: _heavier(rig, 5.0),
     "arm of 11 kg m": lambda rig: _heavier(rig, 11.0),
     "isothermal gas": _isothermal,
     "no dead volume": lambda rig: _scaled(rig, "chamber.dead_volume", 1e-3),
     "braid of 75.4 deg": lambda rig: with_muscle(rig, braid_angle=math.radians(75.4)),
     "gauge pressures, twice the dead volume": lambda rig: _gas(
-        _scaled(rig, "chamber.dead_volume", 2.0), _NONE
+        _scaled(rig, "chamber.dead_volume", 2.0), NONE
     ),
 }
 #: What the text suspects behind the experiments' larger input (6.5.2), and what it does not name,
@@ -241,15 +263,114 @@ def trajectory(high: float, cycles: int) -> Trajectory:
     return cosine_cycles(math.radians(LOW), math.radians(high), cycles=cycles)
 
 
-def _controller(muscles: Array, limit: float, gains: Mapping[str, float] = GAINS) -> Any:
-    more = {name: value * 6.0 / muscles for name, value in gains.items()}
+def rig_of(
+    payload: float, muscles: int, *, elastic: bool = True, changed: Changed | None = None
+) -> Rig:
+    """The rig of a case, see :func:`lifting`."""
+    rig = plant(payload, muscles)
+    if not elastic:
+        assert rig.muscle is not None
+        rig = with_muscle(rig, rig.muscle.replace(model="gaylord", geometry="elliptic"))
+    return rig if changed is None else changed(rig)
+
+
+def inner_loop(rig: Rig) -> dict[str, float]:
+    """Gains and filter of the pressure loop that a rig's chamber and valve allow."""
+    return {**inner_gains(rig, PERIOD, FILTER), "pressure_filter": FILTER}
+
+
+@cache
+def case_gains(
+    case: Case, high: float, elastic: bool = True, changed: Changed | None = None
+) -> tuple[Mapping[str, float], float]:
+    """Gains of the angle, for six muscles, with which the whole loop of a case has room, and its
+    margin: the first of :data:`SLOWER`, the last where none has.
+
+    Parameters
+    ----------
+    case : (float, int)
+        Payload [kg] and number of muscles.
+    high : float
+        Largest angle [deg].
+    elastic : bool
+    changed : callable, optional
+        As for :func:`lifting`, where the controller knows it.
+
+    Returns
+    -------
+    (mapping of str to float, float)
+    """
+    rig = rig_of(*case, elastic=elastic, changed=changed)
+    for gains in SLOWER:
+        margin = whole_margin(rig, rig, case[1], high, gains)
+        if margin >= WHOLE:
+            break
+    return gains, margin
+
+
+def whole_margin(
+    rig: Rig, known: Rig, muscles: int, high: float, gains: Mapping[str, float]
+) -> float:
+    """Least margin of a whole loop at the angles at which its muscles hold the arm.
+
+    Parameters
+    ----------
+    rig, known : Rig
+        What is controlled, and what the pressure loop's gains are for.
+    muscles : int
+    high : float
+        Largest angle [deg].
+    gains : mapping of str to float
+        Of the angle, for six muscles.
+
+    Returns
+    -------
+    float
+        Infinite where no angle is held, or nothing has a linear model.
+    """
+    least = math.inf
+    for angle in (*_ABOUT, high - _CLOSE):
+        try:
+            found = loop_margin(
+                rig, lambda: controller([known], float(muscles), gains), math.radians(angle)
+            )
+        except ParameterError:
+            continue
+        least = min(least, found)
+    return least
+
+
+def controller(rigs: Sequence[Rig], muscles: Any, gains: Mapping[str, Any] = GAINS) -> Cascade:
+    """The cascade of one batch: angle gains by the number of muscles, and a pressure loop with the
+    gains that each rig's chamber and valve allow (:mod:`reproduction.margins`).
+
+    Parameters
+    ----------
+    rigs : sequence of Rig
+        One for each row, with one chamber and one valve, as the controller knows them.
+    muscles : float or ndarray, shape (n,)
+        How many each has.
+    gains : mapping of str to float or ndarray, shape (n,)
+        Of the angle, for six muscles, as :data:`GAINS`.
+
+    Returns
+    -------
+    Cascade
+    """
+    inner = [inner_loop(rig) for rig in rigs]
+    loop = {name: _column([one[name] for one in inner], muscles) for name in inner[0]}
     return cascaded_pid(
-        limit,
+        rigs[0].parameter("supply.initial_pressure").value,
         period=PERIOD,
-        rate_filter=0.0025,
-        inner=PressureLoop(period=PERIOD, **_LOOP),
-        **more,
+        rate_filter=FILTER,
+        inner=PressureLoop(period=PERIOD, **loop),
+        **{name: value * 6.0 / muscles for name, value in gains.items()},
     )
+
+
+def _column(values: list[float], muscles: Any) -> Any:
+    """A gain of each row, one number where there is one rig that is no batch."""
+    return np.array(values) if np.ndim(muscles) else values[0]
 
 
 def lifting(
@@ -259,7 +380,8 @@ def lifting(
     *,
     elastic: bool = True,
     changed: Changed | None = None,
-    gains: Mapping[str, float] = GAINS,
+    known: bool = False,
+    gains: Mapping[str, float] | None = None,
 ) -> Cycles:
     """Lift and lower payloads by a cascaded controller.
 
@@ -275,8 +397,11 @@ def lifting(
         Else the force is Gaylord's alone (6.4.3), the shape as it is.
     changed : callable, optional
         What is read otherwise: a rig for a rig.
-    gains : mapping of str to float
-        Of the angle, for six muscles, as :data:`GAINS`.
+    known : bool
+        Whether the loops are set for the changed rig: it is another reading, not what no controller
+        knows.
+    gains : mapping of str to float, optional
+        Of the angle, for six muscles; by default :func:`case_gains` of each case.
 
     Returns
     -------
@@ -289,17 +414,15 @@ def lifting(
     """
     if not cases:
         raise ParameterError("cases is empty: at least one payload and number of muscles is needed")
-    rigs = []
-    for payload, muscles in cases:
-        rig = plant(payload, muscles)
-        if not elastic:
-            assert rig.muscle is not None
-            rig = with_muscle(rig, rig.muscle.replace(model="gaylord", geometry="elliptic"))
-        rigs.append(rig if changed is None else changed(rig))
-    limit = rigs[0].parameter("supply.initial_pressure").value
+    rigs = [rig_of(*case, elastic=elastic, changed=changed) for case in cases]
+    read = [rig_of(*case, elastic=elastic, changed=changed if known else None) for case in cases]
+    own = [
+        gains or case_gains(case, high, elastic, changed if known else None)[0] for case in cases
+    ]
+    columns = {name: np.array([one[name] for one in own]) for name in GAINS}
     done = sweep(
         rigs,
-        _controller(np.array([float(muscles) for _, muscles in cases]), limit, gains),
+        controller(read, np.array([float(n) for _, n in cases]), columns),
         trajectory(high, cycles),
         sample_time=PERIOD,
         channels=_CHANNELS,
@@ -336,7 +459,7 @@ def beside_idle(payload: float, high: float, cycles: int, *, struts: bool = Fals
     vented = np.zeros(1)
     done = sweep(
         [rig],
-        _controller(np.array([2.0]), rig.parameter("supply.initial_pressure").value),
+        controller([plant(payload, 2)], np.array([2.0])),
         trajectory(high, cycles),
         sample_time=PERIOD,
         channels=("joint_angle.shoulder", "joint_torque.shoulder", "muscle_pressure.pair_1")

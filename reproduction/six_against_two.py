@@ -136,5 +136,5 @@ def _row(
     weak = exact and ours != published and published == 6
     note = f"our blocked force is {short:.2f} of the published one" if weak else ""
     return judge(
-        heading, fact, where, published, ours, relation="equals" if exact else "below", note=note
+        heading, fact, where, published, ours, relation="equals" if exact else "below", reason=note
     )

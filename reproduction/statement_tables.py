@@ -75,10 +75,10 @@ def markdown(
         remarks = []
         for row in members:
             mark = ""
-            if row.note:
+            if row.remark:
                 number += 1
                 mark = f" [{number}]"
-                remarks.append(f"- [{number}] {row.fact}: {row.note}")
+                remarks.append(f"- [{number}] {row.fact}: {row.remark}")
             counts = row.verdict == "differs" and not row.apart
             verdict = f"**{row.told_verdict}**" if counts else row.told_verdict
             cells = (
@@ -98,7 +98,8 @@ def markdown(
 
 
 def to_csv(rows: Iterable[Comparison]) -> str:
-    """The comparison as CSV with a heading; what is no number stays empty.
+    """The comparison as CSV with a heading, the kind of verdict last; what is no number stays
+    empty.
 
     Parameters
     ----------
@@ -111,9 +112,9 @@ def to_csv(rows: Iterable[Comparison]) -> str:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow([field.name for field in fields(Comparison)])
+    writer.writerow([*(field.name for field in fields(Comparison)), "kind"])
     for row in rows:
-        writer.writerow([_cell(value) for value in row.to_dict().values()])
+        writer.writerow([*(_cell(value) for value in row.to_dict().values()), row.kind])
     return stream.getvalue()
 
 

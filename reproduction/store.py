@@ -24,8 +24,12 @@ from reproduction.page import Picture, Section
 
 __all__ = ["digest", "folder", "inputs", "keep", "kept"]
 
-#: Folders of the package and of its reproduction.
-_ROOTS: Final = (Path(pamrs.__file__).parent, Path(__file__).parent)
+#: Folders of the package, of its reproduction, and of the other code that chapter 6 stands beside.
+_ROOTS: Final = (
+    Path(pamrs.__file__).parent,
+    Path(__file__).parent,
+    Path(__file__).parents[1] / "tests" / "reference",
+)
 #: What is calculated and drawn with, besides them.
 _PACKAGES: Final = ("numpy", "scipy", "matplotlib", "Pillow", "deap", "cma")
 #: Parts of them on which no number and no picture depends.
@@ -42,7 +46,7 @@ def folder() -> Path:
 
 def inputs(name: str) -> dict[str, Path]:
     """The files that a chapter depends on: of the package all but the command line, of the
-    reproduction what belongs to no other chapter.
+    reproduction what belongs to no other chapter, and the reference of the tests.
 
     Parameters
     ----------

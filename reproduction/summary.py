@@ -1,12 +1,12 @@
-"""The page of all chapters: how many statements agree, and each that counts with verdict, reason
-and picture.
+"""The page of all chapters: how many statements have which kind of verdict, and each that counts
+with kind, reason and picture.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from pamrs.comparison import VERDICTS, Comparison
+from pamrs.comparison import KINDS, Comparison
 from reproduction.page import Section
 from reproduction.statements import text
 
@@ -14,8 +14,7 @@ __all__ = ["counts", "summary"]
 
 
 def counts(section: Section) -> dict[str, int]:
-    """How many statements have each verdict, how many of those that agree were used to identify,
-    and how many lines stand apart.
+    """How many statements have each kind of verdict, and how many lines stand apart.
 
     Parameters
     ----------
@@ -24,12 +23,11 @@ def counts(section: Section) -> dict[str, int]:
     Returns
     -------
     dict of str to int
-        By verdict, ``"used"`` and ``"apart"``.
+        By kind, in the order of :data:`pamrs.comparison.KINDS`, and ``"apart"``.
     """
     counted = [row for row in section.rows if not row.apart]
     return {
-        **{verdict: sum(row.verdict == verdict for row in counted) for verdict in VERDICTS},
-        "used": sum(row.verdict == "agree" and row.used for row in counted),
+        **{kind: sum(row.kind == kind for row in counted) for kind in KINDS},
         "apart": len(section.rows) - len(counted),
     }
 
@@ -50,13 +48,18 @@ def summary(sections: Mapping[str, Section], command: str) -> str:
     str
         Markdown.
     """
-    lines = [text("summary").format(command=command).rstrip()]
-    total = dict.fromkeys((*VERDICTS, "used", "apart"), 0)
-    for name, section in sections.items():
-        found = counts(section)
-        total = {key: total[key] + found[key] for key in total}
-        lines.append(f"| [{section.title}]({_page(name)}.md) | {_cells(found)} |")
-    lines += [f"| **all** | {_cells(total)} |", ""]
+    every = {name: counts(section) for name, section in sections.items()}
+    total = {key: sum(found[key] for found in every.values()) for key in (*KINDS, "apart")}
+    whole = sum(total[kind] for kind in KINDS)
+    lines = [
+        text("summary").format(command=command, own=total[KINDS[0]], whole=whole).rstrip(),
+        *(
+            f"| [{section.title}]({_page(name)}.md) | {_cells(every[name])} |"
+            for name, section in sections.items()
+        ),
+        f"| **all** | {_cells(total)} |",
+        "",
+    ]
     for name, section in sections.items():
         lines += [
             f"## {section.title}",
@@ -82,9 +85,7 @@ def _page(name: str) -> str:
 
 
 def _cells(found: Mapping[str, int]) -> str:
-    return " | ".join(
-        str(found[key]) for key in ("agree", "used", "differs", "cannot tell", "apart")
-    )
+    return " | ".join(str(number) for number in found.values())
 
 
 def _line(name: str, section: Section, row: Comparison) -> str:
@@ -93,14 +94,14 @@ def _line(name: str, section: Section, row: Comparison) -> str:
     links = " ".join(
         f"[{number}]({_page(name)}/{one}.png)" for number, one in enumerate(pictures, 1)
     )
-    verdict = f"**{row.verdict}**" if row.verdict == "differs" else row.verdict
-    reason = row.criterion if row.verdict == "agree" else row.note
+    kind = f"**{row.kind}**" if row.verdict == "differs" else row.kind
+    reason = row.criterion if row.kind == KINDS[0] else row.remark or row.criterion
     cells = (
         row.fact,
         row.where,
         f"{published} {row.unit}".strip(),
         f"{ours} {row.unit}".strip(),
-        verdict + (" (used)" if row.used else ""),
+        kind,
         reason,
         links,
     )

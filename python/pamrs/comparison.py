@@ -1,5 +1,5 @@
-"""Published statements beside what this package gives: value, deviation, and agree / differs /
-cannot tell.
+"""Published statements beside what this package gives: value, deviation, agree / differs / cannot
+tell, and what an agreement rests on.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from typing import Any, Final
 from pamrs.errors import ParameterError
 
 __all__ = [
+    "BASES",
+    "KINDS",
     "RELATIONS",
     "VERDICTS",
     "Comparison",
@@ -24,6 +26,15 @@ __all__ = [
 RELATIONS: Final = ("equals", "above", "below")
 #: What can be said about a statement.
 VERDICTS: Final = ("agree", "differs", "cannot tell")
+#: What an agreement rests on: nothing but the statement's number; what was taken from the statement
+#: itself or follows from how the thing was built; a sign, where another model would agree as well.
+BASES: Final[Mapping[str, str]] = {
+    "": "agrees on its own",
+    "construction": "agrees by construction",
+    "sign": "agrees in sign only",
+}
+#: What counts in a score: only the first says that ours is right.
+KINDS: Final = (*BASES.values(), "differs", "cannot tell")
 
 _SIGN: Final = {"equals": "", "above": "> ", "below": "< "}
 
@@ -47,8 +58,10 @@ class Comparison:
         Largest deviation that counts as agreement, in ``unit``; for ``equals``.
     verdict : {"agree", "differs", "cannot tell"}
         By the tolerance or the relation.
-    used : bool
-        The statement took part in choosing our numbers, so that agreement proves nothing.
+    basis : {"", "construction", "sign"}
+        What an agreement rests on, see :data:`BASES`.
+    reason : str
+        Why it differs, where that is known.
     apart : str
         Why it is no part of the score: another reading of a statement that is there already, a
         trial, a diagnosis of our own; empty where it is.
@@ -65,9 +78,10 @@ class Comparison:
     relation: str
     tolerance: float
     verdict: str
-    used: bool
+    basis: str
     note: str
     apart: str = ""
+    reason: str = ""
 
     @property
     def criterion(self) -> str:
@@ -96,12 +110,23 @@ class Comparison:
         return sign + _number(self.published), _number(self.ours)
 
     @property
+    def kind(self) -> str:
+        """The verdict with what an agreement rests on: one of :data:`KINDS`."""
+        return BASES[self.basis] if self.verdict == "agree" else self.verdict
+
+    @property
+    def remark(self) -> str:
+        """Reason and note; of a line that counts and differs without one, that it is not known."""
+        unknown = self.verdict == "differs" and not self.apart
+        reason = self.reason or ("reason not known" if unknown else "")
+        return "; ".join(part for part in (reason, self.note) if part)
+
+    @property
     def told_verdict(self) -> str:
-        """The verdict as tables show it, with what it rests on."""
-        verdict = self.verdict + (" (used to identify)" if self.used else "")
+        """The kind of verdict as tables show it, in brackets where it does not count."""
         if not self.apart:
-            return verdict
-        told = self.apart if self.verdict == "cannot tell" else f"{self.apart}: {verdict}"
+            return self.kind
+        told = self.apart if self.verdict == "cannot tell" else f"{self.apart}: {self.verdict}"
         return f"({told})"
 
     def to_dict(self) -> dict[str, Any]:
@@ -119,10 +144,11 @@ def judge(
     *,
     relation: str = "equals",
     tolerance: float = 0.0,
-    used: bool = False,
+    basis: str = "",
     cannot_tell: str = "",
     note: str = "",
     apart: str = "",
+    reason: str = "",
 ) -> Comparison:
     """Compare one number with a published one.
 
@@ -138,14 +164,16 @@ def judge(
         How ours must stand to the published value; equal is neither above nor below.
     tolerance : float
         Largest absolute deviation that counts as equal, in ``unit``.
-    used : bool
-        The statement took part in choosing our numbers.
+    basis : {"", "construction", "sign"}
+        What an agreement rests on, see :data:`BASES`.
     cannot_tell : str
         Why nothing can be decided; the verdict is then "cannot tell", and this the remark.
     note : str
         A remark; it follows ``cannot_tell`` where both are given.
     apart : str
         Why the line is no part of the score.
+    reason : str
+        Why it differs, where that is known.
 
     Returns
     -------
@@ -154,13 +182,15 @@ def judge(
     Raises
     ------
     ParameterError
-        If the relation is unknown, the tolerance is not a number from zero on, or there is no
-        source.
+        If the relation or the basis is unknown, the tolerance is not a number from zero on, or
+        there is no source.
     """
     if relation not in RELATIONS:
         raise ParameterError(
             f"relation = {relation!r} is not allowed: one of {', '.join(RELATIONS)}"
         )
+    if basis not in BASES:
+        raise ParameterError(f"basis = {basis!r} is not allowed: one of {', '.join(BASES)}")
     if not tolerance >= 0.0:
         raise ParameterError(f"tolerance = {tolerance} is not allowed: a number from 0 on")
     if not where.strip():
@@ -184,9 +214,10 @@ def judge(
         relation=relation,
         tolerance=float(tolerance),
         verdict=verdict,
-        used=used,
+        basis=basis,
         note="; ".join(part for part in (cannot_tell, note) if part),
         apart=apart,
+        reason=reason,
     )
 
 
@@ -231,23 +262,21 @@ def table(
         )
         lines.append(line.rstrip())
         if notes:
-            lines.append(f"    {row.where}{': ' + row.note if row.note else ''}")
+            lines.append(f"    {row.where}{': ' + row.remark if row.remark else ''}")
     return "\n".join(lines)
 
 
 def verdicts(rows: Sequence[Comparison]) -> str:
-    """How many statements agree, differ, or cannot tell, in words, and how many lines stand
-    apart.
+    """How many statements agree on their own, by construction and in sign only, differ, or cannot
+    tell, in words, and how many lines stand apart.
     """
     counted = [row for row in rows if not row.apart]
-    found = {verdict: sum(row.verdict == verdict for row in counted) for verdict in VERDICTS}
-    used = sum(row.verdict == "agree" and row.used for row in counted)
-    note = f" ({used} used to identify)" if used else ""
+    own, built, sign, differs, open_ = (sum(row.kind == kind for row in counted) for kind in KINDS)
     rest = len(rows) - len(counted)
     apart = f"; {rest} lines stand apart" if rest > 1 else "; 1 line stands apart" if rest else ""
     return (
-        f"{found['agree']} agree{note}, {found['differs']} differ, {found['cannot tell']} cannot "
-        f"tell{apart}"
+        f"{own} agree on their own, {built} by construction, {sign} in sign only, "
+        f"{differs} differ, {open_} cannot tell{apart}"
     )
 
 

@@ -25,7 +25,7 @@ OTHER: Final = "another reading"
 OWN: Final = "a check of our own"
 TRIAL: Final = "a trial"
 
-_TEXTS: Final = ("fact", "where", "unit", "cannot_tell", "note")
+_TEXTS: Final = ("fact", "where", "unit", "cannot_tell", "note", "reason")
 
 
 def text(name: str) -> str:
@@ -76,6 +76,8 @@ class Statements:
     apart : list of (str, str, str)
         Patterns of group and statement, both whole, of lines that are no part of the score, and
         why.
+    bases : list of (str, str, str)
+        Patterns of lines that no table of statements has, and what their agreement rests on.
     """
 
     def __init__(self, chapter: str) -> None:
@@ -85,6 +87,7 @@ class Statements:
         self.pictures: list[dict[str, str]] = table.get("picture", [])
         self.rows: dict[str, dict[str, Any]] = {row.pop("id"): row for row in table["statement"]}
         self.apart = [(one["group"], one["fact"], one["why"]) for one in table.get("apart", [])]
+        self.bases = [(one["group"], one["fact"], one["basis"]) for one in table.get("basis", [])]
         self._share: float = table.get("share", 0.0)
         self.numbers: list[dict[str, str]] = table.get("chosen", [])
         self._short: list[str] = table["short"]
@@ -139,12 +142,14 @@ class Statements:
         return Lines(self, group)
 
     def scored(self, rows: Iterable[Comparison]) -> list[Comparison]:
-        """The lines, those that a pattern of :attr:`apart` fits being no part of the score; the
-        first that fits decides.
+        """The lines, those that a pattern of :attr:`apart` fits being no part of the score, and
+        with the bases of :attr:`bases`; the first pattern that fits decides.
         """
         return [
             replace(
-                row, apart=next((why for g, f, why in self.apart if _fit(row, g, f)), row.apart)
+                row,
+                apart=_first(self.apart, row, row.apart),
+                basis=_first(self.bases, row, row.basis),
             )
             for row in rows
         ]
@@ -174,6 +179,11 @@ class Lines(list[Comparison]):
     def say(self, key: str, ours: float = math.nan, *said: Any, **more: Any) -> None:
         """One more, with the arguments of :class:`Statements`."""
         self.append(self._table(key, ours, *said, **self._group, **more))
+
+
+def _first(patterns: list[tuple[str, str, str]], row: Comparison, otherwise: str) -> str:
+    """What the first pattern that fits a line says of it."""
+    return next((said for group, fact, said in patterns if _fit(row, group, fact)), otherwise)
 
 
 def _fit(row: Comparison, group: str, fact: str) -> bool:

@@ -201,7 +201,10 @@ def test_all_chains_move_at_once_and_none_as_another() -> None:
     "rig", [pytest.param(JOINT, marks=pytest.mark.slow), TWO], ids=["one joint", "two joints"]
 )
 def test_experiments_keep_to_what_rig_and_recordings_allow(rig: Rig) -> None:
-    text = rig.to_toml_text() + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    text = (
+        rig.to_toml_text().partition("\n[limits]")[0]
+        + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    )
     limited = parse_rig(text + 'payloads = { value = [0.1, 0.9], unit = "kg" }\n')
     pool = library(limited, OWN, sample_time=0.01)
     assert {e.kind for e in pool} >= {"multisine", "slow_triangle", "other_payload", "staircase"}
@@ -394,7 +397,10 @@ def test_pressures_that_cannot_be_found_are_told_in_words(monkeypatch) -> None:
         patched.setattr("pamrs.experiments._protocols.simulate", fails)
         left = {e.kind for e in library(pamrs.rigs.named("tube"), OWN)}
         assert left == {"hold_low", "hold_high", "hold_short", "hold_long"}
-    text = JOINT.to_toml_text() + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    text = (
+        JOINT.to_toml_text().partition("\n[limits]")[0]
+        + '\n[limits]\nmax_pressure = { value = 4, unit = "bar" }\n'
+    )
     monkeypatch.setattr(Experiment, "simulate", fails)
     assert only(parse_rig(text), "multisine") == []
 

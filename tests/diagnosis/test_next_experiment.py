@@ -50,7 +50,8 @@ OPEN = DiagnosisSettings(settled=0.99999, in_set=5e-4, simulated_from=5e-4)
 def limited(rig: pamrs.Rig, text: str, folder: Path) -> pamrs.Rig:
     """A rig whose file says what the stand allows."""
     file = folder / "limited.toml"
-    file.write_text(f"{rig.to_toml_text()}\n[limits]\n{text}\n", encoding="utf-8")
+    unlimited = rig.to_toml_text().partition("\n[limits]")[0]
+    file.write_text(f"{unlimited}\n[limits]\n{text}\n", encoding="utf-8")
     return pamrs.load_rig(file)
 
 

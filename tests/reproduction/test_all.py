@@ -1,5 +1,6 @@
 """Every chapter at once: what is kept and when, how it goes on, and the page of all statements."""
 
+import csv
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -7,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import reproduction
-from pamrs.comparison import judge
+from pamrs.comparison import KINDS, judge
 from reproduction import CHAPTERS, store
 from reproduction.__main__ import main
 from reproduction.page import Picture, Section, page
@@ -17,9 +18,11 @@ from tests.tables import rows_of
 DOCS = Path(__file__).parents[2] / "docs" / "reproduction"
 ROWS = (
     judge("one", "a | b", "6.2", 1.0, 1.01, "bar", tolerance=0.1),
-    judge("one", "c", "6.3", 1.0, 2.0, tolerance=0.1, note="because | of it"),
+    judge("one", "c", "6.3", 1.0, 2.0, tolerance=0.1, reason="because | of it"),
     judge("two", "d", "6.4", math.nan, math.inf, cannot_tell="no number", note="really"),
-    judge("two", "e", "6.4", 1.0, 1.0, used=True),
+    judge("two", "e", "6.4", 1.0, 1.0, basis="construction"),
+    judge("two", "g", "6.4", 1.0, 2.0, relation="above", basis="sign"),
+    judge("two", "h", "6.4", 1.0, 0.5, relation="above", basis="sign"),
     judge("two", "f", "6.5", 1.0, 2.0, apart="a trial"),
 )
 SECTION = Section(
@@ -103,6 +106,7 @@ def test_every_chapter_has_its_files():
         files = {Path(part).name for part in store.inputs(name)}
         assert {f"{module}.py", "drawing.py", "shoulder.toml"} <= files
         assert any(part.startswith("_core") for part in files)
+        assert "recruitment.py" in files
         assert all(part.startswith(module) for part in files if part.startswith("chapter"))
 
 
@@ -152,17 +156,19 @@ def test_code_that_changes_while_it_runs_is_not_kept(tmp_path, monkeypatch):
 
 def test_summary_has_each_statement_that_counts():
     assert counts(SECTION) == {
-        "agree": 2,
-        "differs": 1,
+        "agrees on its own": 1,
+        "agrees by construction": 1,
+        "agrees in sign only": 1,
+        "differs": 2,
         "cannot tell": 1,
-        "used": 1,
         "apart": 1,
     }
     text = summary({"ch6": SECTION, "ch2": replace(SECTION, title="Two")}, "pamrs x")
     lines = text.splitlines()
     assert "Made by `pamrs x`; change the code, not this page." in lines
-    assert "| [Chapter 6: a title](chapter6.md) | 2 | 1 | 1 | 1 | 1 |" in lines
-    assert "| **all** | 4 | 2 | 2 | 2 | 2 |" in lines
+    assert "| [Chapter 6: a title](chapter6.md) | 1 | 1 | 1 | 2 | 1 | 1 |" in lines
+    assert "| **all** | 2 | 2 | 2 | 4 | 2 | 2 |" in lines
+    assert any(line.startswith("**2 of 12 statements agree on their own**") for line in lines)
     heads = [k for k, line in enumerate(lines) if line.startswith("| **the first group** |")]
     assert len(heads) == 2
     rows = lines[heads[0] + 1 :]
@@ -172,31 +178,39 @@ def test_summary_has_each_statement_that_counts():
     assert rows[2] == "| **two** | | | | | | |"
     assert "(chapter2/" in lines[heads[1] + 1]
     assert "| none | inf |" not in text
-    assert "agree (used)" in text
+    assert "| agrees by construction | within" in text
+    assert "| **differs** | reason not known |" in text
     assert "| f |" not in text
     assert "no number; really" in text
 
 
 def test_summary_in_the_documentation_counts_the_tables_beside_it():
-    import csv
-
     text = (DOCS / "README.md").read_text(encoding="utf-8")
     assert "Made by `make reproduce`" in text
-    total = [0] * 5
+    total = [0] * (len(KINDS) + 1)
     for chapter in CHAPTERS.values():
         with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
             rows = list(csv.DictReader(stream))
         counted = [row for row in rows if not row["apart"]]
-        found = [
-            sum(row["verdict"] == "agree" for row in counted),
-            sum(row["verdict"] == "agree" and row["used"] == "yes" for row in counted),
-            sum(row["verdict"] == "differs" for row in counted),
-            sum(row["verdict"] == "cannot tell" for row in counted),
-            len(rows) - len(counted),
-        ]
+        found = [sum(row["kind"] == kind for row in counted) for kind in KINDS]
+        found.append(len(rows) - len(counted))
         assert f"({chapter}.md) | {' | '.join(map(str, found))} |" in text
         total = [a + b for a, b in zip(total, found, strict=True)]
     assert f"| **all** | {' | '.join(map(str, total))} |" in text
+    assert f"**{total[0]} of {sum(total[:-1])} statements agree on their own**" in text
+
+
+@pytest.mark.parametrize("chapter", CHAPTERS.values())
+def test_what_is_only_above_another_never_agrees_on_its_own(chapter):
+    with (DOCS / chapter / "facts.csv").open(encoding="utf-8", newline="") as stream:
+        rows = [row for row in csv.DictReader(stream) if not row["apart"]]
+    compared = [
+        row
+        for row in rows
+        if row["relation"] != "equals"
+        and (row["published"] == "0" or (row["published"] == "1" and not row["unit"]))
+    ]
+    assert [row["fact"] for row in compared if row["kind"] == KINDS[0]] == []
 
 
 # -------------------------------------------------------------------------- the command
@@ -212,7 +226,7 @@ def test_command_writes_pages_tables_and_pictures(capsys, tmp_path, monkeypatch)
     assert {path.name for path in folder.iterdir()} == {"chapter6", "chapter6.md"}
     main(words)
     out = capsys.readouterr().out
-    assert "Chapter ch6: 2 agree (1 used to identify), 1 differ" in out
+    assert "Chapter ch6: 1 agree on their own, 1 by construction, 1 in sign only, 2 differ" in out
     assert "ch2: reproducing" in out
     assert out.count("nothing changed") == 1
     assert "Made by `make reproduce`;" in (folder / "README.md").read_text(encoding="utf-8")

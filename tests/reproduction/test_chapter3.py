@@ -34,6 +34,8 @@ DIFFER = {
     "rate at the top of the pressure over the largest",
     "largest torque",
     "rotation at the largest torque",
+    "least over largest torque from 0 to 78 deg of rotation, 150 psi",
+    "largest over resting diameter of the chapter's muscles, the larger",
 }
 
 
@@ -69,6 +71,8 @@ def test_a_fact_needs_a_source_and_a_criterion():
         ParameterError, match="relation = 'near' is not allowed: one of equals, above, below"
     ):
         judge("group", "fact", "3.2", 1.0, 1.0, relation="near")
+    with pytest.raises(ParameterError, match="basis = 'luck' is not allowed"):
+        judge("group", "fact", "3.2", 1.0, 1.0, basis="luck")
     for tolerance in (-1.0, math.nan):
         with pytest.raises(ParameterError, match=f"tolerance = {tolerance}"):
             judge("group", "fact", "3.2", 1.0, 1.0, tolerance=tolerance)
@@ -80,8 +84,8 @@ def test_a_fact_needs_a_source_and_a_criterion():
 
 def test_text_markdown_and_csv_have_every_fact():
     made = [
-        judge("first", "a | b", "Table 3.2", 100.0, 90.0, "lbf", tolerance=1.0, note="because"),
-        judge("second", "c", "3.4", 1.0, 2.0, relation="above", used=True),
+        judge("first", "a | b", "Table 3.2", 100.0, 90.0, "lbf", tolerance=1.0, reason="because"),
+        judge("second", "c", "3.4", 1.0, 2.0, relation="above", basis="construction"),
         judge("second", "d", "3.5", 0.5, math.nan, "in", cannot_tell="no section"),
     ]
     text, page_text = (
@@ -103,12 +107,15 @@ def test_text_markdown_and_csv_have_every_fact():
     parsed = list(csv.DictReader(io.StringIO(to_csv(made))))
     assert [row["fact"] for row in parsed] == ["a | b", "c", "d"]
     assert parsed[0]["relative"] == "-0.1"
-    assert (parsed[1]["used"], parsed[2]["ours"], parsed[2]["verdict"]) == (
-        "yes",
+    assert (parsed[1]["basis"], parsed[2]["ours"], parsed[2]["verdict"]) == (
+        "construction",
         "",
         "cannot tell",
     )
-    assert verdicts(made) == "1 agree (1 used to identify), 1 differ, 1 cannot tell"
+    assert [row["kind"] for row in parsed] == ["differs", "agrees by construction", "cannot tell"]
+    assert verdicts(made) == (
+        "0 agree on their own, 1 by construction, 0 in sign only, 1 differ, 1 cannot tell"
+    )
     trial = judge("g", "d", "1", 1.0, 2.0, apart="a trial")
     open_ = judge("g", "e", "1", 1.0, 2.0, apart="a trial", cannot_tell="counted")
     assert verdicts([*made, trial]).endswith("1 cannot tell; 1 line stands apart")
@@ -292,13 +299,10 @@ def test_verdicts_of_the_chapter(rows):
         if row.group in chapter3.say.groups.values() and row.group != chapter3.say.groups["braid"]
     ]
     assert {row.fact for row in own if row.verdict == "differs"} == DIFFER
-    assert all(
-        row.note
-        for row in own
-        if row.verdict == "differs" and row.fact != "rotation at the largest torque"
-    )
+    assert all(row.reason for row in own if row.verdict == "differs" and not row.apart)
     assert all(row.note for row in rows if row.verdict == "cannot tell")
-    assert [row.fact for row in own if row.used] == ["peak rate, valve area chosen for it"]
+    built = {row.fact for row in own if row.basis == "construction"}
+    assert "peak rate, valve area chosen for it" in built
     assert {row.verdict for row in rows} == {"agree", "differs", "cannot tell"}
 
 

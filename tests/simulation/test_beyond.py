@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
+import pytest
 
 import pamrs
 from pamrs.rig import parse_rig
@@ -17,8 +19,8 @@ def happened(run: pamrs.Simulation, kind: str) -> list[tuple[str, float]]:
 
 
 def test_a_pressure_above_the_limit_is_an_event() -> None:
-    text = SHOULDER.to_toml_text() + '\n[limits]\nmax_pressure = { value = 6, unit = "bar" }\n'
-    rig = parse_rig(text)
+    unlimited = SHOULDER.to_toml_text().partition("\n[limits]")[0]
+    rig = parse_rig(unlimited + '\n[limits]\nmax_pressure = { value = 6, unit = "bar" }\n')
     volts = np.where(np.arange(300) < 150, 10.0, 0.0)
     run = pamrs.simulate(rig, volts, sample_time=0.01)
     pressure = run["muscle_pressure"]
@@ -31,7 +33,7 @@ def test_a_pressure_above_the_limit_is_an_event() -> None:
     assert passed < 1.5 < kept < 3.0
     assert re.search(r"chamber: max pressure passed at 0\.\d+ s", run.summary())
     # a stand that says nothing of it has no such limit
-    plain = pamrs.simulate(SHOULDER, volts, sample_time=0.01)
+    plain = pamrs.simulate(parse_rig(unlimited), volts, sample_time=0.01)
     assert not happened(plain, "max_pressure_passed")
     assert np.array_equal(plain["muscle_pressure"], pressure)
 
@@ -65,3 +67,25 @@ def test_a_stop_that_gives_way_is_told_with_how_far() -> None:
     assert (
         "beyond its" not in pamrs.simulate(SHOULDER, np.full(200, 5.4), sample_time=0.01).summary()
     )
+
+
+@pytest.mark.parametrize("name", pamrs.rigs.names())
+def test_a_thousand_bar_is_an_event_of_every_packaged_rig(name: str) -> None:
+    rig = pamrs.rigs.named(name)
+    assert 5e5 < rig.limits["max_pressure"] < 2e6
+    chambers = [f"muscle_pressure.{n}" if n else "muscle_pressure" for n in rig.tables("chamber")]
+    rows = np.ones(3)
+    driven: dict[str, Any] = {}
+    if rig.tables("valve"):
+        driven["valve_command"] = {
+            n: table["null_voltage"] * rows for n, table in rig.tables("valve").items()
+        }
+    if any(table["kind"] == "regulator" for table in rig.tables("supply").values()):
+        driven["supply_command"] = 0.0 * rows
+    if not driven and rig.tables("muscle"):
+        driven["length"] = 0.24 * rows
+    elif not driven:
+        driven["duration"] = 2e-5
+    run = pamrs.simulate(rig, sample_time=1e-5, initial=dict.fromkeys(chambers, 1e8), **driven)
+    assert len(happened(run, "max_pressure_passed")) == len(chambers)
+    assert "max pressure passed at 0" in run.summary()

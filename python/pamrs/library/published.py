@@ -83,7 +83,7 @@ def _compare(item: Entry, fact: Fact) -> Comparison:
         "" if fact.unit == "1" else fact.unit,
         relation=fact.relation,
         tolerance=fact.tolerance / scale,
-        used=fact.used,
+        basis="construction" if fact.used else "",
         cannot_tell=fact.cannot_tell,
-        note="" if fact.cannot_tell else fact.note,
+        reason="" if fact.cannot_tell else fact.note,
     )
