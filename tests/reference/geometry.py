@@ -202,9 +202,8 @@ class GeometryReference:
             if miss_near * miss_far <= 0.0:
                 return float(brentq(miss, near, far, xtol=1e-18, rtol=8.9e-16)), False
         least = int(np.argmin(np.abs(misses)))
-        bounds = sorted(
-            (float(grid[max(least - 1, 0)]), float(grid[min(least + 1, grid.size - 1)]))
-        )
+        ends = float(grid[max(least - 1, 0)]), float(grid[min(least + 1, grid.size - 1)])
+        bounds = min(ends), max(ends)
         found = minimize_scalar(
             lambda radius: abs(miss(radius)),
             bounds=bounds,

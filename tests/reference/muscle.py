@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.polynomial import Chebyshev
@@ -157,10 +158,8 @@ class MuscleReference:
             return np.array([self.membrane(shape, axial**k, hoop**k) for k in orders])
         if self.model == "mooney_rivlin":
             units = ((1.0, 0.0), (0.0, 1.0))
-            slopes = [
-                self.along_braid(lambda x, y, u=u: self.energy(*u, x, y), shape, shape.radius)
-                for u in units
-            ]
+            energies = [partial(self.energy, *unit) for unit in units]
+            slopes = [self.along_braid(energy, shape, shape.radius) for energy in energies]
             return -np.array(slopes)
         return np.array([sum(self.elbow_parts(e))]) if self.model == "elbow_linear" else np.zeros(0)
 
