@@ -215,8 +215,9 @@ lock:  ## pin the newest versions that pyproject.toml allows
 	{ head -1 requirements-dev.lock; $(VENV)/lock/bin/python -m pip freeze; } > $(VENV)/lock/dev.lock
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/docs.txt --constraint $(VENV)/lock/dev.lock
 	{ head -1 requirements-docs.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock; } > $(VENV)/lock/docs.lock
+	$(VENV)/lock/bin/python -m pip uninstall --quiet --yes --requirement $(VENV)/lock/docs.lock
 	$(VENV)/lock/bin/python -m pip install --quiet --requirement $(VENV)/lock/bench.txt --constraint $(VENV)/lock/dev.lock
-	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock -f $(VENV)/lock/docs.lock; } > $(VENV)/lock/bench.lock
+	{ head -1 requirements-bench.lock; $(VENV)/lock/bin/python -m pip freeze | grep -vxFf $(VENV)/lock/dev.lock; } > $(VENV)/lock/bench.lock
 	mv $(VENV)/lock/dev.lock requirements-dev.lock && mv $(VENV)/lock/docs.lock requirements-docs.lock && mv $(VENV)/lock/bench.lock requirements-bench.lock
 	rm -rf $(VENV)/lock
 

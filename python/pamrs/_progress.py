@@ -118,8 +118,9 @@ class Steps:
             known = self._share >= _LEAST_SHARE
             left = passed * (1.0 - self._share) / self._share if known else None
             line = Line(text, self._share, left)
-            LOG.info("%s", line.whole)
-            self._to(line)
+        # outside of the lock, since whoever gets a line may wait for another thread
+        LOG.info("%s", line.whole)
+        self._to(line)
 
 
 def receiver(given: Callable[[str], object] | None) -> Callable[[str], object]:

@@ -17,7 +17,17 @@ from typing import Any, Final, TypeAlias
 from pamrs.channels import channel_of, laboratory_unit
 from pamrs.errors import ParameterError, meant
 
-__all__ = ["COLOURS", "Panels", "Curve", "View", "in_laboratory_units", "legend", "over_time"]
+__all__ = [
+    "COLOURS",
+    "MAX_POINTS",
+    "Panels",
+    "Curve",
+    "View",
+    "decimate",
+    "in_laboratory_units",
+    "legend",
+    "over_time",
+]
 
 #: What draws each panel, by its name, the most telling one first.
 Panels: TypeAlias = "dict[str, Callable[[Any], object]]"
@@ -27,7 +37,10 @@ Curve: TypeAlias = tuple[str, Any, Any, dict[str, Any]]
 #: Told apart by colour-blind readers and in grey print (after Okabe and Ito).
 COLOURS: Final = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#c79a00", "#56b4e9")
 _MOST_SHOWN: Final = 3  # panels in a notebook
+MAX_POINTS: Final = 900  # of a curve on a page, where nobody asks for more
 _MOST_POINTS: Final = 4000
+#: Names of recordings are no formulas.
+_NAMES: Final = {"text.parse_math": False}
 #: Channels that show how a rig runs, the most telling one first; others only where these are not.
 _TELLING: Final[tuple[str, ...]] = (
     *("joint_angle", "length", "muscle_pressure", "force", "valve_command", "supply_command"),
@@ -90,8 +103,11 @@ class View:
                 f"ax has {len(several)} Axes, which is not allowed: at most one for each of "
                 f"{', '.join(names)}"
             )
-        for axes, name in zip(several, names, strict=False):
-            panels[name](axes)
+        from matplotlib import rc_context
+
+        with rc_context(_NAMES):
+            for axes, name in zip(several, names, strict=False):
+                panels[name](axes)
         return ax
 
     def _repr_html_(self) -> str:
@@ -100,18 +116,20 @@ class View:
 
     def _picture(self) -> str:
         """The first panels as an image."""
+        from matplotlib import rc_context
         from matplotlib.figure import Figure
 
         panels = list(self._panels().values())[:_MOST_SHOWN]
         if not panels:
             return ""
         size = (7.0, 0.4 + 1.9 * len(panels))
-        figure = Figure(figsize=size, dpi=150, layout="constrained")
-        every = figure.subplots(len(panels), squeeze=False)[:, 0]
-        for draw, axes in zip(panels, every, strict=True):
-            draw(axes)
         file = io.BytesIO()
-        figure.savefig(file, format="png")
+        with rc_context(_NAMES):
+            figure = Figure(figsize=size, dpi=150, layout="constrained")
+            every = figure.subplots(len(panels), squeeze=False)[:, 0]
+            for draw, axes in zip(panels, every, strict=True):
+                draw(axes)
+            figure.savefig(file, format="png")
         data = base64.b64encode(file.getvalue()).decode()
         return f'<img style="width:44em;max-width:100%" src="data:image/png;base64,{data}">'
 
@@ -152,13 +170,50 @@ def _draw_channel(axes: Any, head: str, of: list[tuple[str, list[Curve]]]) -> No
     unit, factor = laboratory_unit(head)
     for name, series in of:
         for label, time, values, style in series:
-            step = max(1, len(time) // _MOST_POINTS)
             text = " ".join(part for part in (name.partition(".")[2], label) if part)
             own = {"color": COLOURS[len(axes.lines) % len(COLOURS)], "lw": 1.2} | style
-            axes.plot(time[::step], factor * values[::step], label=text or "_", **own)
+            times, drawn = decimate(time, factor * values, _MOST_POINTS)
+            # a legend leaves out what begins with an underscore
+            said = f" {text}" if text.startswith("_") else text or "_"
+            axes.plot(times, drawn, label=said, **own)
     axes.set_ylabel(f"{head.replace('_', ' ')} [{unit}]")
     axes.set_xlabel("time [s]")
     legend(axes)
+
+
+def decimate(time: Any, values: Any, points: int = MAX_POINTS) -> tuple[Any, Any]:
+    """Thin a curve for drawing, keeping the extremes of every stretch.
+
+    Parameters
+    ----------
+    time, values : ndarray, shape (n,)
+        Curve; NaN in `values` are gaps.
+    points : int
+        Largest number of points returned.
+
+    Returns
+    -------
+    tuple of ndarray
+        Times and values of at most `points` samples, in order; a stretch that is all NaN stays a
+        gap.
+    """
+    import numpy as np
+
+    n = len(time)
+    if n <= points:
+        return time, values
+    edges = np.linspace(0, n, points // 2 + 1).astype(np.int64)
+    chosen: list[int] = []
+    for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        part = values[start:stop]
+        if np.all(np.isnan(part)):
+            chosen.append(int(start))
+        else:
+            chosen.extend(
+                sorted({int(start + np.nanargmin(part)), int(start + np.nanargmax(part))})
+            )
+    index = np.asarray(chosen, dtype=np.int64)
+    return time[index], values[index]
 
 
 def legend(axes: Any) -> None:

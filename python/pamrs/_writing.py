@@ -59,10 +59,12 @@ def check_writable(*paths: str | os.PathLike[str] | None) -> None:
         If a folder does not exist, is full or does not let files be made in it, or a path is a
         folder itself or a file that must not be written.
     ParameterError
-        If two of them are the same file.
+        If two of them are the same file, or one is called ``-``.
     """
     wanted = [Path(path) for path in paths if path is not None]
     for path in wanted:
+        if path == Path("-"):
+            raise ParameterError("-: standard output is for --json alone; a file is needed")
         _check_writable(path)
     _check_different(path for path in wanted if not path.exists() or path.is_file())
 

@@ -98,3 +98,32 @@ def test_what_is_no_result_is_refused(tmp_path: Path, capsys: Any, content: str,
     assert str(bad) in err
     assert why in err
     assert told(capsys, good, tmp_path / "absent")[0] == 2
+
+
+def test_an_effect_that_acts_elsewhere_is_another(tmp_path: Path, capsys: Any) -> None:
+    first, second = result(tmp_path / "result.json"), tmp_path / "noise0.5" / "result.json"
+    other = json.loads(first.read_text(encoding="utf-8"))
+    (effect,) = other["effects"][:1]
+    effect["at"] = "extensor"
+    second.parent.mkdir()
+    second.write_text(json.dumps(other), encoding="utf-8")
+    code, text, _ = told(capsys, first, second.parent)
+    assert code == 0
+    assert f"{effect['id']}@extensor is named now" in text
+    assert tmp_path.name in text
+    assert "noise0.5" in text
+
+
+def test_standard_output_is_for_json_alone(tmp_path: Path, capsys: Any) -> None:
+    one = result(tmp_path / "a.json")
+    code, out, err = told(capsys, one, one, "--json", "-", "--out", "-")
+    assert (code, out) == (2, "")
+    assert "-: standard output is for --json alone; a file is needed" in err
+
+
+def test_json_nested_without_end_is_refused(tmp_path: Path, capsys: Any) -> None:
+    good, bad = result(tmp_path / "good.json"), tmp_path / "deep.json"
+    bad.write_text("[" * 200_000, encoding="utf-8")
+    code, _, err = told(capsys, good, bad)
+    assert code == 2
+    assert "is not the JSON of a result" in err

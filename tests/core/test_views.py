@@ -176,3 +176,14 @@ def test_names_are_escaped_and_matplotlib_waits_until_it_is_asked() -> None:
         "sys.exit('matplotlib' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_names_are_no_formulas_and_extremes_are_drawn() -> None:
+    angle = np.zeros(20_000)
+    angle[7_777] = 1.0
+    tables = {name: {"joint_angle": angle} for name in ("a$x$_{", "_b$\\frac$")}
+    case = pamrs.Case.from_arrays(pamrs.rigs.shoulder(), tables, sample_time=0.005)
+    assert "data:image/png" in case._repr_html_()
+    axes = case.plot(Figure().subplots())
+    assert len(axes.get_legend_handles_labels()[1]) == 2
+    assert max(axes.lines[0].get_ydata()) == pytest.approx(np.degrees(1.0))

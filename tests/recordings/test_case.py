@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 
 import pamrs
 from pamrs.errors import CaseError
-from pamrs.recordings import digests, load_case
+from pamrs.recordings import load_case
 from tests.tables import rows_of
 
 ROOT = Path(__file__).parents[2]
@@ -37,13 +36,15 @@ def folder(path: Path, toml: str = TOML) -> Path:
 def test_every_file_of_a_case_has_its_digest(tmp_path: Path) -> None:
     case = load_case(folder(tmp_path))
     names = ["case.toml", "rig.toml", "run.csv"]
-    found = digests(case)
+    found = case.inputs
     assert list(found) == names
     for name in names:
         assert found[name] == hashlib.sha256((case.path / name).read_bytes()).hexdigest()
-    (case.path / "run.csv").unlink()
-    assert list(digests(case)) == names[:2]
-    assert digests(replace(case, path=Path("absent"))) == {}
+    other = tmp_path / "other.toml"
+    pamrs.rigs.sealed_chamber().to_toml(other)
+    changed = case.with_rig(pamrs.load_rig(other), other).inputs
+    assert list(changed) == ["case.toml", "run.csv", str(other)]
+    assert list(case.with_rig(case.rig).inputs) == ["case.toml", "run.csv"]
 
 
 def refused(home: Path) -> str:

@@ -138,6 +138,13 @@ def test_what_is_said_beside_a_table_holds_and_a_wrong_unit_is_named() -> None:
     unit = pytest.importorskip("pint").UnitRegistry()
     with pytest.raises(CaseError, match="'joint_angle' = .* a quantity in rad"):
         pamrs.Case.from_arrays(RIG, {"run": frame.to_dict("list") | {"joint_angle": TIME * unit.m}})
+    turned = unit.Quantity(_bench()["joint_angle"].to_numpy(), "deg")
+    with pytest.raises(
+        CaseError, match=r"'joint_angle' has a unit of its own: units\['joint_angle"
+    ):
+        pamrs.Case.from_arrays(
+            RIG, {"run": ARRAYS | {"joint_angle": turned}}, units={"joint_angle": "deg"}
+        )
 
 
 def test_times_are_dates_an_index_a_coordinate_or_in_another_unit() -> None:

@@ -16,6 +16,7 @@ from tests.diagnosis import synthetic
 pytest.importorskip("matplotlib")
 pytest.importorskip("jinja2")
 
+from pamrs._views import MAX_POINTS, decimate
 from pamrs.findings import (
     BudgetTerm,
     EffectFound,
@@ -143,7 +144,7 @@ def test_curves_are_data_that_a_script_redraws() -> None:
     assert "</script>" not in text.removesuffix("</script>")
     measured = told[0]["lines"][0]
     assert measured["name"] == "measured"
-    assert len(measured["x"]) == len(measured["y"]) <= figures.MAX_POINTS
+    assert len(measured["x"]) == len(measured["y"]) <= MAX_POINTS
     assert None in measured["y"]  # a gap
     assert max(v for v in measured["y"] if v is not None) == pytest.approx(
         np.degrees(np.nanmax(found.traces[0].measured)), rel=1e-4
@@ -225,8 +226,8 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
     values = np.sin(time / 1e4)
     values[51_234] = 9.0
     values[70_000:80_000] = np.nan
-    t, v = figures.decimate(time, values)
-    assert len(t) <= figures.MAX_POINTS
+    t, v = decimate(time, values)
+    assert len(t) <= MAX_POINTS
     assert np.nanmax(v) == 9.0
     assert np.all(np.diff(t) > 0)
     assert np.isnan(v[(t >= 71_000) & (t < 79_000)]).all()

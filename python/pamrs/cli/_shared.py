@@ -64,7 +64,7 @@ GEOMETRY: Final = {
 }
 #: Whether notes and progress are left out, by ``--quiet``.
 QUIET: Final = ContextVar("QUIET", default=False)
-#: What ``--json -`` names.
+#: What ``--json -`` names; no other option means it.
 STDOUT: Final = Path("-")
 
 

@@ -42,9 +42,16 @@ def compare_command(
 
 def _names(first: Path, second: Path) -> tuple[str, str]:
     """What two results are called: their files or folders, in full where these are the same."""
-    short = [path.stem if path.stem != "result" else path.parent.name for path in (first, second)]
-    one, other = short if short[0] != short[1] else (str(first), str(second))
-    return one, other
+    one, other = map(_short, (first, second))
+    return (one, other) if one != other else (str(first), str(second))
+
+
+def _short(path: Path) -> str:
+    """Name of a folder, of a file without ending, of the folder of a ``result.json``."""
+    whole = path.absolute()
+    if whole.is_dir():
+        return whole.name
+    return whole.parent.name if whole.name == "result.json" else whole.stem
 
 
 def _read(path: Path) -> dict[str, Any]:

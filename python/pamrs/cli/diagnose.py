@@ -133,7 +133,7 @@ def diagnose_command(
     if rig is not None:
         from pamrs.rig import load_rig
 
-        loaded = loaded.with_rig(load_rig(rig))
+        loaded = loaded.with_rig(load_rig(rig), rig)
     from pamrs.diagnosis import diagnose
 
     with progress(f"diagnosing {loaded.name}") as say:

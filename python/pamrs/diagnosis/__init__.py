@@ -66,7 +66,7 @@ from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import CATALOGUE, EFFECTS, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
 from pamrs.findings import Faulty, NextExperiment
-from pamrs.recordings import Case, Recording, digests, is_table, load_case
+from pamrs.recordings import Case, Recording, is_table, load_case
 from pamrs.rig import Rig, load_rig
 from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
@@ -236,7 +236,7 @@ def diagnose(
     say("reading the case", 0.0)
     case = _case_of(case, data, allow_outside=allow_outside)
     if rig is not None:
-        case = case.with_rig(rig if isinstance(rig, Rig) else load_rig(rig))
+        case = case.with_rig(rig) if isinstance(rig, Rig) else case.with_rig(load_rig(rig), rig)
     case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
     _check_rig(case)
     suspected = [*suspected_units(case), *noted_units(case)]
@@ -281,7 +281,7 @@ def diagnose(
         faulty=[*dead, *clipped],
         warnings=warnings,
         data=data,
-        inputs=digests(case),
+        inputs=dict(case.inputs),
         seconds=round(time.perf_counter() - began, 3),
     )
 
@@ -400,7 +400,7 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     """
     rig, said = at_ambient(case.rig, case.recordings, settings)
     told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
-    return case.with_rig(without_passing(rig)), told
+    return replace(case, rig=without_passing(rig)), told
 
 
 def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty], list[str]]:

@@ -335,7 +335,7 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
         found = json.loads(file.read_text(encoding="utf-8"))
     except OSError as error:
         raise DiagnosisError(f"{file}: cannot be read ({error.strerror})") from None
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise DiagnosisError(f"{file}: is not the JSON of a result ({error})") from None
     given = found.get("schema") if isinstance(found, dict) else None
     if given not in READABLE:
@@ -347,7 +347,7 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
         raise DiagnosisError(f"{file}: is no complete result ({', '.join(missing)} is missing)")
     settings = found.pop("settings", {})
     try:
-        values = {"case": file.parent.name} | fields_from(Diagnosis, found)
+        values = {"case": file.absolute().parent.name} | fields_from(Diagnosis, found)
         return _Read(**values, settings=DiagnosisSettings.from_dict(settings))
     except (TypeError, ValueError, AttributeError) as error:
         raise DiagnosisError(f"{file}: is no complete result ({error})") from None

@@ -103,7 +103,7 @@ def _parameters(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Parameters of what is named, then of the rig."""
     named = result["effects"] if result["verdict"] == "effects" else []
     found = {
-        f"{effect['id']}{'@' * bool(effect.get('at'))}{effect.get('at', '')}.{name}": own
+        f"{_term(effect)}.{name}": own
         for effect in named
         for name, own in effect["parameters"].items()
     }
@@ -155,9 +155,14 @@ def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any
     return told
 
 
+def _term(effect: Mapping[str, Any]) -> str:
+    """What hypotheses call an effect: its id, with the block at which it acts."""
+    return f"{effect['id']}@{effect['at']}" if effect.get("at") else str(effect["id"])
+
+
 def _named(result: Mapping[str, Any]) -> set[str]:
     """Effects and parameters that a result names."""
-    effects = {e["id"] for e in result["effects"] if result["verdict"] == "effects"}
+    effects = {_term(e) for e in result["effects"] if result["verdict"] == "effects"}
     return effects | {w["name"] for w in result["wrong_parameters"]}
 
 

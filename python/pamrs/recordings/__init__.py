@@ -1,7 +1,7 @@
 """Recordings of a rig on one clock, and cases: a rig with its recordings in a folder.
 
 :func:`load_recording` reads a table, checks it and masks what cannot be used; :func:`load_case`
-reads a case folder, :func:`digests` says which files that were, :func:`case_schema` is the JSON
+reads a case folder, :func:`case_schema` is the JSON
 schema of its ``case.toml``; :func:`load_recordings` takes the log of a laboratory as it is,
 :func:`propose` says what of it is likely which channel, :func:`suspicions` which units physics
 contradicts.
@@ -12,7 +12,7 @@ of every format, :mod:`pamrs.recordings.calibration` what their numbers stand fo
 from __future__ import annotations
 
 from pamrs.channels import CHANNELS
-from pamrs.recordings._case import Case, digests, load_case, model_and_case
+from pamrs.recordings._case import Case, load_case, model_and_case
 from pamrs.recordings._case_keys import case_schema
 from pamrs.recordings._doubts import Suspicion, suspicions
 from pamrs.recordings._from_log import load_recordings
@@ -31,7 +31,6 @@ __all__ = [
     "Recording",
     "Suspicion",
     "case_schema",
-    "digests",
     "is_table",
     "load_case",
     "load_recording",

@@ -6,7 +6,7 @@ import hashlib
 import os
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -39,7 +39,7 @@ from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
 
-__all__ = ["SCHEMA", "Case", "digests", "load_case", "model_and_case"]
+__all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
 _RIG: Final = "rig.toml"
@@ -70,6 +70,8 @@ class Case(View):
         The folder.
     description : str
         What ``case.toml`` says about it.
+    inputs : dict of str to str
+        SHA-256 of each file that it was read from; empty for a case of arrays.
     """
 
     name: str
@@ -77,6 +79,8 @@ class Case(View):
     recordings: list[Recording]
     path: Path
     description: str = ""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    _rig_file: str = field(default="", repr=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", shown(self.name)[:MOST_NAME])
@@ -203,19 +207,24 @@ class Case(View):
             made += [_on_its_turn(each, rig) for each in found]
         return cls(name, rig, made, Path())
 
-    def with_rig(self, rig: Rig) -> Case:
+    def with_rig(self, rig: Rig, file: str | os.PathLike[str] | None = None) -> Case:
         """The same recordings with another rig.
 
         Parameters
         ----------
         rig : Rig
             The model to put in place.
+        file : path-like, optional
+            The file that it was read from, for `inputs`.
 
         Returns
         -------
         Case
         """
-        return replace(self, rig=rig)
+        inputs = {name: told for name, told in self.inputs.items() if name != self._rig_file}
+        if file is not None:
+            inputs[str(file)] = _digest(Path(file))
+        return replace(self, rig=rig, inputs=inputs, _rig_file="")
 
 
 def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) -> Case:
@@ -245,7 +254,7 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     given = Path(folder)
     if given.is_file() and given.name != "case.toml":
         model, case = model_and_case(given)
-        return load_case(case, allow_outside=allow_outside).with_rig(model)
+        return load_case(case, allow_outside=allow_outside).with_rig(model, given)
     file = given if given.name == "case.toml" else given / "case.toml"
     home = file.parent
     if file != given and not allow_outside and found_outside(home, file) is not None:
@@ -261,34 +270,21 @@ def load_case(folder: str | os.PathLike[str], *, allow_outside: bool = False) ->
     recordings = _recordings(problems, home, document.get("recording"), texts["source"], rig)
     if problems or rig is None:
         raise CaseError(joined(str(file), problems))
-    return Case(texts["name"], rig, recordings, home, texts["description"])
+    inputs, about = _digests(home, document), texts["description"]
+    return Case(texts["name"], rig, recordings, home, about, inputs, texts["rig"])
 
 
-def digests(case: Case) -> dict[str, str]:
-    """SHA-256 of each file that a case was read from.
-
-    Parameters
-    ----------
-    case : Case
-        The case.
-
-    Returns
-    -------
-    dict of str to str
-        By the file's name in ``case.toml``; without files that are not there any more, or folders,
-        and empty for a case of arrays.
-    """
-    if not (case.path / "case.toml").is_file():
-        return {}
-    document = toml_document(case.path / "case.toml", CaseError)
+def _digests(home: Path, document: Mapping[str, Any]) -> dict[str, str]:
+    """SHA-256 of each file of a case, by its name in ``case.toml``; without folders."""
     logs = [own.get("file") for own in document.get("recording", [])]
     names = ["case.toml", document.get("rig", _RIG), document.get("source"), *logs]
-    found = {}
-    for name in dict.fromkeys(name for name in names if isinstance(name, str)):
-        if (case.path / name).is_file():
-            with (case.path / name).open("rb") as file:
-                found[name] = hashlib.file_digest(file, "sha256").hexdigest()
-    return found
+    wanted = dict.fromkeys(name for name in names if isinstance(name, str) and name)
+    return {name: _digest(home / name) for name in wanted if (home / name).is_file()}
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def model_and_case(file: Path) -> tuple[Rig, Path]:

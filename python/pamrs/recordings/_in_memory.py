@@ -72,7 +72,7 @@ def arrays_of(
             "one at least, is needed"
         )
     problems = list[str]()
-    tables = {name: _table(problems, name, table) for name, table in recordings.items()}
+    tables = {name: _table(problems, name, table, units) for name, table in recordings.items()}
     problems += [
         f"recording {name!r} has no times: give it a channel time [s], or sample_time"
         for name, table in tables.items()
@@ -84,8 +84,10 @@ def arrays_of(
     return tables
 
 
-def _table(problems: list[str], name: Any, table: Any) -> Arrays:
-    """The channels of one recording; what is wrong is added to `problems`."""
+def _table(problems: list[str], name: Any, table: Any, given: Mapping[str, str]) -> Arrays:
+    """The channels of one recording, some with units that are given apart; what is wrong is added
+    to `problems`.
+    """
     if not isinstance(name, str):
         problems.append(f"recording {name!r}: a name is needed that is a text")
     found = Arrays({}, {})
@@ -114,6 +116,8 @@ def _table(problems: list[str], name: Any, table: Any) -> Arrays:
                 problems.append(str(error))
                 continue
             unit = own
+            if key in given:
+                problems.append(f"{label} has a unit of its own: units[{key!r}] is not allowed")
         dated = key == "time" and np.asarray(values).dtype.kind in _DATES
         array = _array(problems, label, values, dates=dated)
         if array is not None:

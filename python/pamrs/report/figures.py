@@ -18,6 +18,7 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pamrs._views import decimate
 from pamrs.findings import Curves, Findings, Trace
 from pamrs.report.text import (
     display_unit,
@@ -33,7 +34,6 @@ __all__ = [
     "Line",
     "Panel",
     "curves",
-    "decimate",
     "draw_panel",
     "free_head",
     "free_panels",
@@ -56,13 +56,13 @@ COLOURS = {
 """Colours of the curves (after Okabe and Ito: told apart by colour-blind readers and in grey
 print)."""
 
-MAX_POINTS = 900
 MOST_FREE = 3
 """Channels of the whole rig that are drawn at most."""
 
 FloatArray = npt.NDArray[np.float64]
 
 STYLE: Any = {
+    "text.parse_math": False,  # names of recordings are no formulas
     "svg.fonttype": "none",
     "font.family": "DejaVu Sans",
     "font.size": 9.0,
@@ -92,41 +92,6 @@ STYLE: Any = {
 """Matplotlib settings of every figure."""
 _SMALL: Any = {"font.size": 8.5, "legend.fontsize": 8.0, "axes.labelsize": 8.5}
 """Those of a summary that are others."""
-
-
-def decimate(
-    time: FloatArray, values: FloatArray, points: int = MAX_POINTS
-) -> tuple[FloatArray, FloatArray]:
-    """Thin a curve for drawing, keeping the extremes of every stretch.
-
-    Parameters
-    ----------
-    time, values : ndarray, shape (n,)
-        Curve; NaN in `values` are gaps.
-    points : int
-        Largest number of points returned.
-
-    Returns
-    -------
-    tuple of ndarray
-        Times and values of at most `points` samples, in order; a stretch that is all NaN stays a
-        gap.
-    """
-    n = len(time)
-    if n <= points:
-        return time, values
-    edges = np.linspace(0, n, points // 2 + 1).astype(np.int64)
-    chosen: list[int] = []
-    for start, stop in zip(edges[:-1], edges[1:], strict=True):
-        part = values[start:stop]
-        if np.all(np.isnan(part)):
-            chosen.append(int(start))
-        else:
-            chosen.extend(
-                sorted({int(start + np.nanargmin(part)), int(start + np.nanargmax(part))})
-            )
-    index = np.asarray(chosen, dtype=np.int64)
-    return time[index], values[index]
 
 
 def _rms(values: FloatArray | None) -> float:

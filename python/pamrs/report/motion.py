@@ -12,9 +12,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pamrs._views import decimate
 from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
-from pamrs.report.figures import COLOURS, STYLE, decimate, png_bytes
+from pamrs.report.figures import COLOURS, STYLE, png_bytes
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -77,7 +77,8 @@ def title(diagnosis: Findings) -> str:
         if len(groups) == 2 and len(told.split()) <= LONGEST - 4:
             return f"The model leaves out {told}"
     others = _listed([words.blocks_label(b) for b in groups[1:]], 2, "and")
-    for end in (f"; something else in the {others}", "") if groups[1:] else ("",):
+    ends = (f"; something else in the {others}", "; something else elsewhere", "")
+    for end in ends if groups[1:] else ("",):
         for most in (3, 2, 1):
             told = _phrase(diagnosis, groups[0], most) + end
             if len(told.split()) <= LONGEST:
@@ -140,7 +141,8 @@ def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
     values = [term.is_value for h in named for term in h.terms]
     if len(left) == 1 and values and all(values):
         wrong = [w for w in diagnosis.wrong_parameters if w.name in left[0].words]
-        return f"The rig file is wrong: {' and '.join(map(words.sentence_of, wrong))}"
+        off = _listed(list(map(words.sentence_of, wrong)), max(most, 1), "and")
+        return f"The rig file is wrong: {off}"
     if not named:
         if _chance(diagnosis, block, left[0]) < words.SETTLED:
             return f"Something acts in the {place}, and nothing is probable enough to be named"
