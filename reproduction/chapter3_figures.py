@@ -12,8 +12,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from pamrs._views import decimate
 from pamrs.design import lift
-from pamrs.report.figures import COLOURS, decimate
+from pamrs.report.figures import COLOURS
 from reproduction import drawing, elbow
 from reproduction.chapter3 import say, step_by_area
 from reproduction.elbow import FOOT_POUND, PSI

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from pamrs.report.figures import decimate
+from pamrs._views import decimate
 from reproduction import drawing, tracking
 from reproduction.chapter5_comparison import orders
 from reproduction.chapter5_statements import say
