@@ -96,7 +96,7 @@ def test_the_command_goes_on_from_the_model_that_it_wrote(
     model, further = tmp_path / "found" / "model.toml", tmp_path / "found" / "further.toml"
     model.parent.mkdir()
     with monkeypatch.context() as first:
-        first.setattr(pamrs.diagnosis, "diagnose", lambda case, consider: found)
+        first.setattr(pamrs.diagnosis, "diagnose", lambda case, consider, progress: found)
         assert cli.main(["diagnose", str(home), "--model", str(model)]) == 0
     assert "muscle_hysteresis" in model.read_text(encoding="utf-8")
     assert pamrs.load_rig(model).case == "../case"
@@ -119,7 +119,7 @@ def test_the_command_takes_another_rig(tmp_path, capsys, monkeypatch) -> None:
 
     seen = []
 
-    def noted(case: pamrs.Case, consider: Sequence[str]) -> pamrs.Diagnosis:
+    def noted(case: pamrs.Case, consider: Sequence[str], progress: object) -> pamrs.Diagnosis:
         seen.append(case)
         raise pamrs.DiagnosisError("enough")
 
