@@ -127,3 +127,12 @@ def test_json_nested_without_end_is_refused(tmp_path: Path, capsys: Any) -> None
     code, _, err = told(capsys, good, bad)
     assert code == 2
     assert "is not the JSON of a result" in err
+
+
+def test_files_that_differ_are_named(tmp_path: Path, capsys: Any) -> None:
+    first, second = result(tmp_path / "a.json"), result(tmp_path / "b.json")
+    for file, digest in ((first, "1"), (second, "2")):
+        content = json.loads(file.read_text(encoding="utf-8"))
+        content["inputs"] = {"rig.toml": digest * 64, "run.csv": "3" * 64}
+        file.write_text(json.dumps(content), encoding="utf-8")
+    assert "  inputs differ: rig.toml\n" in told(capsys, first, second)[1]

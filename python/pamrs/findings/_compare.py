@@ -151,8 +151,16 @@ def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any
     for key in ("inputs", "settings", "version"):
         one, other = first.get(key), second.get(key)
         if one != other and one is not None and other is not None:
-            told.append(f"{key} differ" if key != "version" else f"version {one} and {other}")
+            told.append(
+                f"version {one} and {other}" if key == "version" else _differ(key, one, other)
+            )
     return told
+
+
+def _differ(what: str, one: Mapping[str, Any], other: Mapping[str, Any]) -> str:
+    """Which entries of two tables differ."""
+    names = sorted(name for name in {*one, *other} if one.get(name) != other.get(name))
+    return f"{what} differ: {', '.join(names)}"
 
 
 def _term(effect: Mapping[str, Any]) -> str:
