@@ -1,0 +1,472 @@
+"""A case folder as the page shows and changes it: its rig, logs, case.toml, checks and results."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import tomlkit
+
+from pamrs import rigs
+from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
+from pamrs._writing import write_atomically
+from pamrs.channels import channel_of
+from pamrs.diagnosis import Diagnosis
+from pamrs.diagnosis.prepare import noted_units, suspected_units
+from pamrs.diagnosis.result import load_result
+from pamrs.errors import CaseError, PamrsError, ParameterError
+from pamrs.recordings import (
+    Case,
+    LogProposal,
+    Proposal,
+    channels_of,
+    digests,
+    load_case,
+    propose,
+)
+from pamrs.recordings.logs import check_readable
+from pamrs.rig import Rig, load_rig
+from pamrs.simulation import core_rig
+from pamrs.studio._run import RESULT, Run
+from pamrs.units import to_si
+
+__all__ = ["ROLES", "Check", "Studio", "Table"]
+
+ROLES: Final = {"fit": "fitted", "held_out": "held out, for the proof", "": "left out"}
+_HEAD: Final = "# Confirmed in pamrs studio.\n"
+_MOST_LOGS: Final = 100
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a check of the case found.
+
+    Attributes
+    ----------
+    error : str
+        Why the case cannot be diagnosed; empty where it can.
+    cautions : list of str
+        What was found and masked, or is to be looked at.
+    inputs : dict of str to str
+        SHA-256 of each file that was read.
+    """
+
+    error: str
+    cautions: list[str] = field(default_factory=list)
+    inputs: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Table:
+    """A log on the page: what is proposed for it, and the entries of case.toml that say so.
+
+    Attributes
+    ----------
+    item : LogProposal
+        The proposal.
+    entries : list of dict
+        Its entries; one without channels where none was recognised.
+    """
+
+    item: LogProposal
+    entries: list[dict[str, Any]]
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Its file and, where a file has several tables, its name."""
+        return self.entries[0]["file"], self.entries[0].get("name", "")
+
+    def channel(self, column: str) -> tuple[str, dict[str, Any]]:
+        """The channel that is proposed for a column, and what is said of it."""
+        for name, entry in self.entries[0]["channels"].items():
+            if entry["column"] == column:
+                return name, entry
+        return "", {}
+
+
+class Studio:
+    """One case folder; nothing outside of it is read or written.
+
+    Parameters
+    ----------
+    folder : path-like
+        A case folder, or one that is made.
+
+    Attributes
+    ----------
+    folder : Path
+        The folder, links followed.
+    checked : Check or None
+        The last check, if nothing was changed on the page since.
+    run : Run or None
+        The last diagnosis of this page.
+
+    Raises
+    ------
+    OSError
+        If the folder cannot be made, or is none.
+    """
+
+    def __init__(self, folder: str | os.PathLike[str]) -> None:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+        self.folder = resolved(folder)
+        self.checked: Check | None = None
+        self.run: Run | None = None
+        self.lock = threading.RLock()
+        self._tables: list[Table] | None = None
+        self._unread = ""
+        self._left_out: set[tuple[str, str]] = set()
+
+    # Files -------------------------------------------------------------------------------------
+
+    def path(self, name: str) -> Path:
+        """A file of the folder."""
+        return self.folder / name
+
+    def text(self, name: str) -> str:
+        """The text of ``rig.toml`` or ``case.toml``; empty where it is not there or no text."""
+        if found_outside(self.folder, self.path(name)) is not None:
+            return ""
+        try:
+            return read_toml(self.path(name))
+        except (OSError, UnicodeDecodeError):
+            return ""
+
+    def empty(self) -> bool:
+        """Whether nothing is in the folder."""
+        return not any(self.folder.iterdir())
+
+    def files(self) -> Iterator[Path]:
+        """Every file to be taken away: regular ones, not hidden, that lie in the folder."""
+        for home, folders, names in os.walk(self.folder):
+            folders[:] = sorted(one for one in folders if not one.startswith("."))
+            for name in sorted(names):
+                file = Path(home, name)
+                if not name.startswith(".") and file.is_file() and not file.is_symlink():
+                    yield file
+
+    def new_log(self, name: str) -> Path:
+        """Where a log of that name is to be put.
+
+        Raises
+        ------
+        ParameterError
+            If that is no name for a log, or there is one already.
+        """
+        own = shown(Path(name.replace("\\", "/")).name).lstrip(".")[-MOST_NAME:]
+        if not own or own.endswith((".toml", ".part")):
+            raise ParameterError(f"file = {name!r} is not allowed: the name of a log is needed")
+        target = self.path(own)
+        if os.path.lexists(target):
+            raise ParameterError(f"{own}: is there already; give the new log another name")
+        if len(self.logs()) >= _MOST_LOGS:
+            raise ParameterError(f"{own}: there are {_MOST_LOGS} logs, and no more are allowed")
+        return target
+
+    def logs(self) -> list[Path]:
+        """The logs of the folder: files of a kind that is read, and bags."""
+        found = []
+        for path in sorted(self.folder.iterdir()):
+            if path.name.startswith(".") or found_outside(self.folder, path) is not None:
+                continue
+            try:
+                check_readable(path)
+            except PamrsError:
+                continue
+            found.append(path)
+        return found
+
+    # Rig ---------------------------------------------------------------------------------------
+
+    def put_rig(self, text: str) -> None:
+        """Write ``rig.toml``, right or wrong: what is wrong is told, and can be mended."""
+        write_atomically(self.path("rig.toml"), text)
+        self.changed()
+
+    def put_packaged(self, name: str) -> None:
+        """Begin with a rig of the package."""
+        self.put_rig(rigs.template(name, name, "coefficients"))
+
+    def rig(self) -> tuple[Rig | None, str]:
+        """The rig, or why there is none."""
+        if not self.path("rig.toml").exists():
+            return None, ""
+        try:
+            if found_outside(self.folder, self.path("rig.toml")) is not None:
+                raise CaseError("rig.toml: lies outside the case folder; copy it there")
+            rig = load_rig(self.path("rig.toml"))
+            core_rig(rig)
+        except PamrsError as error:
+            return None, self.said(error)
+        return rig, ""
+
+    def said(self, error: BaseException | str) -> str:
+        """The message of an error; files are named from the folder."""
+        return str(error).replace(f"{self.folder}{os.sep}", "")
+
+    # Data --------------------------------------------------------------------------------------
+
+    def changed(self) -> None:
+        """Something was changed: the check and what is proposed are forgotten."""
+        self.checked = self._tables = None
+
+    def tables(self) -> tuple[list[Table], str]:
+        """What is proposed, or was confirmed, for each log, and why some are not read."""
+        if self._tables is None:
+            rig, _ = self.rig()
+            items, failed = list[LogProposal](), list[str]()
+            for path in self.logs():
+                try:
+                    items += propose([path], rig).logs
+                except (PamrsError, OSError) as error:
+                    failed.append(self.said(error))
+            self._tables, self._unread = self._tables_of(items), "\n".join(failed)
+        return self._tables, self._unread
+
+    def _tables_of(self, items: list[LogProposal]) -> list[Table]:
+        said = Proposal(items).case_toml(self.folder) if any(i.matches for i in items) else ""
+        confirmed = self.text("case.toml")
+        known = _by_log(confirmed) if confirmed.startswith(_HEAD) else {}
+        known = _by_log(said) | known
+        made = []
+        for item in items:
+            key = (item.log.path.relative_to(self.folder).as_posix(), item.name)
+            bare = {"file": key[0], "role": "", "channels": {}}
+            bare |= {"name": item.name} if item.name else {}
+            entries = known.get(key) or [bare | ({"time": item.time} if item.time else {})]
+            if key in self._left_out:
+                entries = [entry | {"role": ""} for entry in entries]
+            made.append(Table(item, entries))
+        return made
+
+    def take(self, log: Path) -> None:
+        """Take a log that was put into the folder, or remove it again where it cannot be read.
+
+        Raises
+        ------
+        RecordingError, MissingPackageError
+            If it cannot be read.
+        """
+        try:
+            propose([log])
+        except PamrsError:
+            log.unlink()
+            raise
+        self.changed()
+
+    @property
+    def foreign(self) -> bool:
+        """Whether there is a ``case.toml`` that was not made here."""
+        text = self.text("case.toml")
+        return bool(text) and not text.startswith(_HEAD)
+
+    def channels(self) -> list[str]:
+        """The channels that the rig can have."""
+        return channels_of(self.rig()[0])
+
+    def confirm(self, given: Sequence[Mapping[str, Any]]) -> None:
+        """Write ``case.toml`` with what the user says of each log.
+
+        Parameters
+        ----------
+        given : sequence of mapping
+            For each of :meth:`tables`, in order: ``role`` (of :data:`ROLES`; None leaves what is
+            proposed for parts of a log), ``sample_time`` ("1 ms", or empty), and ``columns``: from
+            the name of a series to its channel and unit.
+
+        Raises
+        ------
+        ParameterError
+            If a channel is given twice or without a unit, or nothing is left.
+        """
+        tables, _ = self.tables()
+        if len(given) != len(tables):
+            raise ParameterError("the logs have changed: load the page anew")
+        entries = tomlkit.aot()
+        left = set[tuple[str, str]]()
+        for table, own in zip(tables, given, strict=True):
+            chosen = list(_entries(table, own))
+            for entry in chosen:
+                entries.append(_written(entry))
+            if not chosen:
+                left.add(table.key)
+        if not entries:
+            raise ParameterError("no log is left: give at least one a role and its channels")
+        document = tomlkit.document()
+        document.update({"schema": "pamrs.case/1", "rig": "rig.toml", "recording": entries})
+        self._left_out = left
+        self.put_case(_HEAD + tomlkit.dumps(document))
+
+    def put_case(self, text: str) -> None:
+        """Write ``case.toml``; one that was not made here is kept as ``case_before.toml``."""
+        before = self.path("case_before.toml")
+        if self.foreign and not os.path.lexists(before):
+            write_atomically(before, self.text("case.toml"))
+        write_atomically(self.path("case.toml"), text)
+        self.changed()
+
+    # Check, run, result ------------------------------------------------------------------------
+
+    def check(self) -> Check:
+        """Read the whole case as a diagnosis does."""
+        try:
+            rig, error = self.rig()
+            if rig is None:
+                raise CaseError(error or "there is no rig yet")
+            if not self.path("case.toml").exists():
+                raise CaseError("channels and units are not confirmed yet")
+            case = load_case(self.folder)
+        except (PamrsError, OSError) as error:
+            found = Check(self.said(error))
+        else:
+            cautions = [*rig.cautions, *suspected_units(case), *noted_units(case), *_issues(case)]
+            found = Check("", list(dict.fromkeys(cautions)), digests(case))
+        self.checked = found
+        return found
+
+    @property
+    def green(self) -> bool:
+        """Whether the case was checked, can be diagnosed, and was not changed on the page since."""
+        return self.checked is not None and not self.checked.error
+
+    def start(self) -> None:
+        """Begin a diagnosis.
+
+        Raises
+        ------
+        ParameterError
+            If one goes on, or the check is not green.
+        """
+        if self.run is not None and self.run.running:
+            raise ParameterError("a diagnosis goes on already")
+        if not self.green:
+            raise ParameterError("run is locked: check the case first, it must be green")
+        self.run = Run(self.folder)
+
+    def close(self) -> None:
+        """End the diagnosis that goes on."""
+        if self.run is not None:
+            self.run.cancel()
+
+    def said_of_run(self) -> str:
+        """Why the last diagnosis of this page has no result; empty where it has, or goes on."""
+        return "" if self.run is None else self.said(self.run.error)
+
+    def result_file(self, name: str) -> Path:
+        """A file of the last result."""
+        return self.folder / RESULT / name
+
+    def result(self) -> tuple[Diagnosis | None, str]:
+        """The last result, or why it cannot be shown."""
+        file = self.result_file("result.json")
+        if not file.is_file() or found_outside(self.folder, file) is not None:
+            return None, ""
+        try:
+            return load_result(file), ""
+        except PamrsError as error:
+            return None, self.said(error)
+
+    def stale(self, found: Diagnosis) -> bool:
+        """Whether a result was made from other files than those that were checked."""
+        return self.checked is not None and self.green and found.inputs != self.checked.inputs
+
+
+def _by_log(text: str) -> dict[tuple[str, str], list[dict[str, Any]]]:
+    """The entries of a case.toml that name columns, by file and name; none where it is broken."""
+    try:
+        found = parse_toml(text).get("recording", [])
+        made: dict[tuple[str, str], list[dict[str, Any]]] = {}
+        for entry in found:
+            if all("column" in one for one in entry["channels"].values()):
+                made.setdefault((entry["file"], entry.get("name", "")), []).append(entry)
+    except (ValueError, LookupError, TypeError, AttributeError):
+        return {}
+    return made
+
+
+def _written(entry: Mapping[str, Any]) -> Any:
+    """An entry as case.toml has it: a line for each channel."""
+    made = tomlkit.table()
+    for key, value in entry.items():
+        if key != "channels":
+            made.add(key, _inline(value))
+    channels = tomlkit.table()
+    for name, one in entry["channels"].items():
+        channels.add(name, _inline(one))
+    made.add("channels", channels)
+    return made
+
+
+def _inline(value: Any) -> Any:
+    """A value, tables on one line."""
+    if not isinstance(value, dict):
+        return value
+    made = tomlkit.inline_table()
+    for key, inside in value.items():
+        made.add(key, _inline(inside))
+    return made
+
+
+def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+    """The entries of case.toml for a log, as the user wants them."""
+    role, file = given.get("role"), table.entries[0]["file"]
+    if role not in (*ROLES, None):
+        raise ParameterError(f"{file}: role = {role!r} is not allowed: {', '.join(ROLES)}")
+    channels = _chosen(table, given.get("columns", {}))
+    if role == "" or not (channels or role):
+        return
+    if not channels:
+        raise ParameterError(f"{file}: no column has a channel; choose some, or leave the log out")
+    spacing = str(given.get("sample_time", "")).strip()
+    for entry in table.entries:
+        made = {key: value for key, value in entry.items() if key != "channels"}
+        if role is not None:
+            made["role"] = role
+        if spacing:
+            number, _, unit = spacing.partition(" ")
+            try:
+                made["sample_time"] = to_si(float(number), unit.strip(), "time")
+            except ValueError as error:
+                raise ParameterError(
+                    f'{file}: spacing = {spacing!r} is not allowed: write it like "1 ms"'
+                ) from error
+        yield made | {"channels": channels}
+
+
+def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:
+    """The channels of a log; what was proposed with a column and left alone stays whole."""
+    made: dict[str, Any] = {}
+    clocks = [entry["time"] for entry in table.entries[0]["channels"].values() if "time" in entry]
+    for column, (channel, unit) in columns.items():
+        if not channel:
+            continue
+        if column not in table.item.log.series:
+            raise ParameterError(f"column = {column!r} is not in this log: load the page anew")
+        if channel in made:
+            other = made[channel]["column"]
+            raise ParameterError(f"{channel}: {other!r} and {column!r} cannot both be it")
+        if not unit:
+            raise ParameterError(f"{column}: a unit is needed for {channel} (1: a plain number)")
+        proposed, entry = table.channel(column)
+        if (proposed, entry.get("unit")) == (channel, unit):
+            # the user has said now that it is so
+            made[channel] = {key: value for key, value in entry.items() if key != "assumed"}
+        else:
+            clock = {"time": entry.get("time", clocks[0])} if clocks else {}
+            made[channel] = {"column": column, "unit": unit} | clock
+    return made
+
+
+def _issues(case: Case) -> list[str]:
+    """What was found in the recordings, each kind of it once."""
+    found: dict[str, int] = {}
+    for recording in case.recordings:
+        for issue in recording.issues:
+            where = "" if issue.kind == "log" else f"{channel_of(issue.channel)}: "
+            text = f"{recording.name}: {where}{issue.text}"
+            found[text] = found.get(text, 0) + 1
+    return [f"{text} ({count} times)" if count > 1 else text for text, count in found.items()]
