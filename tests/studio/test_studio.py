@@ -291,6 +291,58 @@ def test_what_was_corrected_is_written_and_shown_again(page: Page) -> None:
     assert again.tables()[0][0].channel(odd)[1]["unit"] == "kPa"
 
 
+def test_a_log_without_a_clock_gets_one(page: Page) -> None:
+    page.press("rig", text=RIG)
+    rows = shortened("multisine.csv", 2.0).decode().splitlines()
+    page.upload("a.csv", "\n".join(row.partition(",")[2] for row in rows).encode())
+    assert 'class="spacing"' in page.get()
+    logs = page.as_proposed()
+    assert page.press("confirm", logs=logs) == ""
+    page.press("check")
+    assert not page.studio.green
+    logs[0]["sample_time"] = "5 bar"
+    assert "spacing = '5 bar' is not allowed" in page.press("confirm", logs=logs)
+    logs[0]["sample_time"] = "5 ms"
+    assert page.press("confirm", logs=logs) == ""
+    assert 'value="0.005 s"' in page.get()
+    page.press("check")
+    assert page.studio.green
+
+
+def test_parts_of_a_log_keep_their_roles(page: Page) -> None:
+    page.press("rig", text=RIG)
+    head, *rows = shortened("multisine.csv", 4.0).decode().splitlines()
+    moved = []
+    for number, row in enumerate(rows):  # three pauses of half a minute
+        time_, _, rest = row.partition(",")
+        moved.append(f"{float(time_) + 30.0 * (number // 200)},{rest}")
+    page.upload("a.csv", "\n".join([head, *moved, ""]).encode())
+    (table,) = page.studio.tables()[0]
+    assert [entry["role"] for entry in table.entries] == ["fit", "held_out"]
+    assert "the last is held out" in page.get()
+    logs = page.as_proposed()
+    logs[0]["role"] = None
+    assert page.press("confirm", logs=logs) == ""
+    assert [entry["pieces"] for entry in page.studio.tables()[0][0].entries] == [[1, 2, 3], [4]]
+    page.press("check")
+    assert page.studio.green
+
+
+def test_a_log_of_the_folder_that_cannot_be_read_does_not_hide_the_others(page: Page) -> None:
+    page.press("rig", text=RIG)
+    (page.studio.folder / "notes.txt").write_text("valve changed <b>on Monday</b>\n")
+    page.upload("a.csv", shortened("multisine.csv", 2.0))
+    text = page.get()
+    assert "notes.txt" in text
+    assert "<b>on" not in text
+    assert [table.key[0] for table in page.studio.tables()[0]] == ["a.csv"]
+
+
+def test_a_request_that_is_no_table_is_an_error(page: Page) -> None:
+    for body in (b"[]", b"{", b"\xff", b'{"logs": 3}', b'{"logs": [3]}'):
+        assert page.send("/confirm", body)
+
+
 def test_a_case_that_was_there_is_used_and_kept(tmp_path: Path) -> None:
     folder = tmp_path / "case"
     shutil.copytree(EXAMPLE, folder)

@@ -228,6 +228,9 @@ def make_app(studio: Studio, token: str) -> ASGIApp:
                 await run_in_threadpool(_did, studio, what, await _given(request))
         except (PamrsError, OSError, ValueError, TypeError) as error:
             return JSONResponse({"error": studio.said(error)}, 400)
+        except Exception as error:  # a page has no terminal that shows where it was
+            words = f"that failed ({type(error).__name__}: {error}); please report it"
+            return JSONResponse({"error": studio.said(words)}, 400)
         return JSONResponse({})
 
     acts = ("rig", "packaged", "upload", "confirm", "case", "check", "run", "cancel")

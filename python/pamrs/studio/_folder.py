@@ -224,6 +224,8 @@ class Studio:
                     items += propose([path], rig).logs
                 except (PamrsError, OSError) as error:
                     failed.append(self.said(error))
+                except Exception as error:  # one log must not take the page away
+                    failed.append(f"{path.name}: cannot be read ({error}); please report it")
             self._tables, self._unread = self._tables_of(items), "\n".join(failed)
         return self._tables, self._unread
 
@@ -253,7 +255,7 @@ class Studio:
         """
         try:
             propose([log])
-        except PamrsError:
+        except BaseException:
             log.unlink()
             raise
         self.changed()

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from pamrs import rigs
+from pamrs._files import MOST_BYTES
 from pamrs.channels import laboratory_unit
 from pamrs.report.page import render_page
 from pamrs.studio._curves import sparkline
@@ -44,6 +45,7 @@ def page(studio: Studio, token: str) -> str:
         rig=rig,
         rig_error=rig_error,
         rig_text=studio.text("rig.toml"),
+        most_bytes=MOST_BYTES,
         case_text=studio.text("case.toml"),
         foreign=studio.foreign,
         packaged=rigs.names(),
@@ -90,7 +92,9 @@ def _log(table: Table) -> dict[str, Any]:
         "file": first["file"],
         "name": first.get("name", ""),
         "role": None if listed_twice else first.get("role", "fit"),
-        "clockless": any(row["channel"] and row["rate"] == "–" for row in rows),
+        "clockless": "sample_time" in first
+        or any(row["channel"] and row["rate"] == "–" for row in rows),
+        "spacing": f"{first['sample_time']:g} s" if "sample_time" in first else "",
         "rows": rows,
         "remarks": [*item.log.remarks, *item.remarks],
         "unread": item.log.unread,

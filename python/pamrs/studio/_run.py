@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import multiprocessing
+import shutil
 import signal
+import sys
 import tempfile
 import threading
 from multiprocessing.connection import Connection
@@ -17,6 +19,7 @@ __all__ = ["FILES", "RESULT", "Run"]
 RESULT: Final = "result"
 """Folder of the results, in the case folder."""
 FILES: Final = ("report.html", "result.json", "model.toml", "experiment.csv")
+_MADE: Final = ".result-"  # where they are made, and then moved from
 _LINES: Final = 200  # of the progress that are kept
 _SCREENED: Final = ": screened: "  # of the line that ranks hypotheses, the first first
 _MOST: Final = 3  # of them that are told
@@ -28,17 +31,23 @@ def _work(folder: Path, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the page, which ends this
     from pamrs.errors import PamrsError
 
+    def send(item: object) -> None:
+        try:
+            pipe.send(item)
+        except OSError:  # the page is gone, and nobody waits for this
+            sys.exit(1)
+
     def tell(line: str) -> None:
-        pipe.send((str(line), getattr(line, "share", None), getattr(line, "left", None)))
+        send((str(line), getattr(line, "share", None), getattr(line, "left", None)))
 
     try:
         _diagnose(folder, tell)
     except (PamrsError, OSError) as error:
-        pipe.send(str(error))
+        send(str(error))
     except Exception as error:
-        pipe.send(f"the diagnosis failed ({type(error).__name__}: {error}); please report it")
+        send(f"the diagnosis failed ({type(error).__name__}: {error}); please report it")
     else:
-        pipe.send("")
+        send("")
 
 
 def _diagnose(folder: Path, tell: Any) -> None:
@@ -50,7 +59,7 @@ def _diagnose(folder: Path, tell: Any) -> None:
     rig, protocol = found.rig, found.next_experiment.protocol
     model = rig.with_case("..").to_toml_text() if isinstance(rig, Rig) else found.model
     target = folder / RESULT
-    with tempfile.TemporaryDirectory(prefix=".result-", dir=folder) as place:
+    with tempfile.TemporaryDirectory(prefix=_MADE, dir=folder) as place:
         made = Path(place, RESULT)
         made.mkdir()
         found.report(made / "report.html")
@@ -87,6 +96,7 @@ class Run:
     """
 
     def __init__(self, folder: Path) -> None:
+        self._folder = folder
         self.lines: list[str] = []
         self.share: float | None = 0.0
         self.left: float | None = None
@@ -112,6 +122,8 @@ class Run:
         except (EOFError, OSError):
             pass
         self._process.join(_PATIENCE)
+        for left in self._folder.glob(f"{_MADE}*"):  # of one that was ended
+            shutil.rmtree(left, ignore_errors=True)
         if told is None:
             code = self._process.exitcode
             told = f"the diagnosis ended without a result (exit code {code})"

@@ -43,9 +43,13 @@ for (const button of document.querySelectorAll("button[data-do]")) {
   button.addEventListener("click", async () => {
     const section = button.closest("section"), what = button.dataset.do;
     button.disabled = true;
+    button.setAttribute("aria-busy", "true");
     const body = JSON.stringify(bodies[what] ? bodies[what]() : {});
     if (await send(`/${what}`, body, section)) anew(section);
-    else button.disabled = false;
+    else {
+      button.disabled = false;
+      button.removeAttribute("aria-busy");
+    }
   });
 }
 
@@ -58,6 +62,10 @@ async function upload(files) {
   const section = one("#data"), errors = [];
   for (const file of files) {
     one("#drop").firstChild.textContent = `Sending ${file.name} ... `;
+    if (file.size > Number(one("#logs").dataset.most)) {
+      errors.push(`${file.name}: more than ${one("#logs").dataset.most / 1048576} MB; cut it into parts`);
+      continue;
+    }
     const good = await send(`/upload?name=${encodeURIComponent(file.name)}`, file, section);
     if (!good) errors.push(one(".told", section).textContent);
   }
@@ -65,6 +73,8 @@ async function upload(files) {
   one("#drop").firstChild.textContent = "Drop logs here, or choose them ";
   one(".told", section).textContent = `${errors.join("; ")}. What was taken is shown when the page is loaded anew.`;
 }
+// what is dropped beside it must not take the place of the page
+for (const name of ["dragover", "drop"]) addEventListener(name, (event) => event.preventDefault());
 const drop = one("#drop");
 one("#logs").addEventListener("change", (event) => upload([...event.target.files]));
 for (const name of ["dragover", "dragleave", "drop"]) {
