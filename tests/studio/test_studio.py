@@ -24,6 +24,7 @@ import pytest
 
 from pamrs.cli import main
 from pamrs.errors import ParameterError
+from pamrs.recordings import propose
 from pamrs.studio import Studio, serve
 from pamrs.studio._curves import sparkline
 from tests.studio.browser import CHROMIUM, Browser
@@ -307,6 +308,31 @@ def test_a_log_without_a_clock_gets_one(page: Page) -> None:
     assert 'value="0.005 s"' in page.get()
     page.press("check")
     assert page.studio.green
+
+
+def test_a_log_is_read_once_until_it_or_the_rig_changes(
+    page: Page, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read = list[str]()
+
+    def counted(paths: list[Path], rig: Any) -> Any:
+        read.append(f"{paths[0].name} {rig and rig.name}")
+        return propose(paths, rig)
+
+    monkeypatch.setattr("pamrs.studio._folder.propose", counted)
+    page.press("rig", text=RIG)
+    page.upload("a.csv", shortened("multisine.csv", 2.0))
+    page.upload("b.csv", shortened("angle_steps.csv", 2.0))
+    page.press("confirm", logs=page.as_proposed())
+    page.get()
+    assert read == ["a.csv shoulder", "b.csv shoulder"]
+    page.press("packaged", name="bench")
+    page.get()
+    assert read[2:] == ["a.csv bench", "b.csv bench"]
+    (page.studio.folder / "a.csv").write_bytes(shortened("multisine.csv", 1.0))
+    page.press("rig", text=page.studio.text("rig.toml"))
+    page.get()
+    assert read[4:] == ["a.csv bench"]
 
 
 def test_parts_of_a_log_keep_their_roles(page: Page) -> None:

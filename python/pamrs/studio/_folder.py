@@ -119,6 +119,7 @@ class Studio:
         self.lock = threading.RLock()
         self._tables: list[Table] | None = None
         self._unread = ""
+        self._read: dict[Path, tuple[object, list[LogProposal]]] = {}
         self._left_out: set[tuple[str, str]] = set()
 
     # Files -------------------------------------------------------------------------------------
@@ -217,17 +218,24 @@ class Studio:
     def tables(self) -> tuple[list[Table], str]:
         """What is proposed, or was confirmed, for each log, and why some are not read."""
         if self._tables is None:
-            rig, _ = self.rig()
             items, failed = list[LogProposal](), list[str]()
             for path in self.logs():
                 try:
-                    items += propose([path], rig).logs
+                    items += self._proposed(path)
                 except (PamrsError, OSError) as error:
                     failed.append(self.said(error))
                 except Exception as error:  # one log must not take the page away
                     failed.append(f"{path.name}: cannot be read ({error}); please report it")
             self._tables, self._unread = self._tables_of(items), "\n".join(failed)
         return self._tables, self._unread
+
+    def _proposed(self, log: Path) -> list[LogProposal]:
+        """What is proposed for a log; it is read again where it or the rig has changed."""
+        now = log.stat()
+        key = (now.st_mtime_ns, now.st_size, self.text("rig.toml"))
+        if log not in self._read or self._read[log][0] != key:
+            self._read[log] = (key, propose([log], self.rig()[0]).logs)
+        return self._read[log][1]
 
     def _tables_of(self, items: list[LogProposal]) -> list[Table]:
         said = Proposal(items).case_toml(self.folder) if any(i.matches for i in items) else ""
@@ -254,7 +262,7 @@ class Studio:
             If it cannot be read.
         """
         try:
-            propose([log])
+            self._proposed(log)
         except BaseException:
             log.unlink()
             raise
