@@ -97,7 +97,7 @@ class Page:
                 one["column"]: [name, one["unit"]]
                 for name, one in table.entries[0]["channels"].items()
             }
-            found.append({"role": table.entries[0]["role"], "columns": columns})
+            found.append({"role": table.role, "columns": columns})
         return found
 
 
@@ -345,13 +345,21 @@ def test_parts_of_a_log_keep_their_roles(page: Page) -> None:
     page.upload("a.csv", "\n".join([head, *moved, ""]).encode())
     (table,) = page.studio.tables()[0]
     assert [entry["role"] for entry in table.entries] == ["fit", "held_out"]
-    assert "the last is held out" in page.get()
-    logs = page.as_proposed()
-    logs[0]["role"] = None
-    assert page.press("confirm", logs=logs) == ""
-    assert [entry["pieces"] for entry in page.studio.tables()[0][0].entries] == [[1, 2, 3], [4]]
-    page.press("check")
-    assert page.studio.green
+    assert '<option value="parts" selected>' in page.get()
+
+    def confirmed(role: str) -> list[tuple[str, list[int] | None]]:
+        logs = page.as_proposed()
+        logs[0]["role"] = role
+        assert page.press("confirm", logs=logs) == ""
+        page.press("check")
+        assert page.studio.green
+        entries = page.studio.tables()[0][0].entries
+        return [(entry["role"], entry.get("pieces")) for entry in entries]
+
+    for _ in range(2):  # there and back
+        assert confirmed("parts") == [("fit", [1, 2, 3]), ("held_out", [4])]
+        assert confirmed("fit") == [("fit", None)]
+    assert "role = 'x' is not allowed" in page.press("confirm", logs=[{"role": "x"}])
 
 
 def test_a_log_of_the_folder_that_cannot_be_read_does_not_hide_the_others(page: Page) -> None:

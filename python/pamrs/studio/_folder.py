@@ -36,7 +36,13 @@ from pamrs.units import to_si
 
 __all__ = ["ROLES", "Check", "Studio", "Table"]
 
-ROLES: Final = {"fit": "fitted", "held_out": "held out, for the proof", "": "left out"}
+ROLES: Final = {
+    "fit": "fitted",
+    "held_out": "held out, for the proof",
+    "parts": "fitted, its last part held out",
+    "": "left out",
+}
+_FEWEST_PARTS: Final = 3  # of a log of which one is held out
 _HEAD: Final = "# Confirmed in pamrs studio.\n"
 _MOST_LOGS: Final = 100
 
@@ -79,6 +85,17 @@ class Table:
     def key(self) -> tuple[str, str]:
         """Its file and, where a file has several tables, its name."""
         return self.entries[0]["file"], self.entries[0].get("name", "")
+
+    @property
+    def roles(self) -> dict[str, str]:
+        """The roles that it can have."""
+        several = len(self.item.pieces) >= _FEWEST_PARTS
+        return {key: words for key, words in ROLES.items() if several or key != "parts"}
+
+    @property
+    def role(self) -> str:
+        """The role that it has."""
+        return "parts" if len(self.entries) > 1 else str(self.entries[0].get("role", "fit"))
 
     def channel(self, column: str) -> tuple[str, dict[str, Any]]:
         """The channel that is proposed for a column, and what is said of it."""
@@ -284,9 +301,8 @@ class Studio:
         Parameters
         ----------
         given : sequence of mapping
-            For each of :meth:`tables`, in order: ``role`` (of :data:`ROLES`; None leaves what is
-            proposed for parts of a log), ``sample_time`` ("1 ms", or empty), and ``columns``: from
-            the name of a series to its channel and unit.
+            For each of :meth:`tables`, in order: ``role`` (of its roles), ``sample_time`` ("1 ms",
+            or empty), and ``columns``: from the name of a series to its channel and unit.
 
         Raises
         ------
@@ -423,28 +439,33 @@ def _inline(value: Any) -> Any:
 
 def _entries(table: Table, given: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
     """The entries of case.toml for a log, as the user wants them."""
-    role, file = given.get("role"), table.entries[0]["file"]
-    if role not in (*ROLES, None):
-        raise ParameterError(f"{file}: role = {role!r} is not allowed: {', '.join(ROLES)}")
-    channels = _chosen(table, given.get("columns", {}))
-    if role == "" or not (channels or role):
+    role, file = given.get("role"), table.key[0]
+    if role not in table.roles:
+        raise ParameterError(f"{file}: role = {role!r} is not allowed: {', '.join(table.roles)}")
+    if role == "":
         return
+    channels = _chosen(table, given.get("columns", {}))
     if not channels:
         raise ParameterError(f"{file}: no column has a channel; choose some, or leave the log out")
+    made = {key: value for key, value in table.entries[0].items() if key != "channels"}
     spacing = str(given.get("sample_time", "")).strip()
-    for entry in table.entries:
-        made = {key: value for key, value in entry.items() if key != "channels"}
-        if role is not None:
-            made["role"] = role
-        if spacing:
-            number, _, unit = spacing.partition(" ")
-            try:
-                made["sample_time"] = to_si(float(number), unit.strip(), "time")
-            except ValueError as error:
-                raise ParameterError(
-                    f'{file}: spacing = {spacing!r} is not allowed: write it like "1 ms"'
-                ) from error
-        yield made | {"channels": channels}
+    if spacing:
+        number, _, unit = spacing.partition(" ")
+        try:
+            made["sample_time"] = to_si(float(number), unit.strip(), "time")
+        except ValueError as error:
+            raise ParameterError(
+                f'{file}: spacing = {spacing!r} is not allowed: write it like "1 ms"'
+            ) from error
+    pieces = table.item.pieces
+    if role == "parts":
+        for own, some in (("fit", pieces[:-1]), ("held_out", pieces[-1:])):
+            yield made | {"role": own, "pieces": some, "channels": channels}
+        return
+    if table.role == "parts":  # no longer
+        del made["pieces"]
+        made |= {"pieces": pieces} if table.item.short else {}
+    yield made | {"role": role, "channels": channels}
 
 
 def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from pamrs._files import MOST_BYTES
 from pamrs.channels import laboratory_unit
 from pamrs.report.page import render_page
 from pamrs.studio._curves import sparkline
-from pamrs.studio._folder import ROLES, Studio, Table
+from pamrs.studio._folder import Studio, Table
 
 __all__ = ["page"]
 
@@ -52,7 +52,6 @@ def page(studio: Studio, token: str) -> str:
         logs=[_log(table) for table in tables],
         data_error=data_error,
         channels={name: laboratory_unit(name)[0] or "1" for name in studio.channels()},
-        roles=ROLES,
         units=_UNITS.split(),
         check=studio.checked,
         green=studio.green,
@@ -68,7 +67,6 @@ def page(studio: Studio, token: str) -> str:
 def _log(table: Table) -> dict[str, Any]:
     """A log: its columns with curves, what is proposed, what to look at."""
     item, first = table.item, table.entries[0]
-    listed_twice = len(table.entries) > 1
     rows = []
     for each in item.listed:
         channel, entry = table.channel(each.name)
@@ -91,7 +89,8 @@ def _log(table: Table) -> dict[str, Any]:
     return {
         "file": first["file"],
         "name": first.get("name", ""),
-        "role": None if listed_twice else first.get("role", "fit"),
+        "role": table.role,
+        "roles": table.roles,
         "clockless": "sample_time" in first
         or any(row["channel"] and row["rate"] == "–" for row in rows),
         "spacing": f"{first['sample_time']:g} s" if "sample_time" in first else "",

@@ -22,8 +22,8 @@ function confirmed() {
       const channel = one(".channel", row);
       if (channel) columns[row.dataset.column] = [channel.value, one(".unit", row).value.trim()];
     }
-    const role = one(".role", log), spacing = one(".spacing", log);
-    return { role: role ? role.value : null, sample_time: spacing ? spacing.value : "", columns };
+    const spacing = one(".spacing", log);
+    return { role: one(".role", log).value, sample_time: spacing ? spacing.value : "", columns };
   });
 }
 
