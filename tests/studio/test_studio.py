@@ -174,6 +174,24 @@ def test_the_page_may_load_nothing_from_elsewhere(page: Page) -> None:
     assert "https://" not in text
 
 
+def test_links_lead_nowhere_out_of_the_folder(page: Page, tmp_path: Path) -> None:
+    prepared(page)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "rig.toml").write_text("kept by somebody")
+    (outside / "report.html").write_text("secret")
+    (page.studio.folder / "result").symlink_to(outside)
+    assert "result: lies outside the case folder" in page.press("run")
+    assert page.ask("GET", "/result/report.html").status == 404
+    for name, what in (("rig.toml", "rig"), ("case.toml", "case")):
+        (page.studio.folder / name).unlink()
+        (page.studio.folder / name).symlink_to(outside / "rig.toml")
+        assert "lies outside the case folder" in page.press(what, text="written")
+    assert "kept by somebody" not in page.get()
+    assert (outside / "rig.toml").read_text() == "kept by somebody"
+    assert sorted(file.name for file in outside.iterdir()) == ["report.html", "rig.toml"]
+
+
 def test_nothing_else_of_the_disk_is_reached(page: Page, tmp_path: Path) -> None:
     (tmp_path / "secret.csv").write_text("time [s],x\n0,1\n")
     (page.studio.folder / "result").mkdir()

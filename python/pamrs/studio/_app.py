@@ -208,8 +208,8 @@ def make_app(studio: Studio, token: str) -> ASGIApp:
 
     def result(request: Request) -> Response:
         name = request.path_params["name"]
-        file = studio.result_file(name)
-        if name not in FILES or not file.is_file() or file.is_symlink():
+        file = studio.result_file(name) if name in FILES else None
+        if file is None:
             return PlainTextResponse("not here", 404)
         if name == "report.html" and "save" not in request.query_params:
             return FileResponse(file, headers={"content-security-policy": _REPORT})

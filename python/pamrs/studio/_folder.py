@@ -12,7 +12,7 @@ from typing import Any, Final
 import tomlkit
 
 from pamrs import rigs
-from pamrs._files import MOST_NAME, found_outside, parse_toml, read_toml, resolved, shown
+from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_toml, resolved, shown
 from pamrs._writing import write_atomically
 from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis
@@ -142,16 +142,23 @@ class Studio:
     # Files -------------------------------------------------------------------------------------
 
     def path(self, name: str) -> Path:
-        """A file of the folder."""
-        return self.folder / name
+        """A file of the folder, or a folder in it.
+
+        Raises
+        ------
+        CaseError
+            If it is a link that leads out, or one in it is.
+        """
+        path = self.folder / name
+        if found_outside(self.folder, path) is not None:
+            raise CaseError(f"{name}: lies outside the case folder; copy it there")
+        return path
 
     def text(self, name: str) -> str:
         """The text of ``rig.toml`` or ``case.toml``; empty where it is not there or no text."""
-        if found_outside(self.folder, self.path(name)) is not None:
-            return ""
         try:
             return read_toml(self.path(name))
-        except (OSError, UnicodeDecodeError):
+        except (CaseError, OSError, UnicodeDecodeError):
             return ""
 
     def empty(self) -> bool:
@@ -178,7 +185,7 @@ class Studio:
         own = shown(Path(name.replace("\\", "/")).name).lstrip(".")[-MOST_NAME:]
         if not own or own.endswith((".toml", ".part")):
             raise ParameterError(f"file = {name!r} is not allowed: the name of a log is needed")
-        target = self.path(own)
+        target = self.folder / own
         if os.path.lexists(target):
             raise ParameterError(f"{own}: is there already; give the new log another name")
         if len(self.logs()) >= _MOST_LOGS:
@@ -211,12 +218,11 @@ class Studio:
 
     def rig(self) -> tuple[Rig | None, str]:
         """The rig, or why there is none."""
-        if not self.path("rig.toml").exists():
-            return None, ""
         try:
-            if found_outside(self.folder, self.path("rig.toml")) is not None:
-                raise CaseError("rig.toml: lies outside the case folder; copy it there")
-            rig = load_rig(self.path("rig.toml"))
+            file = self.path("rig.toml")
+            if not file.exists():
+                return None, ""
+            rig = load_rig(file)
             core_rig(rig)
         except PamrsError as error:
             return None, self.said(error)
@@ -329,10 +335,10 @@ class Studio:
 
     def put_case(self, text: str) -> None:
         """Write ``case.toml``; one that was not made here is kept as ``case_before.toml``."""
-        before = self.path("case_before.toml")
+        file, before = self.path("case.toml"), self.folder / "case_before.toml"
         if self.foreign and not os.path.lexists(before):
             write_atomically(before, self.text("case.toml"))
-        write_atomically(self.path("case.toml"), text)
+        write_atomically(file, text)
         self.changed()
 
     # Check, run, result ------------------------------------------------------------------------
@@ -366,7 +372,10 @@ class Studio:
         ------
         ParameterError
             If one goes on, or the check is not green.
+        CaseError
+            If the results would be written elsewhere, through a link.
         """
+        self.path(RESULT)
         if self.run is not None and self.run.running:
             raise ParameterError("a diagnosis goes on already")
         if not self.green:
@@ -382,14 +391,15 @@ class Studio:
         """Why the last diagnosis of this page has no result; empty where it has, or goes on."""
         return "" if self.run is None else self.said(self.run.error)
 
-    def result_file(self, name: str) -> Path:
-        """A file of the last result."""
-        return self.folder / RESULT / name
+    def result_file(self, name: str) -> Path | None:
+        """A file of the last result; None where it is not there, or elsewhere through a link."""
+        file = self.folder / RESULT / name
+        return file if is_inside(self.folder, file) and file.is_file() else None
 
     def result(self) -> tuple[Diagnosis | None, str]:
         """The last result, or why it cannot be shown."""
         file = self.result_file("result.json")
-        if not file.is_file() or found_outside(self.folder, file) is not None:
+        if file is None:
             return None, ""
         try:
             return load_result(file), ""

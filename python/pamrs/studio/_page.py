@@ -60,7 +60,7 @@ def page(studio: Studio, token: str) -> str:
         found=found,
         result_error=result_error,
         stale=found is not None and studio.stale(found),
-        has_experiment=studio.result_file("experiment.csv").is_file(),
+        has_experiment=studio.result_file("experiment.csv") is not None,
     )
 
 
