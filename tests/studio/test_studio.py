@@ -310,6 +310,34 @@ def test_what_was_corrected_is_written_and_shown_again(page: Page) -> None:
     assert again.tables()[0][0].channel(odd)[1]["unit"] == "kPa"
 
 
+def test_what_a_diagnosis_would_refuse_is_red_already(page: Page) -> None:
+    page.press("rig", text=RIG)
+    page.upload("a.csv", shortened("multisine.csv"))
+
+    def error(**changed: list[str]) -> str:
+        logs = page.as_proposed()
+        logs[0]["columns"] |= changed
+        assert page.press("confirm", logs=logs) == ""
+        page.press("check")
+        assert page.studio.checked is not None
+        return page.studio.checked.error
+
+    assert "do not surround any block" in error(joint_angle=["", ""])
+    assert "joint_angle" in error(joint_angle=["joint_angle", "rad"])
+    assert error(joint_angle=["joint_angle", "deg"]) == ""
+
+
+def test_a_unit_that_was_assumed_is_confirmed(page: Page) -> None:
+    page.press("rig", text=RIG)
+    head, _, rows = shortened("multisine.csv", 2.0).decode().partition("\n")
+    bare = ",".join(name.partition(" ")[0] for name in head.split(","))
+    page.upload("a.csv", f"{bare}\n{rows}".encode())
+    assert "assumed: " in page.get()
+    assert page.press("confirm", logs=page.as_proposed()) == ""
+    assert "assumed" not in page.studio.text("case.toml")
+    assert "assumed: " not in page.get()
+
+
 def test_a_log_without_a_clock_gets_one(page: Page) -> None:
     page.press("rig", text=RIG)
     rows = shortened("multisine.csv", 2.0).decode().splitlines()
@@ -466,6 +494,24 @@ def test_the_whole_way(page: Page) -> None:
     page.press("rig", text=RIG + "\n")
     page.press("check")
     assert "Made from other files" in page.get()
+
+
+@pytest.mark.slow
+def test_the_next_experiment_is_there_to_take(tmp_path: Path) -> None:
+    folder = tmp_path / "case"
+    folder.mkdir()
+    for name in ("bench.csv", "rig.toml"):
+        shutil.copy(EXAMPLE.parent / "bench" / name, folder)
+    with served(Studio(folder)) as page:
+        assert page.press("confirm", logs=page.as_proposed()) == ""
+        page.press("check")
+        assert page.press("run") == ""
+        while json.loads(page.get("/progress"))["running"]:
+            time.sleep(0.2)
+        assert 'href="/result/experiment.csv"' in page.get()
+        head, *rows = page.get("/result/experiment.csv").splitlines()
+    assert head.startswith("time")
+    assert len(rows) > 100
 
 
 @pytest.mark.slow

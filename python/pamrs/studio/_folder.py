@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -14,27 +14,24 @@ import tomlkit
 from pamrs import rigs
 from pamrs._files import MOST_NAME, found_outside, is_inside, parse_toml, read_toml, resolved, shown
 from pamrs._writing import write_atomically
-from pamrs.channels import channel_of
 from pamrs.diagnosis import Diagnosis
-from pamrs.diagnosis.prepare import noted_units, suspected_units
 from pamrs.diagnosis.result import load_result
 from pamrs.errors import CaseError, PamrsError, ParameterError
 from pamrs.recordings import (
-    Case,
     LogProposal,
     Proposal,
     channels_of,
-    digests,
     load_case,
     propose,
 )
 from pamrs.recordings.logs import check_readable
 from pamrs.rig import Rig, load_rig
 from pamrs.simulation import core_rig
+from pamrs.studio._check import Check, checked
 from pamrs.studio._run import RESULT, Run
 from pamrs.units import to_si
 
-__all__ = ["ROLES", "Check", "Studio", "Table"]
+__all__ = ["ROLES", "Studio", "Table"]
 
 ROLES: Final = {
     "fit": "fitted",
@@ -45,25 +42,6 @@ ROLES: Final = {
 _FEWEST_PARTS: Final = 3  # of a log of which one is held out
 _HEAD: Final = "# Confirmed in pamrs studio.\n"
 _MOST_LOGS: Final = 100
-
-
-@dataclass(frozen=True)
-class Check:
-    """What a check of the case found.
-
-    Attributes
-    ----------
-    error : str
-        Why the case cannot be diagnosed; empty where it can.
-    cautions : list of str
-        What was found and masked, or is to be looked at.
-    inputs : dict of str to str
-        SHA-256 of each file that was read.
-    """
-
-    error: str
-    cautions: list[str] = field(default_factory=list)
-    inputs: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -351,12 +329,9 @@ class Studio:
                 raise CaseError(error or "there is no rig yet")
             if not self.path("case.toml").exists():
                 raise CaseError("channels and units are not confirmed yet")
-            case = load_case(self.folder)
+            found = checked(load_case(self.folder))
         except (PamrsError, OSError) as error:
             found = Check(self.said(error))
-        else:
-            cautions = [*rig.cautions, *suspected_units(case), *noted_units(case), *_issues(case)]
-            found = Check("", list(dict.fromkeys(cautions)), digests(case))
         self.checked = found
         return found
 
@@ -500,14 +475,3 @@ def _chosen(table: Table, columns: Mapping[str, Any]) -> dict[str, Any]:
             clock = {"time": entry.get("time", clocks[0])} if clocks else {}
             made[channel] = {"column": column, "unit": unit} | clock
     return made
-
-
-def _issues(case: Case) -> list[str]:
-    """What was found in the recordings, each kind of it once."""
-    found: dict[str, int] = {}
-    for recording in case.recordings:
-        for issue in recording.issues:
-            where = "" if issue.kind == "log" else f"{channel_of(issue.channel)}: "
-            text = f"{recording.name}: {where}{issue.text}"
-            found[text] = found.get(text, 0) + 1
-    return [f"{text} ({count} times)" if count > 1 else text for text, count in found.items()]
