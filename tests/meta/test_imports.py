@@ -42,6 +42,7 @@ LAYERS = (
     ("control", "design"),
     ("sweeps",),
     ("diagnosis",),
+    ("studio",),
     ("cli",),
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.

@@ -36,6 +36,7 @@ from pamrs.cli.rig import rig_app
 from pamrs.cli.schema import schema_command
 from pamrs.cli.simulate import simulate_command
 from pamrs.cli.size import size_command
+from pamrs.cli.studio import studio_command
 from pamrs.errors import NotWrittenError
 
 __all__ = ["NOT_WRITTEN", "app", "main"]
@@ -74,6 +75,7 @@ app.command("prove")(prove_command)
 app.command("replay")(replay_command)
 app.command("schema")(schema_command)
 app.command("size")(size_command)
+app.command("studio")(studio_command)
 app.command("compare")(compare_command)
 app.command("diagnose")(diagnose_command)
 for _group in (app, rig_app, fit_app, design_app):

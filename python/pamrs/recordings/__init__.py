@@ -18,6 +18,7 @@ from pamrs.recordings._doubts import Suspicion, suspicions
 from pamrs.recordings._from_log import load_recordings
 from pamrs.recordings._headed import load_recording
 from pamrs.recordings._in_memory import is_table
+from pamrs.recordings._matching import channels_of
 from pamrs.recordings._proposal import LogProposal, Proposal, propose
 from pamrs.recordings._recording import Issue, OwnValue, Recording
 
@@ -31,6 +32,7 @@ __all__ = [
     "Recording",
     "Suspicion",
     "case_schema",
+    "channels_of",
     "is_table",
     "load_case",
     "load_recording",

@@ -307,7 +307,8 @@ def _proposal(
     for match in matches:
         if match.channel not in known:
             remarks.append(
-                f"{match.series.name} has no clock: give --sample-time, or time in case.toml"
+                f"{match.series.name} has no clock: give the spacing of its samples "
+                "(--sample-time), or time in case.toml"
             )
         if match.hold:
             remarks.append(
