@@ -16,7 +16,7 @@ from pamrs.diagnosis.prepare import (
     without_dead_commands,
 )
 from pamrs.errors import DiagnosisError
-from pamrs.recordings import Case, digests
+from pamrs.recordings import Case
 
 __all__ = ["Check", "checked"]
 
@@ -73,7 +73,7 @@ def checked(case: Case) -> Check:
             f"the rig ({', '.join(rig.blocks)}): nothing can be judged, record more of them"
         )
     cautions = [*rig.cautions, *suspected, *_issues(case)]
-    return Check("", list(dict.fromkeys(cautions)), digests(case))
+    return Check("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 
 def _issues(case: Case) -> list[str]:
