@@ -11,7 +11,6 @@ from pamrs.findings import (
     BlockResidual,
     ChannelError,
     Condition,
-    ConditionMap,
     EffectFound,
     EffectParameterFound,
     FitErrors,
@@ -74,10 +73,6 @@ def residual(rms: float, noise: float, p_value: float) -> dict[str, Any]:
 
 
 def diagnosis(**changes: Any) -> Diagnosis:
-    x, y = np.linspace(100.0, 500.0, 13), np.linspace(-60.0, 60.0, 11)
-    centre_x, centre_y = np.meshgrid((x[1:] + x[:-1]) / 2, (y[1:] + y[:-1]) / 2)
-    z = 6.0 * np.tanh(centre_y / 30.0) * (centre_x / 500.0)
-    z[0, :3] = np.nan
     content: dict[str, Any] = rows_of(__file__, "diagnosis")
     content["where"]["conditions"] = [Condition(*own) for own in content["where"]["conditions"]]
     own = {"muscle_pressure": fit_entry(3e5), "joint_angle": fit_entry(0.6)}
@@ -93,15 +88,6 @@ def diagnosis(**changes: Any) -> Diagnosis:
             for channel in channels
         ],
         "residuals": {name: residual(rms, 1.0, 0.5) for name, rms in sizes.items()},
-        "condition_map": {
-            "x_label": "muscle pressure [kPa]",
-            "y_label": "pressure rate [kPa/s]",
-            "x_edges": x,
-            "y_edges": y,
-            "z": z,
-            "z_after": 0.1 * z,
-            "block": "chamber",
-        },
     }
     content.update(changes)
     return Diagnosis(**content | entries(content))
@@ -119,7 +105,6 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
     errors = {
         part: each(ChannelError, content["fit"].get(part, {})) for part in ("channels", "held_out")
     }
-    shown = content["condition_map"]
     return {
         "where": Where(**content["where"]),
         "effects": [EffectFound(**effect) for effect in effects],
@@ -128,17 +113,15 @@ def entries(content: dict[str, Any]) -> dict[str, Any]:
         "next_experiment": NextExperiment(**content["next_experiment"]),
         "tested": [Tested(**{"left": None, **row}) for row in content["tested"]],
         "residuals": each(BlockResidual, content["residuals"]),
-        "condition_map": None if shown is None else ConditionMap(**shown),
     }
 
 
 def sealed_chamber() -> Diagnosis:
-    """Only a pressure, one recording, no map, no held-out data."""
+    """Only a pressure, one recording, no held-out data."""
     return diagnosis(
         case="sealed_hold",
         traces=[trace("hold", "fit", "muscle_pressure", "Pa", 3e5, n=900)],
         fit={"channels": {"muscle_pressure": fit_entry(3e5)}, "held_out": {}, "gap_closed": None},
-        condition_map=None,
         residuals={"chamber": residual(900.0, 100.0, 1e-9)},
         timings={},
     )
@@ -167,7 +150,6 @@ def nothing() -> Diagnosis:
         next_experiment={},
         warnings=[],
         residuals={},
-        condition_map=None,
         traces=[same],
         text="",
         rig=None,

@@ -164,7 +164,6 @@ def _judged(verdict: str, probabilities: dict[str, float], **more: Any) -> Diagn
         blocks=[block],
         where={"block": "arm"},
         traces=[],
-        condition_map=None,
     )
 
 

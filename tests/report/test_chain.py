@@ -47,7 +47,6 @@ def found(rig: pamrs.Rig, located: str, blocks: list[BlockVerdict], **more: obje
         "rig": rig,
         "measured": ["supply_pressure", "muscle_pressure", "joint_angle"],
         "traces": [],
-        "condition_map": None,
     }
     # a table of residuals as dictionaries is what the maker of results expects
     told = {name: dict(r) for name, r in residuals.items()}

@@ -215,7 +215,7 @@ def test_figure_is_a_png(make, tmp_path: Path) -> None:
 
 def test_figure_without_traces(tmp_path: Path) -> None:
     assert (
-        synthetic.diagnosis(traces=[], probabilities={}, residuals={}, condition_map=None)
+        synthetic.diagnosis(traces=[], probabilities={}, residuals={})
         .figure(tmp_path / "f.png")
         .exists()
     )

@@ -139,9 +139,6 @@ class Diagnosis(View, Findings):
     residuals : dict of str to BlockResidual
         {block: {rms, noise, excess, p_value, channel}}, residual of each block's refitted baseline
         against the noise level.
-    condition_map : ConditionMap or None
-        ``x_label``, ``y_label``, ``x_edges`` (m+1,), ``y_edges`` (n+1,), ``z`` and ``z_after`` (n,
-        m): mean residual in units of the noise, NaN where there are no data; ``block``.
     timings : dict
         Seconds of each stage, optional.
     tried : list of Tried
@@ -314,7 +311,7 @@ def load_result(path: str | os.PathLike[str]) -> Diagnosis:
     -------
     Diagnosis
         With everything that JSON has: attributes, `summary()`, `headline`, `to_json()`. Of what it
-        has not (`rig`, `traces`, `residuals`, `condition_map`, `measured`, `timings`, `tried`,
+        has not (`rig`, `traces`, `residuals`, `measured`, `timings`, `tried`,
         `tested`, and with these report and pictures) a DiagnosisError says what to do.
 
     Raises

@@ -14,7 +14,6 @@ from __future__ import annotations
 from pamrs.findings._compare import Compared, compare_results
 from pamrs.findings._details import (
     BlockResidual,
-    ConditionMap,
     Considered,
     Curves,
     Form,
@@ -65,7 +64,6 @@ __all__ = [
     "ChannelError",
     "Compared",
     "Condition",
-    "ConditionMap",
     "Considered",
     "Curves",
     "EffectFound",

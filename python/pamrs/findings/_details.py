@@ -225,31 +225,6 @@ class BlockResidual(Entry):
 
 
 @dataclass(frozen=True, eq=False)
-class ConditionMap(Entry):
-    """Mean residual over two conditions.
-
-    Attributes
-    ----------
-    x_label, y_label : str
-        The conditions.
-    x_edges, y_edges : list of float
-        Edges of the cells, lengths m + 1 and n + 1.
-    z, z_after : (n, m) list of list of float
-        Mean residual in units of the noise before and after; NaN where there are no data.
-    block : str
-        The block.
-    """
-
-    x_label: str
-    y_label: str
-    x_edges: Any
-    y_edges: Any
-    z: Any
-    z_after: Any = None
-    block: str = ""
-
-
-@dataclass(frozen=True, eq=False)
 class Tried(Entry):
     """A set of effects, or of wrong values, that was fitted.
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from pamrs.declared import told
 from pamrs.findings._details import (
     BlockResidual,
-    ConditionMap,
     Considered,
     NextExperiment,
     RecordingUsed,
@@ -113,8 +112,6 @@ class Findings:
         Channels that every recording has.
     residuals : dict of str to BlockResidual
         Residual of each block's refitted baseline against the noise level.
-    condition_map : ConditionMap or None
-        Mean residual over two conditions.
     timings : dict
         Seconds of each stage, optional.
     tried : list of Tried
@@ -214,7 +211,6 @@ class Findings:
     free_traces: list[Trace] = field(default_factory=list, metadata=told(json=False))
     measured: list[str] = field(default_factory=list, metadata=told(json=False))
     residuals: dict[str, BlockResidual] = field(default_factory=dict, metadata=told(json=False))
-    condition_map: ConditionMap | None = field(default=None, metadata=told(json=False))
     timings: dict[str, float] = field(default_factory=dict, metadata=told(json=False))
     tried: list[Tried] = field(default_factory=list, metadata=told(json=False))
     tested: list[Tested] = field(default_factory=list, metadata=told(json=False))

@@ -141,7 +141,6 @@ def assemble(
         wrong_parameters=_wrong(models, fitted, found.table),
         measured=list(case.channels),
         residuals=_block_table(groups),
-        condition_map=picture.map,
         tried=_tried(groups),
         considered=part("what was asked for", lambda: _considered(judged, fitted), []),
         tested=part("the list of what was tested", lambda: _tested(groups), []),
@@ -164,10 +163,9 @@ def _picture(
     if located is None:
         return Picture()
     block = next(b for b in fitted.blocks if b.name == located)
-    stages = found["refit"], found["after"]
     return fitted.losses.part(
         "the conditions of the mismatch",
-        lambda: describe(block, fitted.recordings, nominal, *stages, noise_level),
+        lambda: describe(block, fitted.recordings, nominal, found["refit"], noise_level),
         Picture(),
     )
 

@@ -211,5 +211,5 @@ def _conditions(
     nominal: Rig,
 ) -> list[Condition]:
     """Under which conditions what is left is largest."""
-    picture = describe(block, problem.recordings, nominal, residual, None, noise_level)
+    picture = describe(block, problem.recordings, nominal, residual, noise_level)
     return [c for c in picture.conditions if c.share > TELLING_CONDITION * c.time][:6]

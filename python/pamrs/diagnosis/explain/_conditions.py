@@ -15,13 +15,11 @@ from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.fit import Key
 from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, binned
-from pamrs.findings import Condition, ConditionMap
+from pamrs.findings import Condition
 from pamrs.rig import Rig
 from pamrs.units import with_unit
 
 Array = NDArray[np.float64]
-_MAP_CELLS = 8
-"""Cells of the conditions map in each direction."""
 
 
 @dataclass
@@ -36,14 +34,11 @@ class Picture:
         In the recording with the largest excess [s].
     recording : str
         That recording.
-    map : ConditionMap or None
-        Mean residual (in noise levels) over two conditions, before and after.
     """
 
     conditions: list[Condition] = field(default_factory=list)
     intervals: list[list[float]] = field(default_factory=list)
     recording: str = ""
-    map: ConditionMap | None = None
 
 
 def _binned(values: Array, rows: NDArray[np.bool_], width: int) -> Array:
@@ -135,11 +130,10 @@ def describe(
     block: Block,
     recordings: list[Prepared],
     rig: Rig,
-    before: dict[Key, Any],
-    after: dict[Key, Any] | None,
+    found: dict[Key, Any],
     noise_level: dict[Key, NoiseLevel],
 ) -> Picture:
-    """Shares of the excess by condition, intervals in the worst recording, and the conditions map.
+    """Shares of the excess by condition, and intervals in the worst recording.
 
     Parameters
     ----------
@@ -149,37 +143,29 @@ def describe(
         Recordings.
     rig : Rig
         Nominal model, for the valve's null.
-    before, after : dict
-        Residuals of the refitted baseline and of the final model.
+    found : dict
+        Residuals of a model.
     noise_level : dict
         Noise levels.
     """
     columns: dict[str, list[Array]] = {}
-    scaled, scaled_after, worst, picture = [], [], -1.0, Picture()
+    scaled, worst, picture = [], -1.0, Picture()
     for prepared in recordings:
         key = (block.name, prepared.recording.name)
         width = bins_of(prepared)
-        means, counts = binned(before[key].value, before[key].rows, width)
+        means, counts = binned(found[key].value, found[key].rows, width)
         ok = counts > 0
         # inside a window the residual is an integral: its change says where the cause acts
         score = means / noise_level[key].binned
         cause = (
             score
             if block.window is None
-            else _change(before[key].value, before[key].rows, width) / noise_level[key].binned
+            else _change(found[key].value, found[key].rows, width) / noise_level[key].binned
         )
         conditions = _conditions(block, prepared, rig, width)
         for name, values in conditions.items():
             columns.setdefault(name, []).append(values[ok])
         scaled.append(cause[ok])
-        if after is not None:
-            a = after[key]
-            rest = (
-                binned(a.value, a.rows, width)[0]
-                if block.window is None
-                else _change(a.value, a.rows, width)
-            )
-            scaled_after.append((rest / noise_level[key].binned)[ok])
         power = float(np.mean(score[ok] ** 2)) if ok.any() else 0.0
         if power > worst:
             worst = power
@@ -193,7 +179,6 @@ def describe(
     }
     z = np.concatenate(scaled)
     picture.conditions = _shares(_regimes(joined), z, rising=block.window is not None)
-    picture.map = _map(joined, z, np.concatenate(scaled_after) if scaled_after else None, block)
     return picture
 
 
@@ -259,54 +244,3 @@ def _intervals(flags: NDArray[np.bool_], bin_time: float, most: int = 12) -> lis
     return [
         [round(float(a * bin_time), 3), round(float(b * bin_time), 3)] for a, b in sorted(spans)
     ]
-
-
-def _map(
-    columns: dict[str, Array], z: Array, after: Array | None, block: Block
-) -> ConditionMap | None:
-    """Mean residual over the two conditions that tell most of it apart."""
-    names = [n for n, v in columns.items() if np.ptp(v) > 1e-9]
-    if len(names) < 2:
-        return None
-    edges = {
-        n: np.unique(np.quantile(columns[n], np.linspace(0, 1, _MAP_CELLS + 1))) for n in names
-    }
-    names = [n for n in names if edges[n].size >= 3]
-    if len(names) < 2:
-        return None
-    if len(names) > 2:
-        # recordings do not share their time: a condition of the rig says more
-        names = [n for n in names if n != "time [s]"]
-
-    def explained(a: str, b: str) -> float:
-        mean, count = _cells(columns[a], columns[b], edges[a], edges[b], z)
-        return float(np.nansum(count * np.nan_to_num(mean) ** 2))
-
-    x, y = max(
-        ((a, b) for i, a in enumerate(names) for b in names[i + 1 :]), key=lambda ab: explained(*ab)
-    )
-    grid = _cells(columns[x], columns[y], edges[x], edges[y], z)[0]
-    rest = (
-        _cells(columns[x], columns[y], edges[x], edges[y], after)[0] if after is not None else None
-    )
-    return ConditionMap(
-        x_label=x,
-        y_label=y,
-        x_edges=edges[x].tolist(),
-        y_edges=edges[y].tolist(),
-        z=grid.tolist(),
-        z_after=None if rest is None else rest.tolist(),
-        block=block.name,
-    )
-
-
-def _cells(x: Array, y: Array, x_edges: Array, y_edges: Array, z: Array) -> tuple[Array, Array]:
-    i = np.clip(np.searchsorted(x_edges, x, side="right") - 1, 0, x_edges.size - 2)
-    j = np.clip(np.searchsorted(y_edges, y, side="right") - 1, 0, y_edges.size - 2)
-    shape = (y_edges.size - 1, x_edges.size - 1)
-    count, total = np.zeros(shape), np.zeros(shape)
-    np.add.at(count, (j, i), 1.0)
-    np.add.at(total, (j, i), z)
-    with np.errstate(invalid="ignore"):
-        mean = np.where(count >= 3, total / np.maximum(count, 1.0), np.nan)
-    return mean, count
