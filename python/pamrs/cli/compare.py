@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from json import loads
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -58,5 +57,4 @@ def _read(path: Path) -> dict[str, Any]:
     """A result as a table, by its file or the folder with ``result.json``."""
     from pamrs.diagnosis.result import load_result
 
-    told: dict[str, Any] = loads(load_result(path).to_json())
-    return told
+    return load_result(path).to_dict()

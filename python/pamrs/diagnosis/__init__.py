@@ -28,7 +28,7 @@ from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
 from pamrs.diagnosis.evidence import BlockGroup, calibrate
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
-from pamrs.diagnosis.fit import Problem, fits, holdable, with_offsets, without_passing
+from pamrs.diagnosis.fit import Problem, fits, with_offsets
 from pamrs.diagnosis.model import conclude
 from pamrs.diagnosis.next_experiment import next_to_record
 from pamrs.diagnosis.noise import noise_levels
@@ -36,39 +36,28 @@ from pamrs.diagnosis.prepare import (
     Block,
     Prepared,
     Unjudged,
-    at_ambient,
     averaged_to_need,
     begun_alike,
     blocks_beside_tanks,
-    check_plausible,
     check_sense,
-    noted_units,
-    own_of_rig,
     prepare,
     said_of_beginnings,
     said_of_own,
     said_of_tanks,
-    suspected_units,
     unjudged_blocks,
     unread_tanks,
-    varying,
     with_own_values,
     with_tanks,
-    without_copies,
-    without_dead_commands,
-    without_impossible,
-    without_poor_thermometers,
-    without_rails,
 )
+from pamrs.diagnosis.ready import readied
 from pamrs.diagnosis.result import Diagnosis
 from pamrs.diagnosis.search import examine, find_misread, reading_errors
 from pamrs.diagnosis.settings import DiagnosisSettings
-from pamrs.effects import CATALOGUE, EFFECTS, UNLISTED, Hypothesis, Term
+from pamrs.effects import CATALOGUE, UNLISTED, Hypothesis, Term
 from pamrs.errors import DiagnosisError, PamrsError, ParameterError, SimulationError, meant
-from pamrs.findings import Faulty, NextExperiment
+from pamrs.findings import NextExperiment
 from pamrs.recordings import Case, Recording, is_table, load_case
 from pamrs.rig import Rig, load_rig
-from pamrs.rig.schema import qualified
 from pamrs.simulation import core_rig, regulators_of
 
 __all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]
@@ -153,16 +142,6 @@ def _drowned(problem: Problem, rig: Rig) -> dict[str, str]:
     return found
 
 
-def _wanted(rig: Rig) -> str:
-    """Channels that surround a rig's blocks, by name."""
-    names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
-    names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
-    names += [dotted("joint_angle", name) for name in rig.tables("joint")]
-    names += ["length"] if rig.model["load"] else []
-    names += ["force"] if (rig.model["load"] or {}).get("kind") == "frame" else []
-    return ", ".join([*names, *core_rig(rig).inputs])
-
-
 def diagnose(
     case: Case | Rig | str | os.PathLike[str],
     *,
@@ -237,19 +216,9 @@ def diagnose(
     case = _case_of(case, data, allow_outside=allow_outside)
     if rig is not None:
         case = case.with_rig(rig) if isinstance(rig, Rig) else case.with_rig(load_rig(rig), rig)
-    case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
-    _check_rig(case)
-    suspected = [*suspected_units(case), *noted_units(case)]
     chosen = DiagnosisSettings() if settings is None else settings
-    try:
-        case, held = _nominal(case, chosen)
-        alive, dead = without_dead_commands(case.recordings, case.rig)
-        case = replace(case, recordings=alive)
-        check_plausible(case.recordings, case.rig, case.name, chosen)
-    except DiagnosisError as error:
-        raise DiagnosisError("\n".join([str(error), *suspected])) from error
-    case, clipped, masked = _sound(case, chosen)
-    seen = blocks_beside_tanks(case.rig, case.channels)
+    ready = readied(case, chosen)
+    case, seen = ready.case, ready.blocks
     shortened, counts = averaged_to_need(case.recordings, seen, case.name, chosen)
     case = replace(case, recordings=shortened)
     say(f"{case.name}: preparing {len(case.recordings)} recordings", _JUDGED[0] / 2)
@@ -268,7 +237,7 @@ def diagnose(
             )
             inner, outer, moved = laid or (inner, outer, [])
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
-    warnings = [*inner.losses.told, *suspected, *masked, *held, *begun, *moved]
+    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *begun, *moved]
     warnings += diagnosis.warnings
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
@@ -278,7 +247,7 @@ def diagnose(
     )
     return replace(
         diagnosis,
-        faulty=[*dead, *clipped],
+        faulty=ready.faulty,
         warnings=warnings,
         data=data,
         inputs=dict(case.inputs),
@@ -374,85 +343,6 @@ def _on_time(inner: Problem, outer: Problem, rig: Rig) -> tuple[Problem, Problem
     return found[0], found[-1], said
 
 
-def _check_rig(case: Case) -> None:
-    """Refuse cases of which no block of their rig can be judged."""
-    rig = case.rig
-    if (rig.model["load"] or {}).get("kind") == "frame" and "force" not in case.channels:
-        raise DiagnosisError(
-            f"load.kind = 'frame' of case {case.name!r} holds the length, so that only its force "
-            f"can be judged: every recording needs the channel force; all have "
-            f"{', '.join(case.channels)}"
-        )
-
-    free = varying(rig, core_rig(rig))
-    for recording in case.recordings:
-        fixed = [name for name in recording.parameters if name not in free]
-        if fixed:
-            raise DiagnosisError(
-                f"parameters of recording {recording.name!r}: {', '.join(fixed)} cannot differ "
-                f"between recordings of a diagnosis; what can: {', '.join(sorted(free))}"
-            )
-
-
-def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
-    """The case with the rig that its recordings were made on as far as that is known before any
-    fit, and what that is, in words.
-    """
-    rig, said = at_ambient(case.rig, case.recordings, settings)
-    told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
-    return replace(case, rig=without_passing(rig)), told
-
-
-def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty], list[str]]:
-    """The case with what its recordings cannot have measured masked or left out; what is said of
-    sensors whose range ends, and of the rest.
-    """
-    kept, clipped = without_rails(case.recordings)
-    kept, masked = without_impossible(kept, case.rig, settings)
-    kept, copies = without_copies(kept)
-    kept, unread = without_poor_thermometers(kept, case.rig)
-    return replace(case, recordings=kept), clipped, [*copies, *masked, *unread]
-
-
-def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
-    """Tanks in front of regulators that nobody measured, in words."""
-    said = []
-    for name, ports in rig.ports("supply").items():
-        inlet = block_of(ports.get("inlet", ""))
-        table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
-        gauge = dotted("supply_pressure", inlet)
-        if table is not None and table["kind"] == "tank" and gauge not in channels:
-            said.append(
-                f"{gauge} was not recorded: {qualified('supply', name)} is taken to have "
-                f"{table['initial_pressure'] / 1e5:.3g} bar in front of it throughout; record it "
-                "where the tank may come near to what the regulator is set to"
-            )
-    return said
-
-
-def _said_of_held(rig: Rig) -> list[str]:
-    """What the model holds already, and what of it cannot be held, in words."""
-
-    def told(entry: dict[str, Any]) -> str:
-        place = f" at {entry['at']}" if "at" in entry else ""
-        return f"{EFFECTS[entry['id']].name} ({entry['id']}{place})"
-
-    held = [told(entry) for entry in rig.effects if holdable(entry)]
-    passing = [told(entry) for entry in rig.effects if not holdable(entry)]
-    said = []
-    if held:
-        said.append(
-            f"the model holds already: {', '.join(held)}; the parameters of each were refitted "
-            "with those of the rig, and it is not named again"
-        )
-    if passing:
-        said.append(
-            f"taken out of the model before the diagnosis: {', '.join(passing)}; what happens at "
-            "times of its own in each recording, or is a form without a name, is looked for anew"
-        )
-    return said
-
-
 def _asked(rig: Rig, consider: Sequence[str]) -> tuple[Hypothesis, ...]:
     """What the caller asks for, checked, each hypothesis once."""
     if isinstance(consider, str):
@@ -528,11 +418,6 @@ def _problems(
             + ", ".join(f"{name}: {100 * share:.0f} %" for name, share in thin.items())
             + f"); at least {100 * least:.0f} % are needed"
             + "".join(f"; {told}" for told in begun)
-        )
-    if not blocks:
-        raise DiagnosisError(
-            f"case {case.name!r}: its channels ({', '.join(channels)}) do not surround any block "
-            f"of the rig ({', '.join(rig.blocks)}); measure {_wanted(rig)}"
         )
     inner = Problem(blocks, fitted, core, settings, considered=asked)
     with _in_range(case.name):

@@ -2,20 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis import DiagnosisSettings
-from pamrs.diagnosis.prepare import (
-    at_ambient,
-    blocks_beside_tanks,
-    check_plausible,
-    noted_units,
-    own_of_rig,
-    suspected_units,
-    without_dead_commands,
-)
-from pamrs.errors import DiagnosisError
+from pamrs.diagnosis.ready import readied
 from pamrs.recordings import Case
 
 __all__ = ["Check", "checked"]
@@ -57,22 +48,8 @@ def checked(case: Case) -> Check:
     DiagnosisError
         If units or columns cannot be right, or no block of the rig can be judged.
     """
-    settings = DiagnosisSettings()
-    own = replace(case, recordings=own_of_rig(case.rig, case.recordings))
-    suspected = [*suspected_units(own), *noted_units(own)]
-    rig, _ = at_ambient(case.rig, own.recordings, settings)
-    alive, _ = without_dead_commands(own.recordings, rig)
-    try:
-        check_plausible(alive, rig, case.name, settings)
-    except DiagnosisError as error:
-        raise DiagnosisError("\n".join([str(error), *suspected])) from error
-    channels = replace(own, recordings=alive).channels
-    if not blocks_beside_tanks(rig, channels):
-        raise DiagnosisError(
-            f"the channels that every log has ({', '.join(channels)}) do not surround any block of "
-            f"the rig ({', '.join(rig.blocks)}): nothing can be judged, record more of them"
-        )
-    cautions = [*rig.cautions, *suspected, *_issues(case)]
+    ready = readied(case, DiagnosisSettings())
+    cautions = [*case.rig.cautions, *ready.suspected, *_issues(case)]
     return Check("", list(dict.fromkeys(cautions)), dict(case.inputs))
 
 

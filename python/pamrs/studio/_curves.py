@@ -8,6 +8,8 @@ import numpy as np
 from markupsafe import Markup
 from numpy.typing import NDArray
 
+from pamrs._views import decimate
+
 __all__ = ["sparkline"]
 
 _WIDTH: Final = 240
@@ -30,21 +32,13 @@ def sparkline(values: NDArray[np.float64]) -> Markup:
     rows = np.flatnonzero(np.isfinite(values))
     if not rows.size:
         return Markup("")
-    parts = np.array_split(rows, min(_WIDTH, rows.size))
-    ends = [row for part in parts for row in _ends(part, values)]
-    drawn = values[ends]
+    ends, drawn = decimate(rows, values[rows], 2 * _WIDTH)
     low, high = float(drawn.min()), float(drawn.max())
     scale = (_HEIGHT - 4) / (high - low) if high > low else 0.0
-    x = np.asarray(ends) * (_WIDTH / max(1, values.size - 1))
+    x = ends * (_WIDTH / max(1, values.size - 1))
     y = _HEIGHT - 2 - (drawn - low) * scale if scale else np.full(x.size, _HEIGHT / 2)
     points = " ".join(f"{a:.1f},{b:.1f}" for a, b in zip(x, y, strict=True))
     return Markup(
         '<svg class="spark" viewBox="0 0 {} {}" preserveAspectRatio="none" aria-hidden="true">'
         '<polyline points="{}"/></svg>'
     ).format(_WIDTH, _HEIGHT, points)
-
-
-def _ends(part: NDArray[np.intp], values: NDArray[np.float64]) -> list[int]:
-    """Where a stretch is lowest and highest, in the order of time."""
-    own = values[part]
-    return sorted({int(part[own.argmin()]), int(part[own.argmax()])})

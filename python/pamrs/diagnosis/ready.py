@@ -1,0 +1,192 @@
+"""What a diagnosis does with a case before it fits anything: units, dead and swapped channels,
+impossible samples, copies, and the blocks that what was recorded surrounds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from pamrs.channels import block_of, dotted
+from pamrs.diagnosis.fit import holdable, without_passing
+from pamrs.diagnosis.prepare import (
+    Block,
+    at_ambient,
+    blocks_beside_tanks,
+    check_plausible,
+    noted_units,
+    own_of_rig,
+    suspected_units,
+    varying,
+    without_copies,
+    without_dead_commands,
+    without_impossible,
+    without_poor_thermometers,
+    without_rails,
+)
+from pamrs.diagnosis.settings import DiagnosisSettings
+from pamrs.effects import EFFECTS
+from pamrs.errors import DiagnosisError
+from pamrs.findings import Faulty
+from pamrs.recordings import Case
+from pamrs.rig import Rig
+from pamrs.rig.schema import qualified
+from pamrs.simulation import core_rig
+
+__all__ = ["Ready", "readied"]
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A case that can be diagnosed.
+
+    Attributes
+    ----------
+    case : Case
+        With the recordings that are the rig's own, and the rig that they were made on as far as
+        that is known before any fit; impossible samples are masked.
+    blocks : list of Block
+        Blocks of the rig that its channels surround.
+    suspected : list of str
+        Units and columns to be looked at.
+    told : list of str
+        What was masked, left out or taken as known.
+    faulty : list of Faulty
+        Sensors and commands that are dead or at the end of their range.
+    """
+
+    case: Case
+    blocks: list[Block]
+    suspected: list[str]
+    told: list[str]
+    faulty: list[Faulty]
+
+
+def readied(case: Case, settings: DiagnosisSettings) -> Ready:
+    """Look at a case before anything is fitted.
+
+    Parameters
+    ----------
+    case : Case
+        The case as it was read.
+    settings : DiagnosisSettings
+        Numbers that say what is implausible.
+
+    Returns
+    -------
+    Ready
+
+    Raises
+    ------
+    DiagnosisError
+        If recordings cannot be of this rig (units, swapped columns, dead sensors), or surround no
+        block of it.
+    """
+    case = replace(case, recordings=own_of_rig(case.rig, case.recordings))
+    _check_rig(case)
+    suspected = [*suspected_units(case), *noted_units(case)]
+    try:
+        case, held = _nominal(case, settings)
+        alive, dead = without_dead_commands(case.recordings, case.rig)
+        case = replace(case, recordings=alive)
+        check_plausible(case.recordings, case.rig, case.name, settings)
+    except DiagnosisError as error:
+        raise DiagnosisError("\n".join([str(error), *suspected])) from error
+    case, clipped, masked = _sound(case, settings)
+    blocks = blocks_beside_tanks(case.rig, case.channels)
+    if not blocks:
+        raise DiagnosisError(
+            f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
+            f"block of the rig ({', '.join(case.rig.blocks)}); measure {_wanted(case.rig)}"
+        )
+    return Ready(case, blocks, suspected, [*masked, *held], [*dead, *clipped])
+
+
+def _check_rig(case: Case) -> None:
+    """Refuse cases of which no block of their rig can be judged."""
+    rig = case.rig
+    if (rig.model["load"] or {}).get("kind") == "frame" and "force" not in case.channels:
+        raise DiagnosisError(
+            f"load.kind = 'frame' of case {case.name!r} holds the length, so that only its force "
+            f"can be judged: every recording needs the channel force; all have "
+            f"{', '.join(case.channels)}"
+        )
+
+    free = varying(rig, core_rig(rig))
+    for recording in case.recordings:
+        fixed = [name for name in recording.parameters if name not in free]
+        if fixed:
+            raise DiagnosisError(
+                f"parameters of recording {recording.name!r}: {', '.join(fixed)} cannot differ "
+                f"between recordings of a diagnosis; what can: {', '.join(sorted(free))}"
+            )
+
+
+def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
+    """The case with the rig that its recordings were made on as far as that is known before any
+    fit, and what that is, in words.
+    """
+    rig, said = at_ambient(case.rig, case.recordings, settings)
+    told = [*said, *_said_of_held(rig), *_said_of_inlets(rig, case.channels)]
+    return replace(case, rig=without_passing(rig)), told
+
+
+def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty], list[str]]:
+    """The case with what its recordings cannot have measured masked or left out; what is said of
+    sensors whose range ends, and of the rest.
+    """
+    kept, clipped = without_rails(case.recordings)
+    kept, masked = without_impossible(kept, case.rig, settings)
+    kept, copies = without_copies(kept)
+    kept, unread = without_poor_thermometers(kept, case.rig)
+    return replace(case, recordings=kept), clipped, [*copies, *masked, *unread]
+
+
+def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:
+    """Tanks in front of regulators that nobody measured, in words."""
+    said = []
+    for name, ports in rig.ports("supply").items():
+        inlet = block_of(ports.get("inlet", ""))
+        table = rig.tables("supply").get(inlet) if ports.get("inlet") else None
+        gauge = dotted("supply_pressure", inlet)
+        if table is not None and table["kind"] == "tank" and gauge not in channels:
+            said.append(
+                f"{gauge} was not recorded: {qualified('supply', name)} is taken to have "
+                f"{table['initial_pressure'] / 1e5:.3g} bar in front of it throughout; record it "
+                "where the tank may come near to what the regulator is set to"
+            )
+    return said
+
+
+def _said_of_held(rig: Rig) -> list[str]:
+    """What the model holds already, and what of it cannot be held, in words."""
+
+    def told(entry: dict[str, Any]) -> str:
+        place = f" at {entry['at']}" if "at" in entry else ""
+        return f"{EFFECTS[entry['id']].name} ({entry['id']}{place})"
+
+    held = [told(entry) for entry in rig.effects if holdable(entry)]
+    passing = [told(entry) for entry in rig.effects if not holdable(entry)]
+    said = []
+    if held:
+        said.append(
+            f"the model holds already: {', '.join(held)}; the parameters of each were refitted "
+            "with those of the rig, and it is not named again"
+        )
+    if passing:
+        said.append(
+            f"taken out of the model before the diagnosis: {', '.join(passing)}; what happens at "
+            "times of its own in each recording, or is a form without a name, is looked for anew"
+        )
+    return said
+
+
+def _wanted(rig: Rig) -> str:
+    """Channels that surround a rig's blocks, by name."""
+    names = [dotted("muscle_pressure", name) for name in rig.tables("chamber")]
+    names += [dotted("supply_pressure", name) for name in rig.tables("supply")]
+    names += [dotted("joint_angle", name) for name in rig.tables("joint")]
+    names += ["length"] if rig.model["load"] else []
+    names += ["force"] if (rig.model["load"] or {}).get("kind") == "frame" else []
+    return ", ".join([*names, *core_rig(rig).inputs])
