@@ -74,6 +74,14 @@ def test_two_results_are_set_side_by_side(tmp_path: Path, capsys: Any) -> None:
     assert "src=" not in html
 
 
+def test_an_effect_that_the_model_holds_by_then_is_told_so(tmp_path: Path, capsys: Any) -> None:
+    first = result(tmp_path / "first.json")
+    held = {"nominal": 0.5, "value": 0.5, "std": 0.1, "unit": "1", "moved_sigmas": 0.0}
+    parameters = {"heat_transfer.fill_coefficient": held}
+    second = result(tmp_path / "second.json", effects=[], verdict="none", parameters=parameters)
+    assert "heat_transfer is held by the model" in told(capsys, first, second)[1]
+
+
 def test_the_same_result_twice_changed_nothing(tmp_path: Path, capsys: Any) -> None:
     one = result(tmp_path / "a.json")
     other = result(tmp_path / "b.json")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from pamrs.findings import (
     MismatchStages,
     Unexplained,
 )
-from pamrs.report import render_html
+from pamrs.report import render_html, story
 from pamrs.report import text as words
 from tests.diagnosis import synthetic
 
@@ -71,6 +72,19 @@ def test_one_cause_that_two_groups_see_is_told_once() -> None:
     other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
     assert words.claim(seen(one, other)).count("the model leaves out") == 1
     assert words.claim(seen(one, other)).startswith("The model leaves out: encoder error in the ch")
+
+
+def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:
+    sure = group("chamber", "muscle_pressure", 0.93, effects=["leak_muscle"])
+    creep = group("arm", "joint_angle", 0.4, effects=["muscle_creep"])
+    left = replace(creep, effects=[], ambiguity=[["unlisted"], ["muscle_creep"]])
+    found = seen(sure, left, verdict="effects")
+    assert story.title(found) == (
+        "The model of the chamber leaves out a leak: muscle leak (0.93); something else in the arm"
+    )
+    names = [row.name for row in story.rivals(found)]
+    assert names[0] == "muscle leak in the chamber"
+    assert any(name.endswith("in the arm") for name in names)
 
 
 def test_noise_that_is_left_is_not_called_unexplained(tmp_path: Any) -> None:

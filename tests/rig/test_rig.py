@@ -284,6 +284,9 @@ def test_effects_are_checked() -> None:
     entry = '\n[[effects]]\nid = "leak_muscle"\nparameters = { conductance = %s }\n'
     assert "leak_muscle.conductance" in refused(SHOULDER + entry % '{ value = 1.0, unit = "bar" }')
     assert "no unit" in refused(SHOULDER + entry % "1e-9")
+    assert "its standard deviation, std" in refused(
+        SHOULDER + entry % '{ value = 1e-9, unit = "m3/(s Pa)", tol = 1e-10 }'
+    )
     assert "twice" in refused(SHOULDER + 2 * (entry % '{ value = 1e-9, unit = "m3/(s Pa)" }'))
     rig = parse_rig(SHOULDER + entry % '{ value = 0.1, unit = "l/(s bar)", std = 0.01 }')
     assert rig.effects[0]["parameters"]["conductance"] == pytest.approx(1e-9)

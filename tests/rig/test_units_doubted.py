@@ -9,6 +9,7 @@ import pytest
 
 import pamrs
 from pamrs.errors import ParameterError, UnitWarning
+from pamrs.library.evaluate import free_contraction
 
 TOLD = r"never exceeds 2 Pa \(gauge\): pascals are wanted, 1 bar is 1e5"
 
@@ -107,7 +108,7 @@ def test_what_a_sensor_reads_and_what_the_package_asks_is_not_doubted() -> None:
         warnings.simplefilter("error")
         start = {"muscle_pressure": 12.3456}
         pamrs.simulate(rig, 5.0, sample_time=0.01, duration=0.1, initial=start)
-        pamrs.library.evaluate.free_contraction(rig.muscle, 4e5)
+        free_contraction(rig.muscle, 4e5)
         pamrs.Joint(kind="pulley", radius=0.03).torque(rig.muscle, [0.0, 2e5], 0.5)
 
 

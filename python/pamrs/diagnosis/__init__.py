@@ -237,8 +237,9 @@ def diagnose(
             )
             inner, outer, moved = laid or (inner, outer, [])
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
-    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *begun, *moved]
-    warnings += diagnosis.warnings
+    # the first few are all that a terminal shows: first what may make the answer wrong
+    warnings = [*inner.losses.told, *ready.suspected, *diagnosis.warnings]
+    warnings += [*ready.told, *begun, *moved]
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)

@@ -135,7 +135,9 @@ def _changed(found: Compared, first: Mapping[str, Any], second: Mapping[str, Any
             told.append(f"{what}: {one or 'none'} before, now {other or 'none'}")
     before, now = _named(first), _named(second)
     told += [f"{name} is named now" for name in sorted(now - before)]
-    told += [f"{name} is not named any more" for name in sorted(before - now)]
+    held = {name.partition(".")[0] for name in second["parameters"]}
+    for name in sorted(before - now):
+        told.append(f"{name} is {'held by the model' if name in held else 'not named any more'}")
     for name, (p, q) in found.candidates.items():
         if abs((p or 0.0) - (q or 0.0)) >= LIKELY:
             told.append(f"probability of {name}: {p or 0.0:.2f} before, now {q or 0.0:.2f}")

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import BlockVerdict, EffectFound, EffectParameterFound, Findings
+from pamrs.findings import BlockMismatch, BlockVerdict, EffectFound, EffectParameterFound, Findings
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
@@ -44,7 +44,9 @@ def _answer(block: BlockVerdict) -> list[Hypothesis]:
 
 
 def _answering(diagnosis: Findings) -> list[BlockVerdict]:
-    """The groups of blocks in which something is or may be missing or wrong, the located first."""
+    """The groups of blocks in which something is or may be missing or wrong: those with a settled
+    name first, then the located one.
+    """
     found = [
         b
         for b in words.told_blocks(diagnosis)
@@ -52,7 +54,16 @@ def _answering(diagnosis: Findings) -> list[BlockVerdict]:
     ]
     if not found and diagnosis.verdict == "unlisted":
         found = words.told_blocks(diagnosis)
-    return sorted(found, key=lambda b: diagnosis.where.block not in b.blocks)
+
+    def settled(block: BlockVerdict) -> bool:
+        answer = _answer(block)
+        return (
+            len(answer) == 1
+            and bool(answer[0].terms)
+            and (_chance(diagnosis, block, answer[0]) >= words.SETTLED)
+        )
+
+    return sorted(found, key=lambda b: (not settled(b), diagnosis.where.block not in b.blocks))
 
 
 def title(diagnosis: Findings) -> str:
@@ -76,8 +87,8 @@ def title(diagnosis: Findings) -> str:
         told = " and ".join(_settled(diagnosis, b) for b in groups[:2])
         if len(groups) == 2 and len(told.split()) <= LONGEST - 4:
             return f"The model leaves out {told}"
-    others = _listed([words.blocks_label(b) for b in groups[1:]], 2, "and")
-    ends = (f"; something else in the {others}", "; something else elsewhere", "")
+    others = _listed([_place(diagnosis, b) for b in groups[1:]], 2, "and")
+    ends = (f"; something else in the {others}", "")
     for end in ends if groups[1:] else ("",):
         for most in (3, 2, 1):
             told = _phrase(diagnosis, groups[0], most) + end
@@ -103,10 +114,15 @@ def _chance(diagnosis: Findings, block: BlockVerdict, answer: Hypothesis) -> flo
 
 def _place(diagnosis: Findings, block: BlockVerdict) -> str:
     """The block of a group with the mismatch, in words."""
-    located = diagnosis.where.block
-    worst = max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
+    worst = _worst(block)
     name = worst.block if worst else next(iter(block.blocks), "rig")
+    located = diagnosis.where.block
     return words.spoken_name(located if located in block.blocks else name)
+
+
+def _worst(block: BlockVerdict) -> BlockMismatch | None:
+    """The largest mismatch of a group."""
+    return max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
 
 
 def _healthy(diagnosis: Findings) -> str:
@@ -261,10 +277,21 @@ def to_do(diagnosis: Findings) -> list[str]:
 
 
 def rivals(diagnosis: Findings) -> list[Rival]:
-    """The explanations of the located mismatch, the most probable first, and why each stands there;
-    behind those with a probability the effects that come closest by themselves.
+    """The explanations of each mismatch in the order of the title, the most probable first, and why
+    each stands there; behind those of the located one the effects that come closest by themselves.
     """
-    block = words.told_probabilities(diagnosis)[0]
+    groups = _answering(diagnosis) or words.told_probabilities(diagnosis)
+    several = len(groups) > 1
+    found = []
+    for block in groups[:2]:
+        at = f" in the {_place(diagnosis, block)}" if several else ""
+        most = MOST_RIVALS // 2 if several else MOST_RIVALS
+        found += [row._replace(name=row.name + at) for row in _ranked(diagnosis, block, most)]
+    return found
+
+
+def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
+    """At most so many explanations of what one group of blocks misses."""
     ranked = words.ranked_probabilities(block.probabilities, len(block.probabilities) + 1)
     shown = [(key, p) for key, p in ranked if p >= 0.005]
     shown += [(key, p) for key, p in ranked if p < 0.005 and key in ("none", "parameters")]
@@ -273,8 +300,9 @@ def rivals(diagnosis: Findings) -> list[Rival]:
         (row for row in diagnosis.tested if row.left is not None and row.id not in known),
         key=lambda row: row.left or 0.0,
     )
-    shown = shown[:MOST_RIVALS]
-    shown += [(row.id, 0.0) for row in closest[: max(0, MOST_RIVALS - len(shown))]]
+    shown = shown[:most]
+    if diagnosis.where.block in block.blocks or not diagnosis.where.block:
+        shown += [(row.id, 0.0) for row in closest[: max(0, most - len(shown))]]
     return [
         Rival(
             words.hypothesis_label(key),
@@ -301,7 +329,10 @@ def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
 
 def _why(diagnosis: Findings, block: BlockVerdict, key: str) -> str:
     """Why an explanation has the probability that it has."""
-    hypothesis, channel = Hypothesis.parse(key), diagnosis.where.channel
+    hypothesis, worst = Hypothesis.parse(key), _worst(block)
+    channel = diagnosis.where.channel
+    if worst and diagnosis.where.block not in block.blocks:
+        channel = worst.channel
     about = words.spoken_name(channel) if channel else ""
     stage = {NONE: "before", PARAMETERS: "refit"}.get(hypothesis, "")
     missed = words.miss(diagnosis, channel, stage) if stage else None

@@ -545,7 +545,14 @@ class Reader:
                 f"{parameter.unit!r} }}"
             )
             return None
-        self.unknown_keys(f"{label}.", raw, ("value", "unit", "std", "error"))
+        if "tol" in raw:
+            self.problem(
+                f"{label}.tol is not allowed: an effect has no nominal value to keep to; how well "
+                "this one is known is its standard deviation, std"
+            )
+        self.unknown_keys(
+            f"{label}.", (k for k in raw if k != "tol"), ("value", "unit", "std", "error")
+        )
         if "error" in raw:
             self.of_each_recording(f"{qualified(identity, place)}.{parameter.name}", label, raw)
         unit = raw.get("unit")

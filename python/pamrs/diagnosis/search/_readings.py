@@ -213,7 +213,9 @@ def _fit_reading(problem: Problem, nominal: Rig, was: Fit, reading: Reading) -> 
     except SimulationError:
         return None
     before, after = _power(problem, was), _power(own, now)
-    if after - 1.0 > _LEFT * (before - 1.0) or not _free_is_listed(own, now, reading):
+    if after - 1.0 > _LEFT * (before - 1.0) or _spoils_a_block(problem, was, own, now):
+        return None
+    if not _free_is_listed(own, now, reading):
         return None
     return replace(reading, before=before, after=after, fit=now, was=was)
 
@@ -270,6 +272,16 @@ def _white(problem: Problem) -> dict[str, float]:
 def _power(problem: Problem, found: Fit) -> float:
     rows, _ = stacked(problem, found.residuals, found.inflation)
     return float(rows @ rows) / max(1, rows.size)
+
+
+def _spoils_a_block(problem: Problem, was: Fit, own: Problem, now: Fit) -> bool:
+    """Whether a reading makes what any block leaves clearly more: the right unit does not, whatever
+    physics is missing beside it.
+    """
+    blocks = [[block] for block in problem.blocks]
+    before = [_power(replace(problem, blocks=one), was) for one in blocks]
+    after = [_power(replace(own, blocks=one), now) for one in blocks]
+    return any(b > _SUSPECT * max(1.0, a) for a, b in zip(before, after, strict=True))
 
 
 def _linear(problem: Problem, rig: Rig, names: Sequence[str]) -> float:
