@@ -132,8 +132,8 @@ class _Question:
 
     @property
     def noise(self) -> dict[str, float]:
-        """Sample noise of the channels that all recordings have [SI]."""
-        common = set.intersection(*(set(p.noise) for p in self.recordings))
+        """Sample noise of the channels that all recordings measure [SI]; simulated have none."""
+        common = set.intersection(*({*p.noise} - {*p.simulated} for p in self.recordings))
         return {
             channel: float(np.median([p.noise[channel] for p in self.recordings]))
             for channel in sorted(common)

@@ -88,8 +88,8 @@ class Block:
         Channel of the temperature of a gas that has one and no thermometer, and that of the room
         [K], at which it begins at rest.
     floating : tuple of str
-        Drives that were simulated, since nobody measured them (a tank's pressure), and whose level
-        is free in each recording.
+        Drives that were simulated, since nobody measured them (a tank's pressure); their level and
+        how far they fall are free in each recording.
     anchor : float or None
         Time after which the pressures that drive it are taken anew inside a window [s]; None:
         never.
@@ -850,17 +850,20 @@ def _begun_off(triangle: Array, inside: Array) -> Array:
 
 
 def _levels(block: Block, core: _core.Rig, prepared: Prepared, prediction: Array) -> list[Array]:
-    """What the level of each simulated drive does to a prediction, and of a temperature a share of
-    the wall's in what the thermometer reads; `core` is the rig as it was in the recording.
+    """What the level of each simulated drive, and how far it falls, does to a prediction, and of a
+    temperature a share of the wall's in what the thermometer reads; `core` is the rig as it was in
+    the recording.
     """
     # a wall is as warm as the room: a share of it makes what the gas does smaller by that share
     columns = [prediction - float(np.mean(prediction))] if block.kind == "temperature" else []
     for name in block.floating:
         value, slope = prepared.signals[name]
-        step = 1e-3 * max(1.0, float(np.abs(value).max()))
-        there = prepared.shaken({name: (value + step, slope)})
-        bare = replace(there, recording=replace(there.recording, parameters={}))
-        columns.append((predicted(block, core, bare) - prediction) / step)
+        # how far it falls goes with the valve's area over the tank's volume, which nobody knows
+        for off, steeper in ((np.ones_like(value), 0.0), (value - value[0], 1.0)):
+            step = 1e-3 * max(1.0, float(np.abs(value).max())) / max(1.0, float(np.abs(off).max()))
+            there = prepared.shaken({name: (value + step * off, slope * (1.0 + step * steeper))})
+            bare = replace(there, recording=replace(there.recording, parameters={}))
+            columns.append((predicted(block, core, bare) - prediction) / step)
     return columns
 
 

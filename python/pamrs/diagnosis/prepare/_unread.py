@@ -108,6 +108,6 @@ def said_of_tanks(rig: Rig, blocks: Sequence[Block], recordings: Sequence[Prepar
         driven = " and ".join(block.name for block in blocks if tank in block.floating)
         said.append(
             f"{tank} was not recorded: {driven} is driven by its simulated course from "
-            f"{begun}; its level is free in each recording"
+            f"{begun}; its level and how far it falls are free in each recording"
         )
     return said
