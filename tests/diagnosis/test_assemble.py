@@ -69,7 +69,7 @@ def test_an_effect_of_two_blocks_is_named_once() -> None:
     assert [e["id"] for e in found.effects if e["probability"] > 0.5] == ["pressure_lag"]
     assert found.text.count("pressure_lag") >= 1
     assert "pressure_lag) and" not in found.text
-    assert found.headline.count("lag of the recorded muscle pressure") == 1
+    assert found.headline.count("pressure lag") == 1
     own = found.effects[0].parameters
     told = [t for t in found.budget if t.id == "pressure_lag"]
     assert told  # with one value each, whichever groups of blocks see it

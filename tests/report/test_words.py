@@ -61,17 +61,15 @@ def seen(*blocks: BlockVerdict, **more: Any) -> Any:
 def test_one_cause_that_two_groups_see_is_told_once() -> None:
     one = group("chamber", "muscle_pressure", 0.93, effects=["encoder_error"])
     two = group("arm", "joint_angle", 0.984, effects=["encoder_error"])
-    told = words.claim(seen(one, two))
-    assert told == (
-        "The model leaves out: encoder error in the chamber, probability 0.93, and in the arm, "
-        "probability 0.98"
-    )
     found = seen(one, two)
+    assert found.headline == (
+        "The model leaves out encoder error in the arm (0.98) and in the chamber (0.93)"
+    )
     assert words.name_chance(found, found.effects[0]) == "0.93 in the chamber, 0.98 in the arm"
-    # another name, or a group that leaves something open, is told by itself
+    # another name is told by itself
     other = group("arm", "joint_angle", 0.9, effects=["muscle_creep"])
-    assert words.claim(seen(one, other)).count("the model leaves out") == 1
-    assert words.claim(seen(one, other)).startswith("The model leaves out: encoder error in the ch")
+    told = "muscle creep in the arm (0.90) and encoder error in the chamber (0.93)"
+    assert seen(one, other).headline == f"The model leaves out {told}"
 
 
 def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:

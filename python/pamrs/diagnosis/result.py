@@ -20,7 +20,7 @@ from pamrs.declared import DEFINITIONS, document, object_of, told
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.errors import DiagnosisError
 from pamrs.findings import VERDICTS, Findings, ModelFile, Trace, fields_from, to_plain
-from pamrs.report import text as words
+from pamrs.report import story
 from pamrs.report.terminal import notebook, summary
 
 __all__ = [
@@ -170,7 +170,7 @@ class Diagnosis(View, Findings):
     @property
     def headline(self) -> str:
         """The verdict in one sentence."""
-        return words.headline(self)
+        return story.headline(self)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the content of the JSON file: exactly the keys of the schema, null for no

@@ -349,7 +349,7 @@ def render(diagnosis: Findings) -> str:
             is_open=words.is_open(diagnosis),
         ),
         title=_typeset(story.title(diagnosis)),
-        headline=_typeset(words.headline(diagnosis)),
+        headline=_typeset(story.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,

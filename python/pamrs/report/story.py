@@ -8,11 +8,18 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
-from pamrs.findings import BlockMismatch, BlockVerdict, EffectFound, EffectParameterFound, Findings
+from pamrs.findings import (
+    HEALTHY,
+    BlockMismatch,
+    BlockVerdict,
+    EffectFound,
+    EffectParameterFound,
+    Findings,
+)
 from pamrs.report import text as words
 from pamrs.units import with_unit
 
-__all__ = ["Rival", "bench_value", "facts", "rivals", "title", "to_do"]
+__all__ = ["Rival", "bench_value", "facts", "headline", "rivals", "title", "to_do"]
 
 LONGEST = 20
 """Words of a title at most."""
@@ -83,10 +90,9 @@ def title(diagnosis: Findings) -> str:
     groups = _answering(diagnosis)
     if not groups:
         return _healthy(diagnosis)
-    if len(groups) > 1 and not diagnosis.off and all(len(_answer(b)) == 1 for b in groups):
-        told = " and ".join(_settled(diagnosis, b) for b in groups[:2])
-        if len(groups) == 2 and len(told.split()) <= LONGEST - 4:
-            return f"The model leaves out {told}"
+    together = _together(diagnosis, groups)
+    if together and len(together.split()) <= LONGEST:
+        return together
     others = _listed([_place(diagnosis, b) for b in groups[1:]], 2, "and")
     ends = (f"; something else in the {others}", "")
     for end in ends if groups[1:] else ("",):
@@ -97,12 +103,44 @@ def title(diagnosis: Findings) -> str:
     return _phrase(diagnosis, groups[0], 0)
 
 
-def _settled(diagnosis: Findings, block: BlockVerdict) -> str:
-    """What a group names, where and how surely: ``muscle leak in the chamber (0.89)``."""
-    (answer,) = _answer(block)
-    chance = _chance(diagnosis, block, answer)
-    name = words.set_label(answer.words) if answer.terms else "something without a name"
-    return f"{name} in the {_place(diagnosis, block)} ({words.format_probability(chance)})"
+def headline(diagnosis: Findings) -> str:
+    """The verdict in one sentence, however long: the title with all answers that are left, and
+    before and behind it sensors and commands that are faulty, what the whole rig misses from its
+    commands alone, and what was not judged.
+
+    Parameters
+    ----------
+    diagnosis : Findings
+        What was found.
+    """
+    first = [entry.text for entry in diagnosis.faulty]
+    if diagnosis.misread:
+        return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
+    groups = _answering(diagnosis)
+    together = _together(diagnosis, groups)
+    told = [_phrase(diagnosis, block, MOST_RIVALS) for block in groups] if not together else []
+    behind = [". ".join(told or [together or title(diagnosis)])]
+    if groups and diagnosis.off:
+        behind.append(words.off_sentence(diagnosis))
+    return ". ".join([*first, "; ".join([*behind, *words.not_judged_words(diagnosis)])])
+
+
+def _together(diagnosis: Findings, groups: Sequence[BlockVerdict]) -> str:
+    """What several groups name, each with its place and how sure it is, where none leaves anything
+    open: ``The model leaves out pressure lag in the arm (0.95) and in the chamber (0.93)``.
+    """
+    if len(groups) < 2 or diagnosis.off or any(len(_answer(b)) > 1 for b in groups):
+        return ""
+    places: dict[str, list[str]] = {}
+    for block in groups:
+        (answer,) = _answer(block)
+        name = words.set_label(answer.words) if answer.terms else "something without a name"
+        where = _with_chance(
+            f"in the {_place(diagnosis, block)}", _chance(diagnosis, block, answer)
+        )
+        places.setdefault(name, []).append(where)
+    named = [f"{name} {_listed(own, len(own), 'and')}" for name, own in places.items()]
+    return f"The model leaves out {_listed(named, len(named), 'and')}"
 
 
 def _chance(diagnosis: Findings, block: BlockVerdict, answer: Hypothesis) -> float:
@@ -132,11 +170,12 @@ def _healthy(diagnosis: Findings) -> str:
         size = words.sized(error.after, error.unit)
         what = words.spoken_name(channel)
         return f"From its commands alone the whole rig misses {what} by {size}"
-    place = words.judged_place(diagnosis)
+    place = words.judged_place(diagnosis) + words.beside_held(diagnosis)
     if diagnosis.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
         return f"No physics is missing{place}: {by}"
-    return f"Nothing is missing{place}: the model explains these recordings down to the noise"
+    how = words.down_to(diagnosis)
+    return f"Nothing is missing{place}: the model explains these recordings {how}"
 
 
 def _listed(names: Sequence[str], most: int, last: str) -> str:
@@ -150,41 +189,50 @@ def _listed(names: Sequence[str], most: int, last: str) -> str:
 def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
     """What the answers of a group that are left share, and at most so many of their names."""
     left = _answer(block)
-    place = _place(diagnosis, block)
-    named = [h for h in left if h.terms]
-    # what the whole rig still misses says nothing against names that are open anyway
-    doubt = NONE in left or PARAMETERS in left or (bool(diagnosis.off) and len(left) == 1)
-    values = [term.is_value for h in named for term in h.terms]
+    values = [term.is_value for h in left for term in h.terms]
     if len(left) == 1 and values and all(values):
         wrong = [w for w in diagnosis.wrong_parameters if w.name in left[0].words]
         off = _listed(list(map(words.sentence_of, wrong)), max(most, 1), "and")
         return f"The rig file is wrong: {off}"
-    if not named:
-        if _chance(diagnosis, block, left[0]) < words.SETTLED:
-            return f"Something acts in the {place}, and nothing is probable enough to be named"
-        return f"Something acts in the {place} that no effect of the catalogue explains"
-    kinds = [{EFFECTS[t.id].shares for t in h.terms if not t.is_value} for h in named]
-    shared = sorted(set.intersection(*kinds) - {""})
-    if left[0] in (NONE, PARAMETERS):
-        head = f"Values may explain what the {place} misses; not ruled out"
-        head = (
-            f"The model of the {place} may be complete; not ruled out" if left[0] == NONE else head
-        )
-    elif any(values):
-        file = f"The rig file {'may be' if doubt else 'is'} wrong about the {place}"
-        head = f"The {place} {'may differ' if doubt else 'differs'} from model and rig file"
-        head = file if all(values) and UNLISTED not in left else head
-    elif shared and UNLISTED not in left:
-        head = f"The model of the {place} {'may leave' if doubt else 'leaves'} out {shared[0]}"
-    else:
-        acts = "may act" if doubt else "acts"
-        head = f"Something {acts} in the {place} that the model leaves out"
-    told = [
-        f"{words.set_label(h.words)} ({words.format_probability(_chance(diagnosis, block, h))})"
-        for h in left
-        if h not in (NONE, PARAMETERS)
-    ]
-    return f"{head}: {_listed(told, most, 'or')}" if most else head
+    chances = {h: _chance(diagnosis, block, h) for h in left if h not in (NONE, PARAMETERS)}
+    if left == [UNLISTED]:
+        if not chances[UNLISTED] < words.SETTLED:
+            acts = f"Something acts in the {_place(diagnosis, block)}"
+            explains = "that no effect of the catalogue explains"
+            return _with_chance(f"{acts} {explains}", chances[UNLISTED])
+        ranked = words.ranked_probabilities(block.probabilities, most)
+        chances = {Hypothesis.parse(key): p for key, p in ranked if key not in HEALTHY}
+    head = _head(diagnosis, block, left)
+    told = [_with_chance(words.set_label(h.words), p) for h, p in chances.items()]
+    return f"{head}: {_listed(told, most, 'or')}" if most and told else head
+
+
+def _with_chance(text: str, chance: float) -> str:
+    """Something with its probability behind it, where that is known."""
+    return f"{text} ({words.format_probability(chance)})" if words.is_number(chance) else text
+
+
+def _head(diagnosis: Findings, block: BlockVerdict, left: Sequence[Hypothesis]) -> str:
+    """What the answers of a group that are left share, in words."""
+    place = _place(diagnosis, block)
+    if left == [UNLISTED]:
+        return f"Something acts in the {place}, and nothing is probable enough to be named"
+    if left[0] == NONE:
+        return f"The model of the {place} may be complete; not ruled out"
+    if left[0] == PARAMETERS:
+        return f"Values may explain what the {place} misses; not ruled out"
+    # what the whole rig still misses says nothing against names that are open anyway
+    doubt = NONE in left or PARAMETERS in left or (bool(diagnosis.off) and len(left) == 1)
+    values = [term.is_value for h in left for term in h.terms]
+    if any(values):
+        if all(values) and UNLISTED not in left:
+            return f"The rig file {'may be' if doubt else 'is'} wrong about the {place}"
+        return f"The {place} {'may differ' if doubt else 'differs'} from model and rig file"
+    kinds = [{EFFECTS[t.id].shares for t in h.terms} for h in left if h.terms]
+    shared = sorted(set.intersection(*kinds) - {""}) if kinds else []
+    if shared and UNLISTED not in left:
+        return f"The model of the {place} {'may leave' if doubt else 'leaves'} out {shared[0]}"
+    return f"Something {'may act' if doubt else 'acts'} in the {place} that the model leaves out"
 
 
 def _missing(block: BlockVerdict) -> float:

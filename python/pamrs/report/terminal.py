@@ -19,7 +19,7 @@ _ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
 
 def summary(diagnosis: Findings) -> str:
     """Return the result as plain text for a terminal, about 20 lines."""
-    lines = [f"Diagnosis of {diagnosis.case}", *textwrap.wrap(words.headline(diagnosis) + ".", 96)]
+    lines = [f"Diagnosis of {diagnosis.case}", *textwrap.wrap(story.headline(diagnosis) + ".", 96)]
     left_out = words.left_out_sentence(diagnosis)
     lines += textwrap.wrap(left_out + "." * bool(left_out), 96, subsequent_indent="  ")
     where = diagnosis.where.text
@@ -169,7 +169,7 @@ def notebook(diagnosis: Findings) -> str:
     closed = f"<p>{html.escape(mended)}, on {diagnosis.proof}.</p>" if mended else ""
     where = html.escape(diagnosis.where.text)
     return (
-        f"<div><p><b>{html.escape(words.headline(diagnosis))}.</b></p><p>{where}</p>"
+        f"<div><p><b>{html.escape(story.headline(diagnosis))}.</b></p><p>{where}</p>"
         f"<table>{rows}</table>{closed}"
         "<p><code>.report(&quot;report.html&quot;)</code> writes the whole story.</p></div>"
     )

@@ -10,7 +10,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple, TypeGuard
 
 from pamrs.channels import unit_of
-from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis, Term, effect_of
+from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of
 from pamrs.findings import (
     HEALTHY,
     BlockVerdict,
@@ -28,6 +28,7 @@ from pamrs.rig.schema import BLOCKS
 from pamrs.units import with_unit
 
 __all__ = [
+    "beside_held",
     "blocks_label",
     "BUDGET_NOTE",
     "SETTLED",
@@ -36,9 +37,9 @@ __all__ = [
     "budgets",
     "chance_of",
     "chance_of_named",
-    "claim",
     "considered_sentence",
     "data_sentence",
+    "down_to",
     "display_unit",
     "effect_heading",
     "effect_name",
@@ -48,7 +49,6 @@ __all__ = [
     "format_probability",
     "format_share",
     "format_uncertain",
-    "headline",
     "hypothesis_label",
     "is_named",
     "is_number",
@@ -62,7 +62,6 @@ __all__ = [
     "mended_sentence",
     "miss",
     "miss_of",
-    "moved_parameters",
     "name_chance",
     "noise_alone",
     "not_judged_words",
@@ -283,18 +282,6 @@ def is_named(block: BlockVerdict, hypothesis: str) -> bool:
     return Hypothesis.parse(hypothesis) == Hypothesis.of(named)
 
 
-def moved_parameters(diagnosis: Findings, least: float = 1.0) -> list[str]:
-    """Names of identifiable parameters that moved by at least `least` tolerances, farthest
-    first.
-    """
-    moved = [
-        (abs(p.moved_sigmas), name)
-        for name, p in diagnosis.parameters.items()
-        if is_number(p.moved_sigmas) and p.identifiable is not False
-    ]
-    return [name for size, name in sorted(moved, reverse=True) if size >= least]
-
-
 def sentence_of(wrong: WrongParameter) -> str:
     """What the rig file says of a parameter and what the recordings say:
     ``chamber dead volume is 360 +- 5 cm3, not 150 +- 23``.
@@ -431,67 +418,6 @@ def _shared(one: str, other: str) -> int:
     return max(ends, default=0)
 
 
-def headline(diagnosis: Findings) -> str:
-    """One sentence that states the verdict: what is found, in the order of :func:`claim`, what
-    stays unexplained, and what was not judged.
-    """
-    told = [claim(diagnosis)]
-    kept = [kept_sentence(u) for u in _kept(diagnosis)[:2]]
-    told += [text for text in kept if text.casefold() not in told[0].casefold()]
-    return "; ".join([*told, *not_judged_words(diagnosis)])
-
-
-def claim(diagnosis: Findings) -> str:
-    """The headline without what stays unexplained beside it, and without what was not judged: what
-    a sensor or logger spoiled, what the whole rig misses from its commands alone, then the blocks,
-    that with the largest mismatch first.
-    """
-    read = "; ".join(reading.text for reading in diagnosis.misread)
-    first = [entry.text for entry in diagnosis.faulty] + [read] * bool(read)
-    if read:
-        return ". ".join(first)
-    off = off_sentence(diagnosis)
-    found = _claims(diagnosis)
-    # where something has no name anyway, that is the answer, and the whole rig stands beside it
-    told = [found, off] if diagnosis.verdict == "unlisted" else [off, found]
-    text = "; ".join(filter(None, told))
-    return ". ".join([*first, text[:1].upper() + text[1:]])
-
-
-def _claims(diagnosis: Findings) -> str:
-    """What is found in each block, the largest mismatch first; blocks without a name up to the last
-    that has one.
-    """
-    blocks = told_blocks(diagnosis)
-    named = [b for b in blocks if b.effects or b.wrong_parameters]
-    doubtful = [b for b in blocks if b.verdict == "unlisted" and len(b.ambiguity) > 1]
-    if not named and not doubtful:
-        return _unnamed(diagnosis)
-    found = [
-        (max(map(_size, blocks)), _found(diagnosis, *blocks))
-        for blocks in _alike(sorted(named, key=lambda b: not b.effects))
-    ]
-    found += [(_size(block), _found(diagnosis, block)) for block in doubtful]
-    least = min(size for size, _ in found)
-    found += [(u.noises, kept_sentence(u)) for u in _kept(diagnosis)[:2] if u.noises > least]
-    return "; ".join(dict.fromkeys(text for _, text in sorted(found, key=lambda own: -own[0])))
-
-
-def _kept(diagnosis: Findings) -> list[Unexplained]:
-    """What blocks without a name keep, where no sets of names are left open instead."""
-    open_ = {n for b in told_blocks(diagnosis) if len(b.ambiguity) > 1 for n in b.blocks}
-    return [u for u in diagnosis.unexplained if u.verdict == "unlisted" and u.block not in open_]
-
-
-def _size(block: BlockVerdict) -> float:
-    """The largest mismatch of a group before anything is named, in noise levels: nothing of what
-    is no more than noise; without bound where a result does not say.
-    """
-    sizes = [m.fitted.refit for m in block.mismatch]
-    own = [size.noises for size in sizes if size.more_than_noise]
-    return max(own, default=0.0 if sizes else math.inf)
-
-
 def off_sentence(diagnosis: Findings) -> str:
     """What the whole rig misses from its commands alone, in words; empty where it misses no more
     than noise and the uncertainty of its values explain.
@@ -515,17 +441,6 @@ def not_judged_words(diagnosis: Findings) -> list[str]:
         reasons.setdefault(block.reason, []).append(own)
     told = [f"{' and '.join(names)} ({why})" for why, names in reasons.items()]
     return [f"not judged: {'; '.join(told)}"] if told else []
-
-
-def _alike(blocks: Sequence[BlockVerdict]) -> list[list[BlockVerdict]]:
-    """Groups of blocks that name the same and leave nothing else open, side by side: one cause that
-    several groups see (an encoder, of what it moves and of the air that this moves).
-    """
-    found: dict[Any, list[BlockVerdict]] = {}
-    for k, block in enumerate(blocks):
-        names = frozenset((*block.effects, *block.wrong_parameters))
-        found.setdefault(k if len(block.ambiguity) > 1 else names, []).append(block)
-    return list(found.values())
 
 
 def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
@@ -555,64 +470,6 @@ def _place(diagnosis: Findings, block: BlockVerdict) -> str:
         worst = max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
         located = worst.block if worst else next(iter(block.blocks), None)
     return f" in the {spoken_name(located)}" if located else ""
-
-
-def _found(diagnosis: Findings, block: BlockVerdict, *others: BlockVerdict) -> str:
-    """What was found in one group of blocks, and in others that name the same."""
-    place = _place(diagnosis, block)
-    if len(block.ambiguity) > 1:
-        if where := _places(block, place):
-            return where
-        rivals = "these recordings cannot tell " + told_apart(block.ambiguity, block.probabilities)
-        left = [Hypothesis.of(words) for words in block.ambiguity]
-        of_file = [term.is_value for hypothesis in left for term in hypothesis.terms]
-        healthy = NONE in left or PARAMETERS in left
-        if all(of_file) and not any(h.rest == UNLISTED.rest for h in left):
-            return f"the rig file {'may be' if healthy else 'is'} wrong: {rivals}"
-        if healthy:
-            return f"physics may be missing{place}: {rivals}"
-        if any(of_file):
-            return f"physics is missing{place}, or the rig file is wrong: {rivals}"
-        return f"physics is missing{place}: {rivals}"
-    told = {e.term: effect_name(e) for e in diagnosis.effects}
-    if block.effects:
-        names = " and ".join(told.get(e) or label(e) for e in block.effects)
-        return f"the model leaves out: {names}{place}{_seen_in(diagnosis, block, others)}"
-    wrong = {w.name: w for w in diagnosis.wrong_parameters}
-    values = " and ".join(sentence_of(wrong[name]) for name in block.wrong_parameters)
-    seen = f", seen{place}" if others else ""
-    return f"the rig file is wrong: {values}{seen}{_seen_in(diagnosis, block, others)}"
-
-
-def _seen_in(diagnosis: Findings, block: BlockVerdict, others: Sequence[BlockVerdict]) -> str:
-    """How sure a group is of what it names, and each other one that names the same: ``, probability
-    0.99, and in the chamber, probability 0.93``.
-    """
-    told = _how_sure(chance_of_named(diagnosis, block))
-    for other in others:
-        told += f", and{_place(diagnosis, other)}{_how_sure(chance_of_named(diagnosis, other))}"
-    return told
-
-
-def _places(block: BlockVerdict, place: str) -> str:
-    """That one effect is missing and only where it acts is open, with its probability wherever that
-    is; empty where something else is open.
-    """
-    left = [Hypothesis.of(words) for words in block.ambiguity if words != [UNLISTED.rest]]
-    terms = [term for hypothesis in left for term in hypothesis.terms]
-    several = len(terms) > 1 and all(len(hypothesis.words) == 1 for hypothesis in left)
-    if not several or len(terms) != len(left) or len({term.id for term in terms}) > 1:
-        return ""
-    chances = [chance_of(block.probabilities, hypothesis.words) for hypothesis in left]
-    info = terms[0].info
-    places = [
-        f"at {term.at or info.everywhere} ({format_probability(p)})"
-        for term, p in zip(terms, chances, strict=True)
-    ]
-    return (
-        f"the model leaves out: {info.name}{place}{_how_sure(sum(chances))}, and "
-        f"these recordings cannot tell whether {', '.join(places[:-1])} or {places[-1]}"
-    )
 
 
 def chance_of(probabilities: Mapping[str, float], names: Sequence[str]) -> float:
@@ -786,10 +643,6 @@ def is_open(diagnosis: Findings) -> bool:
     return diagnosis.verdict == "unlisted" and leading(diagnosis)[1] < SETTLED
 
 
-def _how_sure(chance: float) -> str:
-    return f", probability {format_probability(chance)}" if is_number(chance) else ""
-
-
 def told_apart(sets: list[list[str]], probabilities: Mapping[str, float]) -> str:
     """Hypotheses that are left, the most probable first: ``a (0.80) from b (0.12)``, ``a (0.50), b
     (0.30) and c (0.20) apart``.
@@ -827,40 +680,24 @@ def _answer(names: list[str], chance: float = math.nan) -> str:
     return f"{text} ({format_probability(chance)})" if is_number(chance) else text
 
 
-def _unnamed(diagnosis: Findings) -> str:
-    """The headline of a diagnosis without a name."""
-    block = diagnosis.where.block
-    place = f" in the {spoken_name(block)}" if block else ""
-    doubtful = [s for s in diagnosis.ambiguity if s not in (["none"], ["parameters"])]
-    chances = open_chances(diagnosis)
-    rivals = " or ".join(_answer(s, chance_of(chances, s)) for s in doubtful)
-    if diagnosis.verdict == "none" and doubtful:
-        return (
-            "The model explains these recordings down to the noise level, but they cannot rule out "
-            f"{rivals}{place}"
-        )
-    beside = _beside_held(diagnosis)
-    if diagnosis.verdict == "none":
-        return (
-            f"Nothing is missing{judged_place(diagnosis)}{beside}: the model explains these "
-            "recordings down to the noise level"
-        )
-    if diagnosis.verdict == "parameters" and doubtful:
-        return (
-            "Parameter values may explain the difference; these recordings cannot rule out "
-            f"{rivals}{place}"
-        )
-    if diagnosis.verdict == "parameters":
-        moved = [spoken_name(n) for n in moved_parameters(diagnosis)[:3]]
-        which = f": {', '.join(moved)}" if moved else ""
-        place = judged_place(diagnosis)
-        return (
-            f"No physics is missing{place}{beside}; parameter values explain the difference{which}"
-        )
-    if len(doubtful) > 1:
-        apart = told_apart(doubtful, chances)
-        return f"Physics is missing{place}: these recordings cannot tell {apart}"
-    return _outside(diagnosis, place)
+def down_to(diagnosis: Findings) -> str:
+    """How closely a model without anything missing explains the recordings: ``down to the noise
+    level``, or to within the error that is taken for its own where it misses more than noise.
+    """
+    errors = diagnosis.fit.held_out or diagnosis.fit.channels
+    missed = [
+        (found.noises, found.size, own)
+        for block in diagnosis.judged
+        for own in block.mismatch
+        if (found := miss(diagnosis, own.channel, "after"))
+        and found.noises > _MORE_THAN_NOISE
+        and own.model_error > errors[own.channel].noise
+    ]
+    if not missed:
+        return "down to the noise level"
+    _, size, own = max(missed, key=lambda each: each[0])
+    usual = sized(own.model_error, own.unit)
+    return f"to within its usual error ({spoken_name(own.channel)} {size} of {usual})"
 
 
 def judged_place(diagnosis: Findings) -> str:
@@ -870,29 +707,12 @@ def judged_place(diagnosis: Findings) -> str:
     return f" in the {' and '.join(blocks_label(block) for block in diagnosis.judged)}"
 
 
-def _beside_held(diagnosis: Findings) -> str:
+def beside_held(diagnosis: Findings) -> str:
     """The effects that the model had before: `` in addition to the leak that the model holds``."""
     ids = [term.id for term in diagnosis.budget if term.kind == "held"]
     ids += [effect.id for name in diagnosis.parameters if (effect := effect_of(name))]
     held = [f"the {label(i)}" for i in dict.fromkeys(ids) if i in EFFECTS]
     return f" in addition to {' and '.join(held)} that the model holds" if held else ""
-
-
-def _outside(diagnosis: Findings, place: str) -> str:
-    """That something has no name, no more surely than its probability allows."""
-    chance = leading(diagnosis)[1]
-    if not chance < SETTLED:
-        return f"Physics outside the catalogue acts{place or ' on this rig'}{_how_sure(chance)}"
-    rivals = [
-        (key, p)
-        for key, p in ranked_probabilities(diagnosis.probabilities, len(diagnosis.probabilities))
-        if key not in (*HEALTHY, "unlisted")
-    ]
-    others = " or ".join(_answer(Hypothesis.parse(key).words, p) for key, p in rivals[:2])
-    return (
-        f"Physics is missing{place}, and nothing is probable enough to be named: "
-        f"{_answer(['unlisted'], chance)}{f', {others}' if others else ''}"
-    )
 
 
 def term_label(term: BudgetTerm) -> str:
@@ -1007,6 +827,8 @@ def format_interval(interval: Sequence[float]) -> str:
     return " to ".join(_percent(share) for share in interval)
 
 
+_MORE_THAN_NOISE = 2.0
+"""[noise levels] Error of a channel that is not called noise."""
 _TOLD_LOGS = 3
 """Recordings of which a summary says what was left out."""
 

@@ -7,6 +7,7 @@ from pamrs.findings import BlockVerdict, Findings
 from pamrs.recordings import Case
 from pamrs.report.text import (
     display_unit,
+    down_to,
     effect_name,
     format_number,
     format_probability,
@@ -73,7 +74,7 @@ def _of_blocks(
     if kind == "none":
         text = (
             f"These recordings show no missing physics{judged_place(diagnosis)}: the nominal model "
-            f"predicts {_every(diagnosis)} down to the noise level."
+            f"predicts {_every(diagnosis)} {down_to(diagnosis)}."
         )
         return text + _unsettled(diagnosis)
     if kind == "parameters" and diagnosis.wrong_parameters:
@@ -88,7 +89,7 @@ def _of_blocks(
         return (
             f"These recordings show no missing physics{judged_place(diagnosis)}, but parameters "
             "differ from their nominal values. With values inside their tolerances the model "
-            f"predicts {_every(diagnosis)} down to the noise level. Moved most: {moved}."
+            f"predicts {_every(diagnosis)} {down_to(diagnosis)}. Moved most: {moved}."
             + _unsettled(diagnosis)
         )
     place = diagnosis.where.text
