@@ -5,7 +5,6 @@ missing beside them is named.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -96,7 +95,7 @@ def test_the_command_goes_on_from_the_model_that_it_wrote(
     model, further = tmp_path / "found" / "model.toml", tmp_path / "found" / "further.toml"
     model.parent.mkdir()
     with monkeypatch.context() as first:
-        first.setattr(pamrs.diagnosis, "diagnose", lambda case, consider, progress: found)
+        first.setattr(pamrs.diagnosis, "diagnose", lambda case, settings, consider, progress: found)
         assert cli.main(["diagnose", str(home), "--model", str(model)]) == 0
     assert "muscle_hysteresis" in model.read_text(encoding="utf-8")
     assert pamrs.load_rig(model).case == "../case"
@@ -119,7 +118,7 @@ def test_the_command_takes_another_rig(tmp_path, capsys, monkeypatch) -> None:
 
     seen = []
 
-    def noted(case: pamrs.Case, consider: Sequence[str], progress: object) -> pamrs.Diagnosis:
+    def noted(case: pamrs.Case, **options: object) -> pamrs.Diagnosis:
         seen.append(case)
         raise pamrs.DiagnosisError("enough")
 

@@ -27,6 +27,8 @@ NOISE = {"supply_pressure": 400.0, "muscle_pressure": 400.0, "joint_angle": 3e-4
 SECONDS = 15.0
 LIMIT = 1.1  # of the excess that noise has
 
+PERFECT = pamrs.DiagnosisSettings(usual_error=0.0)
+
 
 def shoulder_case(truth: pamrs.Rig, fitted: int = 2, speed: float = 1.0) -> pamrs.Case:
     """A shoulder's recordings with the noise of transducers: some to fit, one held out."""
@@ -49,9 +51,8 @@ def shoulder_case(truth: pamrs.Rig, fitted: int = 2, speed: float = 1.0) -> pamr
 
 
 def test_an_effect_below_the_noise_is_named() -> None:
-    found = pamrs.diagnose(
-        shoulder_case(pamrs.rigs.shoulder().with_effect("valve_dead_zone", {"half_width": 8e-4}))
-    )
+    truth = pamrs.rigs.shoulder().with_effect("valve_dead_zone", {"half_width": 8e-4})
+    found = pamrs.diagnose(shoulder_case(truth), settings=PERFECT)
     assert found.effects[0]["id"] == "valve_dead_zone"
     # the leakage past the closed spool, in its hyperbolic form, nearly does the same
     assert 0.55 < found.probabilities["valve_dead_zone"] < 0.95
@@ -267,7 +268,7 @@ def test_a_parameter_that_only_held_out_recordings_show_is_a_parameter(
     truth = nominal.with_parameters({"arm.viscous": known.value + 2.0 * known.tol})
     slow, fast = shoulder_case(truth, speed=0.02), shoulder_case(truth, speed=2.0)
     case = pamrs.Case("unseen", nominal, [*slow.recordings[:2], fast.recordings[2]], Path())
-    found = pamrs.diagnose(case, progress=said.append)
+    found = pamrs.diagnose(case, progress=said.append, settings=PERFECT)
     assert "arm: one baseline leaves noise in all recordings" in said
     assert found.verdict == "parameters"
     assert abs(found.parameters["arm.viscous"]["moved_sigmas"] - 2.0) < 0.2

@@ -13,11 +13,19 @@ from numpy.typing import NDArray
 import pamrs
 from pamrs.diagnosis.evidence import significant
 from pamrs.diagnosis.fit import Problem, residuals
-from pamrs.diagnosis.noise import Excess, excess, noise_levels
+from pamrs.diagnosis.noise import (
+    Excess,
+    error_sizes,
+    excess,
+    model_error,
+    noise_levels,
+    with_sizes,
+)
 from pamrs.diagnosis.noise._discrepancy import _flowing, whitening
 from pamrs.diagnosis.prepare import Residual, available_blocks, binned, prepare
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.recordings import Recording
+from pamrs.rig import parse_rig
 from pamrs.simulation import core_rig
 from tests.diagnosis.noisy import whole
 
@@ -46,16 +54,21 @@ def recorded(seed: int) -> tuple[Recording, Array]:
 
 def judged(off: list[Array], stated: dict[str, dict[str, float]]) -> Excess:
     """What the arm keeps where the encoder reads so much too much [rad], a recording each."""
+    problem = arm(off)
+    level = noise_levels(problem, problem.core, stated)
+    left = residuals(problem, RIG)
+    return excess(problem.blocks[0], problem.recordings, left, level, SETTINGS)
+
+
+def arm(off: list[Array]) -> Problem:
+    """The arm in recordings whose encoder reads so much too much [rad]."""
     recordings = []
     for seed, more in enumerate(off):
         found, _ = recorded(seed)
         channels = found.channels | {"joint_angle": found.channels["joint_angle"] + more}
         recordings.append(prepare(replace(found, channels=channels), RIG, SETTINGS))
     blocks = [b for b in available_blocks(RIG, tuple(NOISE)) if b.channel == "joint_angle"]
-    core = core_rig(RIG)
-    problem = Problem(blocks, recordings, core, SETTINGS)
-    level = noise_levels(problem, core, stated)
-    return excess(blocks[0], recordings, residuals(problem, RIG), level, SETTINGS)
+    return Problem(blocks, recordings, core_rig(RIG), SETTINGS)
 
 
 def smooth(seed: int) -> Array:
@@ -91,6 +104,33 @@ def test_what_is_no_curve_over_the_reading_is_not_hidden_by_the_stated_error() -
     curve = judged([smooth(0), smooth(1)], SIZE)
     assert significant(play)
     assert play.ratio > 3.0 * curve.ratio
+
+
+@pytest.mark.parametrize(
+    ("share", "low", "high"), [(0.0, 0.0, 0.03), (0.1, 0.03, 0.2), (1.0, 0.7, 1.0)]
+)
+def test_the_size_of_an_error_is_found(share: float, low: float, high: float) -> None:
+    problem = arm([share * smooth(0), share * smooth(1)])
+    level = noise_levels(problem, problem.core, SIZE)
+    (size,) = error_sizes(problem, residuals(problem, RIG), level)[0].values()
+    assert low <= size <= high
+    found = with_sizes(level, {"arm": size})
+    (block,) = problem.blocks
+    left = excess(block, problem.recordings, residuals(problem, RIG), found, SETTINGS)
+    assert not significant(left)
+    same = with_sizes(level, {"arm": 1.0})
+    assert all(same[key].binned == pytest.approx(level[key].binned) for key in level)
+
+
+def test_what_the_file_states_takes_the_place_of_the_usual_error() -> None:
+    usual = model_error(RIG, 0.01)
+    assert usual["muscle"] == {"share": 0.01}
+    assert usual["joint_angle"] == {"share": pytest.approx(0.001)}
+    assert model_error(RIG, 0.0) == {}
+    text = RIG.to_toml_text() + '\n[model_error]\nmuscle = "3 %"\n'
+    stated = model_error(parse_rig(text), 0.01)
+    assert stated["muscle"] == {"share": pytest.approx(0.03)}
+    assert stated["valve"] == {"share": 0.01}
 
 
 def test_one_curve_acts_in_all_recordings() -> None:

@@ -159,7 +159,10 @@ def test_a_push_is_found_beside_a_persistent_effect() -> None:
         "muscle_hysteresis", {"friction_pressure": 1e-4, "presliding": 0.003}
     )
     records = recordings("external_torque", {"torque": 5.0, "duration": 0.8}, plant=plant)
-    found = pamrs.diagnose(pamrs.Case("both", pamrs.rigs.shoulder(), records, Path()))
+    # what such pushes leave beside the first name is inside what a model is usually off by
+    perfect = pamrs.DiagnosisSettings(usual_error=0.0)
+    both = pamrs.Case("both", pamrs.rigs.shoulder(), records, Path())
+    found = pamrs.diagnose(both, settings=perfect)
     assert found.probabilities["external_torque+muscle_hysteresis"] > 0.5
     (push,) = [e for e in found.effects if e["id"] == "external_torque"]
     largest = {

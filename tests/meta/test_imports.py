@@ -47,7 +47,16 @@ LAYERS = (
 )
 #: The same inside the diagnosis: its steps, then the result, what is said of it, and who runs it.
 STEPS = ("settings", "prepare", "fit", "noise", "screen", "evidence", "search", "model")
-STEPS_OF_A_DIAGNOSIS = (*STEPS, "next_experiment", "result", "schema", "explain", "", "prove")
+STEPS_OF_A_DIAGNOSIS = (
+    *STEPS,
+    "ready",
+    "next_experiment",
+    "result",
+    "schema",
+    "explain",
+    "",
+    "prove",
+)
 #: Names that a module may take from the root package, which loads all others on first use.
 FROM_ROOT = {"_core", "__version__"}
 

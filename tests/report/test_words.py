@@ -165,3 +165,20 @@ def test_conditions_count_nothing_twice() -> None:
     assert [c.share for c in found] == pytest.approx([190 / 220, 30 / 220])
     assert found[1].text.startswith("otherwise at rest: 14 % of the excess over the noise, in 10 %")
     assert not _shares(masks, np.zeros(100), rising=False)
+
+
+def test_a_miss_inside_the_usual_error_of_a_model_is_said_so() -> None:
+    """The arm misses ten noises where its model is usually off by twelve."""
+    own = group("arm", "joint_angle", 0.9)
+    (mismatch,) = own.mismatch
+    errors = {"joint_angle": dict(zip(KEYS, (0.001, 0.02, 0.01, 0.01), strict=True))}
+    fit = {"channels": errors, "held_out": {}, "gap_closed": None}
+    for error, told in (
+        (0.012, "to within its usual error (joint angle 0.57 deg of 0.69 deg)"),
+        (0.0, "down to the noise level"),
+    ):
+        quiet = replace(own, verdict="none", mismatch=[replace(mismatch, model_error=error)])
+        found = synthetic.diagnosis(
+            blocks=[quiet], verdict="none", effects=[], probabilities={"none": 1.0}, fit=fit
+        )
+        assert story.title(found).endswith(f"the model explains these recordings {told}")

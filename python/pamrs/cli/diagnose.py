@@ -71,6 +71,16 @@ def diagnose_command(
             )
         ),
     ] = None,
+    perfect_model: Annotated[
+        bool,
+        typer.Option(
+            "--perfect-model",
+            help=(
+                "The model is exact but for what its file says: without it each block may be off "
+                "by a smooth curve of 1 % or of what [model_error] states."
+            ),
+        ),
+    ] = False,
     allow_outside: Annotated[
         bool,
         typer.Option(
@@ -112,8 +122,10 @@ def diagnose_command(
     if plan is not None:
         if case is not None or rig is not None:
             raise typer.BadParameter("give a case (with or without --rig) or --plan, not both")
-        if consider:
-            raise typer.BadParameter("--consider needs a case: --plan has no recordings to judge")
+        if consider or perfect_model:
+            raise typer.BadParameter(
+                "--consider and --perfect-model need a case: --plan has no recordings to judge"
+            )
         if any(path is not None for path in (report, pdf, png, model, experiment)):
             raise typer.BadParameter("--plan writes text and --json only")
         _plan(plan, channels, pressure_noise, angle_noise, force_noise, json)
@@ -134,10 +146,11 @@ def diagnose_command(
         from pamrs.rig import load_rig
 
         loaded = loaded.with_rig(load_rig(rig), rig)
-    from pamrs.diagnosis import diagnose
+    from pamrs.diagnosis import DiagnosisSettings, diagnose
 
+    settings = DiagnosisSettings(usual_error=0.0) if perfect_model else None
     with progress(f"diagnosing {loaded.name}") as say:
-        result = diagnose(loaded, consider=consider or (), progress=say)
+        result = diagnose(loaded, settings=settings, consider=consider or (), progress=say)
     protocol = result.next_experiment.protocol
     if experiment is not None and protocol is None:
         typer.echo(

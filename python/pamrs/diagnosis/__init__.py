@@ -8,9 +8,9 @@ other and with "unlisted" on held-out recordings.
 
 Public are `diagnose`, `Diagnosis`, `DiagnosisSettings`, and these packages and modules, each with
 its own list: `settings` (every number that steers a verdict), `result` and `schema` (what is
-returned), `prove` (many cases, each in a process of its own), and the steps in the order in which
-they work: `prepare`, `fit`, `noise`, `screen`, `evidence`, `search`, `model`, `next_experiment`,
-`explain`.
+returned), `prove` (many cases, each in a process of its own), `ready` (what is looked at before any
+fit), and the steps in the order in which they work: `prepare`, `fit`, `noise`, `screen`,
+`evidence`, `search`, `model`, `next_experiment`, `explain`.
 """
 
 from __future__ import annotations
@@ -238,8 +238,8 @@ def diagnose(
             inner, outer, moved = laid or (inner, outer, [])
             diagnosis, inner, unjudged = _physics(case, inner, outer, unjudged, say)
     # the first few are all that a terminal shows: first what may make the answer wrong
-    warnings = [*inner.losses.told, *ready.suspected, *diagnosis.warnings]
-    warnings += [*ready.told, *begun, *moved]
+    warnings = [*inner.losses.told, *ready.suspected, *ready.told, *diagnosis.warnings]
+    warnings += [*ready.masked, *begun, *moved]
     if not math.isfinite(sum(diagnosis.probabilities.values())):
         raise DiagnosisError("the probabilities are not finite: please report this case")
     say(f"{case.name}: done", 1.0)

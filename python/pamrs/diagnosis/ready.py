@@ -14,6 +14,7 @@ from pamrs.diagnosis.prepare import (
     Block,
     at_ambient,
     blocks_beside_tanks,
+    check_commands,
     check_plausible,
     noted_units,
     own_of_rig,
@@ -50,8 +51,8 @@ class Ready:
         Blocks of the rig that its channels surround.
     suspected : list of str
         Units and columns to be looked at.
-    told : list of str
-        What was masked, left out or taken as known.
+    told, masked : list of str
+        What is no proof or taken as known; and samples that were masked.
     faulty : list of Faulty
         Sensors and commands that are dead or at the end of their range.
     """
@@ -60,6 +61,7 @@ class Ready:
     blocks: list[Block]
     suspected: list[str]
     told: list[str]
+    masked: list[str]
     faulty: list[Faulty]
 
 
@@ -90,17 +92,19 @@ def readied(case: Case, settings: DiagnosisSettings) -> Ready:
         case, held = _nominal(case, settings)
         alive, dead = without_dead_commands(case.recordings, case.rig)
         case = replace(case, recordings=alive)
+        for recording in case.recordings:
+            check_commands(recording, case.rig, core_rig(case.rig).inputs)
         check_plausible(case.recordings, case.rig, case.name, settings)
     except DiagnosisError as error:
         raise DiagnosisError("\n".join([str(error), *suspected])) from error
-    case, clipped, masked = _sound(case, settings)
+    case, clipped, copies, masked = _sound(case, settings)
     blocks = blocks_beside_tanks(case.rig, case.channels)
     if not blocks:
         raise DiagnosisError(
             f"case {case.name!r}: its channels ({', '.join(case.channels)}) do not surround any "
             f"block of the rig ({', '.join(case.rig.blocks)}); measure {_wanted(case.rig)}"
         )
-    return Ready(case, blocks, suspected, [*masked, *held], [*dead, *clipped])
+    return Ready(case, blocks, suspected, [*copies, *held], masked, [*dead, *clipped])
 
 
 def _check_rig(case: Case) -> None:
@@ -132,15 +136,17 @@ def _nominal(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[str]]:
     return replace(case, rig=without_passing(rig)), told
 
 
-def _sound(case: Case, settings: DiagnosisSettings) -> tuple[Case, list[Faulty], list[str]]:
+def _sound(
+    case: Case, settings: DiagnosisSettings
+) -> tuple[Case, list[Faulty], list[str], list[str]]:
     """The case with what its recordings cannot have measured masked or left out; what is said of
-    sensors whose range ends, and of the rest.
+    sensors whose range ends, of copies, and of the rest.
     """
     kept, clipped = without_rails(case.recordings)
     kept, masked = without_impossible(kept, case.rig, settings)
     kept, copies = without_copies(kept)
     kept, unread = without_poor_thermometers(kept, case.rig)
-    return replace(case, recordings=kept), clipped, [*copies, *masked, *unread]
+    return replace(case, recordings=kept), clipped, copies, [*masked, *unread]
 
 
 def _said_of_inlets(rig: Rig, channels: Sequence[str]) -> list[str]:

@@ -177,6 +177,15 @@ class DiagnosisSettings:
         "docs/decisions/0022",
         least=2,
     )
+    usual_error: float = _setting(
+        0.01,
+        "1",
+        "error that each block of a model is taken to have where the rig file states none for it: "
+        "one standard deviation of a smooth curve, as a share of what the block does, of a gauge a "
+        "tenth of it; 0 takes models to be perfect",
+        "docs/decisions/0095",
+        most=0.5,
+    )
     # fits
     most_tolerances: float = _setting(
         3.0,

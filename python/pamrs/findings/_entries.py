@@ -203,6 +203,9 @@ class BlockMismatch(Entry):
         On the recordings that were fitted.
     held_out : MismatchStages or None
         On those held out; None where there are none.
+    model_error : float
+        What the error that is taken for the model's own does to the channel [unit], one standard
+        deviation: what is left inside it is not called missing.
     """
 
     block: str
@@ -210,6 +213,14 @@ class BlockMismatch(Entry):
     unit: str
     fitted: MismatchStages
     held_out: MismatchStages | None = field(metadata=told("null where nothing was held out"))
+    model_error: float = field(
+        default=0.0,
+        metadata=told(
+            "what the error that is taken for the model's own does to the channel, one standard "
+            "deviation",
+            required=False,
+        ),
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,6 +4,7 @@ after.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from pamrs.channels import unit_of
@@ -54,7 +55,10 @@ def block_entries(
     def mismatch(block: Block) -> BlockMismatch:
         outside = None if held is fitted else _sizes(block, held, out_found, noise_level)
         inside = _sizes(block, fitted, fit_found, noise_level)
-        return BlockMismatch(block.name, block.channel, unit_of(block.channel), inside, outside)
+        levels = [noise_level[block.name, p.recording.name] for p in fitted.recordings]
+        error = math.sqrt(sum(own.stated * own.binned**2 for own in levels) / len(levels))
+        unit = unit_of(block.channel)
+        return BlockMismatch(block.name, block.channel, unit, inside, outside, error)
 
     return [
         BlockVerdict(

@@ -49,7 +49,10 @@ def where(
     """
     groups = [j.group for j in judged]
     if located is None:
-        text = "After the refit, no block's residual is above the noise level."
+        text = (
+            "After the refit, no block's residual is above the noise level, with the error that is "
+            "taken for the model's own."
+        )
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     proof = errors["held_out"] or errors["fit"]

@@ -1,22 +1,37 @@
 """When a residual is more than noise: noise levels with the noise of the drives, excess over them,
 autocorrelation.
 
-Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `correlation_time`,
-`inflation`.
+Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `model_error`,
+`error_sizes`, `with_sizes`,
+`correlation_time`, `inflation`.
 """
 
 from __future__ import annotations
 
 from pamrs.diagnosis.noise._autocorrelation import CORRELATED_VARIANCE, correlation_time, inflation
-from pamrs.diagnosis.noise._levels import Excess, NoiseLevel, bins_of, excess, noise_levels
+from pamrs.diagnosis.noise._discrepancy import model_error
+from pamrs.diagnosis.noise._levels import (
+    LEAST_SIZE,
+    Excess,
+    NoiseLevel,
+    bins_of,
+    error_sizes,
+    excess,
+    noise_levels,
+    with_sizes,
+)
 
 __all__ = [
     "CORRELATED_VARIANCE",
+    "LEAST_SIZE",
     "Excess",
     "NoiseLevel",
     "bins_of",
     "correlation_time",
+    "error_sizes",
     "excess",
     "inflation",
+    "model_error",
     "noise_levels",
+    "with_sizes",
 ]

@@ -13,6 +13,7 @@ from pamrs import _core
 from pamrs.channels import block_of, channel_of, with_trait
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned, change
 from pamrs.errors import SimulationError
+from pamrs.rig import Rig
 
 # waves of a stated error: a shift, one to fifteen half periods over the visited (decision 95)
 _CURVE_WAVES = 16
@@ -29,8 +30,37 @@ _FACTORS = ("muscle", "transmission", "joint")
 """Blocks whose share of error multiplies the muscles' pull."""
 _SUMMANDS = ("arm", "link", "load")
 """Blocks whose share of error stands beside the muscles' pull."""
+_IMPERFECT = ("supply", "valve", "chamber", "muscle", "transmission")
+"""Blocks that have a usual error: what makes flows, and what makes forces."""
+_GAUGES = ("muscle_pressure", "joint_angle")
+"""Channels whose gauges have one."""
+_GAUGE_SHARE = 0.1
+"""That of a gauge's range over that of a block: gauges are linear to a tenth of a percent."""
 _MOTION = ("joint_angle", "length")
 _COMMANDS = with_trait("driven")
+
+
+def model_error(rig: Rig, usual: float) -> Stated:
+    """The error of a model: as the rig file states it, and of what that leaves out a usual one.
+
+    Parameters
+    ----------
+    rig : Rig
+        The model, with what its file states in ``[model_error]``.
+    usual : float
+        Share of what a block does to its output that is off where nothing is stated for it.
+
+    Returns
+    -------
+    dict
+        As :attr:`pamrs.Rig.model_error`.
+    """
+    stated = rig.model_error
+    if not usual:
+        return stated
+    told = {channel_of(name) for name in stated}
+    shares = dict.fromkeys(_IMPERFECT, usual) | dict.fromkeys(_GAUGES, _GAUGE_SHARE * usual)
+    return {n: {"share": s} for n, s in shares.items() if n not in told} | stated
 
 
 def operating_ranges(block: Block, recordings: list[Prepared]) -> OperatingRanges:

@@ -28,6 +28,11 @@ _LEAST_BIN_SAMPLES = 5  # fewest samples of such a bin
 _STATED_FREEDOM = 4.0
 # share of that variance that no curve tells: an error is no exact curve of one value (decision 95)
 _CURVE_REST = 0.02
+# shares of the usual error that are tried (decision 95)
+_SIZES = (0.01, 0.03, 0.1, 0.2, 0.4, 0.7, 1.0)
+LEAST_SIZE = _SIZES[0]  # share of the usual error that is hardly any
+# spread of the logarithm of an error's size, a factor of three (decision 95)
+_SIZE_SPREAD = math.log(3.0)
 _MOST_EXPONENT = 700.0  # that a double's exponential bears
 
 
@@ -188,6 +193,94 @@ def noise_levels(
                 max(1.0, float(np.mean(weights))) if weights else 1.0,
             )
     return found
+
+
+def error_sizes(
+    problem: Problem, found: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
+) -> tuple[dict[str, float], float]:
+    """How large the error of the model most probably is in each block, as a share of what is taken
+    for usual and at most 1, from what a hypothesis leaves; and how probable that is then.
+
+    The residuals are those of one Gaussian process with curves of that size, which has a log-normal
+    prior about the usual one: recordings that show a model to be better than usual may show what
+    is smaller than the usual error.
+
+    Parameters
+    ----------
+    problem : Problem
+        Blocks and recordings.
+    found : dict
+        Residuals of the recordings.
+    noise_level : dict
+        From :func:`noise_levels`, with the curves of the usual error.
+
+    Returns
+    -------
+    sizes : dict of str to float
+        By block; 1 where no error acts.
+    evidence : float
+        Logarithm of the density of the bin means under these sizes, up to a constant.
+    """
+    sizes, evidence = {}, 0.0
+    for block in problem.blocks:
+        rows, bent, rest = [], [], []
+        for prepared in problem.recordings:
+            key = block.name, prepared.recording.name
+            level = noise_level[key]
+            noise = level.binned * math.sqrt(max(0.0, 1.0 - level.stated))
+            if level.curves is None or not noise > 0.0:
+                continue
+            means, counts = binned(found[key].value, found[key].rows, bins_of(prepared))
+            seen = counts > 0
+            rows.append(means[seen] / noise)
+            bent.append(level.curves[seen] / noise)
+            own = _CURVE_REST * level.stated / (1.0 - level.stated)
+            rest.append(np.full(int(seen.sum()), own))
+        sizes[block.name] = 1.0
+        if rows:
+            y, c, r = np.concatenate(rows), np.concatenate(bent), np.concatenate(rest)
+            each = {size: _evidence(y, c, r, size) for size in _SIZES}
+            sizes[block.name] = max(each, key=lambda size: each[size])
+            evidence += each[sizes[block.name]]
+    return sizes, evidence
+
+
+def _evidence(rows: Array, curves: Array, rest: Array, size: float) -> float:
+    """Logarithm of the probability of rows with unit noise beside curves so many times as high,
+    whose size is log-normal about 1.
+    """
+    variance = 1.0 + size**2 * rest
+    y = rows / np.sqrt(variance)
+    c = size * curves / np.sqrt(variance)[:, None]
+    normal = np.eye(c.shape[1]) + c.T @ c
+    told = c.T @ y
+    square = float(y @ y - told @ np.linalg.solve(normal, told))
+    volume = float(np.linalg.slogdet(normal)[1] + np.log(variance).sum())
+    prior = (math.log(size) / _SIZE_SPREAD) ** 2
+    return -0.5 * (square + volume + prior)
+
+
+def with_sizes(
+    noise_level: dict[Key, NoiseLevel], sizes: dict[str, float]
+) -> dict[Key, NoiseLevel]:
+    """Noise levels with the error of each block's model so many times as large."""
+
+    def scaled(level: NoiseLevel, size: float) -> NoiseLevel:
+        if level.curves is None:
+            return level
+        error = size**2 * level.stated * level.binned**2
+        noise = (1.0 - level.stated) * level.binned**2
+        rest = _CURVE_REST * error
+        return replace(
+            level,
+            binned=math.sqrt(noise + error),
+            stated=error / (noise + error),
+            beside=math.sqrt(noise + rest),
+            rest=rest / (noise + rest),
+            curves=size * level.curves,
+        )
+
+    return {key: scaled(level, sizes[key[0]]) for key, level in noise_level.items()}
 
 
 def _power(curves: Array) -> float:

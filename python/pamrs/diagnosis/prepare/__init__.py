@@ -44,6 +44,7 @@ from pamrs.diagnosis.prepare._rails import without_rails
 from pamrs.diagnosis.prepare._signals import (
     Prepared,
     binned,
+    check_commands,
     noise_level,
     prepare,
     smoothed,
@@ -76,6 +77,7 @@ __all__ = [
     "binned",
     "blocks_beside_tanks",
     "change",
+    "check_commands",
     "check_plausible",
     "check_sense",
     "implausible",

@@ -471,7 +471,7 @@ def prepare(recording: Recording, rig: Rig, settings: DiagnosisSettings) -> Prep
             "needed for a diagnosis"
         )
     core = core_rig(rig)
-    _check_commands(recording, rig, core.inputs)
+    check_commands(recording, rig, core.inputs)
     signals, raw, noise, lengths, steps = {}, {}, {}, {}, {}
     drives = [name for name in core.channels if channel_of(name) in DRIVES]
     for name in (*drives, *pulls_of(rig).values(), *thermometers_of(rig).values()):
@@ -583,7 +583,7 @@ def moves_by_gauges(recording: Recording, rig: Rig) -> bool:
     return bool(joints) and {*joints, *pulling} <= set(recording.channels)
 
 
-def _check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
+def check_commands(recording: Recording, rig: Rig, inputs: list[str]) -> None:
     """Refuse a recording without a command, unless what moves a joint or load was measured past the
     valves.
     """

@@ -43,7 +43,17 @@ from pamrs.diagnosis.fit import (
     same_data_in,
     two_at_a_time,
 )
-from pamrs.diagnosis.noise import Excess, excess, noise_levels
+from pamrs.diagnosis.noise import (
+    LEAST_SIZE,
+    Excess,
+    NoiseLevel,
+    bins_of,
+    error_sizes,
+    excess,
+    model_error,
+    noise_levels,
+    with_sizes,
+)
 from pamrs.diagnosis.prepare import Block, Residual
 from pamrs.diagnosis.screen import (
     Score,
@@ -83,6 +93,7 @@ from pamrs.effects import (
     Hypothesis,
     SameData,
     Term,
+    effect_of,
 )
 from pamrs.errors import SimulationError
 from pamrs.rig import Rig
@@ -110,6 +121,8 @@ _MOST_FORMS = 4  # forms of an effect that are fitted
 _EFFECTS_WITH_STARTS = 3  # effects of which more than one start is fitted (decision 13)
 _REFITTED = 0.3  # share of the work on some blocks that their refit is
 _SCREENED = 0.6  # share that it is up to the fits of what the screen found
+# share of the error that was taken below which what a hypothesis leaves is clearly less
+_CLEARLY_LESS = 0.5
 _POLISH_FROM = 0.03  # probability from which a hypothesis is fitted to its end (decision 22)
 
 
@@ -201,14 +214,19 @@ def _begin_part(
     tell(Line("refitting the baseline inside its tolerances", 0.0))
     refit = _refit(inner, outer, nominal, same=held is fitted)
     kept = refit.start.fitted
+    if _is_marginal(refit) or not any(significant(kept[b.name]) for b in refit.trial.suspects):
+        what = "the search for effects inside the error of the model"
+        less = inner.losses.part(what, lambda: _hidden(refit, tell), None)
+        if less is not None:
+            return _tried(less, tell)
     if refit.apart and not any(significant(kept[b.name]) for b in refit.trial.suspects):
         common = _fit_all_recordings(refit.trial, refit.start)
         if common is not None:
             tell("one baseline leaves noise in all recordings")
             return _healthy_group(refit, common)
-    if not refit.trial.suspects:
-        return _search_in_noise(refit, say, tell)
-    return _explain(refit, tell)
+    if refit.trial.suspects:
+        return _explain(refit, tell)
+    return _search_in_noise(refit, say, tell)
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,6 +247,11 @@ class _Refit:
         The refitted baseline as a hypothesis.
     apart : list of Block
         Blocks whose excess the held-out recordings alone show.
+    before : dict
+        What the nominal model leaves of the recordings to fit.
+    error : (dict, dict)
+        Noise levels with the error of the model that is taken for usual, and how large it is in
+        each block, as a share of that.
     """
 
     trial: Attempts
@@ -237,6 +260,37 @@ class _Refit:
     was: dict[str, Excess]
     start: Candidate
     apart: list[Block]
+    before: dict[Key, Residual]
+    error: tuple[dict[Key, NoiseLevel], dict[str, float]]
+
+    @property
+    def error_is_given(self) -> bool:
+        """Whether the size of the error is stated: by the rig file, or that there is none."""
+        return bool(self.trial.nominal.model_error) or not self.trial.settings.usual_error
+
+    def beside_less(self, candidates: list[Candidate]) -> _Refit | None:
+        """The same beside the error that the most probable hypothesis leaves to the model; None
+        where that is hardly smaller.
+        """
+        trial, (usual, sizes) = self.trial, self.error
+        if self.error_is_given:
+            return None
+        each = [
+            (told - _price(c, trial), left)
+            for c in candidates
+            for left, told in (error_sizes(trial.inner, c.fit.residuals, usual),)
+        ]
+        left = max(each, key=lambda own: own[0])[1]
+        if all(left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
+            return None
+        return self.beside({name: min(size, left[name]) for name, size in sizes.items()})
+
+    def beside(self, sizes: dict[str, float]) -> _Refit | None:
+        """The same beside errors of other sizes; None where these leave no mismatch."""
+        trial = self.trial
+        own = trial.inner, trial.outer, trial.nominal, self.first, self.before
+        found = _kept(*own, (self.error[0], sizes), same=trial.same)
+        return found if found.trial.suspects else None
 
     def group(
         self,
@@ -264,10 +318,31 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     blocks, settings = inner.blocks, inner.settings
     before = residuals(inner, nominal)
     first = refitted(inner, nominal, without_autocorrelation(blocks))
-    stated = nominal.model_error
+    stated = model_error(nominal, settings.usual_error)
     noise_level = noise_levels(inner, core_rig(first.rig, inner.core), stated)
     if not same:
         noise_level |= noise_levels(outer, core_rig(first.rig, outer.core), stated)
+    usual, sizes = noise_level, dict.fromkeys((b.name for b in blocks), 1.0)
+    if settings.usual_error and not nominal.model_error:
+        sizes, _ = error_sizes(inner, first.residuals, usual)
+    return _kept(inner, outer, nominal, first, before, (usual, sizes), same=same)
+
+
+def _kept(
+    inner: Problem,
+    outer: Problem,
+    nominal: Rig,
+    first: Fit,
+    before: dict[Key, Residual],
+    error: tuple[dict[Key, NoiseLevel], dict[str, float]],
+    *,
+    same: bool,
+) -> _Refit:
+    """The refit beside an error of the model: noise levels with that taken for usual, and how large
+    it is in each block.
+    """
+    blocks, settings = inner.blocks, inner.settings
+    noise_level = with_sizes(*error)
     baseline, autocorrelation = with_autocorrelation(inner, nominal, first, noise_level)
 
     def kept(problem: Problem, found: dict[Key, Residual]) -> dict[str, Excess]:
@@ -298,7 +373,22 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     there = held_out_alone(out)
     suspects = [b for b in blocks if significant(now[b.name]) or b in there]
     trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
-    return _Refit(trial, first, autocorrelation, was, Candidate((), baseline, out, now, 0.0), apart)
+    start = Candidate((), baseline, out, now, 0.0)
+    return _Refit(trial, first, autocorrelation, was, start, apart, before, error)
+
+
+def _price(candidate: Candidate, trial: Attempts) -> float:
+    """What the parameters of a hypothesis cost: how far they moved, and what their number could
+    have fitted by chance (Schwarz's half a logarithm of the number of bins).
+    """
+    problem = trial.inner
+    bins = sum(p.n / bins_of(p) for p in problem.recordings) * len(problem.blocks)
+    names = {n for n in candidate.fit.values if effect_of(n)} | {*candidate.wrong}
+    events = candidate.fit.events.values.values() if candidate.fit.events else ()
+    count = len(names) + sum(map(len, events))
+    moved = sum(v * v for n, v in candidate.fit.moved.items() if n not in names)
+    terms = trial.settings.further_price * len(candidate.terms)
+    return 0.5 * (moved + count * math.log(bins)) + terms
 
 
 def _healthy_group(refit: _Refit, common: Candidate) -> BlockGroup:
@@ -343,7 +433,73 @@ def _search_in_noise(refit: _Refit, say: Say, tell: Say) -> BlockGroup:
 
 
 def _explain(refit: _Refit, tell: Say) -> _Mismatch:
-    """A mismatch with every hypothesis that was tried for it."""
+    """A mismatch with every hypothesis that was tried for it; tried again where the best one shows
+    the model to be better than was thought, which may show more.
+    """
+    found = _tried(refit, tell)
+    less = refit.beside_less(found.candidates)
+    if less is None:
+        return found
+    tell("the model is better than usual: judged again with a smaller error")
+    return _tried(less, tell)
+
+
+def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
+    """The refit beside a smaller error, where one effect and a better model are more probable than
+    none and the model as it is; None where they are not.
+    """
+    sizes = refit.error[1]
+    if refit.error_is_given or max(sizes.values()) <= LEAST_SIZE:
+        return None
+    least = refit.beside(dict.fromkeys(sizes, LEAST_SIZE))
+    if least is None:
+        return None
+    work = _begun(least, tell)
+    events = [
+        c
+        for e in (*work.own, *work.transient)
+        if (c := least.trial.fit_events(e, least.start)) is not None
+    ]
+    singles = [*_fit_singles(work.search), *events, *work.mistaken]
+    return refit.beside_less([refit.start, *singles])
+
+
+@dataclass(frozen=True, eq=False)
+class _Begun:
+    """What a mismatch is searched with.
+
+    Attributes
+    ----------
+    search : Search
+        Screen and weights.
+    mismatch : Block
+        The block that keeps most.
+    marginal : bool
+        Whether hardly more than noise is left.
+    mistaken : list of Candidate
+        Values that may be wrong.
+    own, transient : list of Term
+        Effects with sizes, and with times, of their own in each recording.
+    """
+
+    search: Search
+    mismatch: Block
+    marginal: bool
+    mistaken: list[Candidate]
+    own: list[Term]
+    transient: list[Term]
+
+
+def _tried(refit: _Refit, tell: Say) -> _Mismatch:
+    """A mismatch with every hypothesis that was tried for it, beside one size of error."""
+    work = _begun(refit, tell)
+    candidates = _fit_hypotheses(work.search, work.mistaken, work.own, work.transient)
+    candidates, weighed = _weigh_to_the_end(work.search, candidates)
+    return _Mismatch(refit, work.mismatch, work.search, work.marginal, candidates, weighed)
+
+
+def _begun(refit: _Refit, tell: Say) -> _Begun:
+    """A mismatch screened, its wrong values fitted."""
     trial, start = refit.trial, refit.start
     suspects, now = trial.suspects, start.fitted
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
@@ -374,9 +530,7 @@ def _explain(refit: _Refit, tell: Say) -> _Mismatch:
         visited_ranges(trial.inner),
     )
     search = Search(trial, screened, start, weighing, tell)
-    candidates = _fit_hypotheses(search, mistaken, own, transient)
-    candidates, weighed = _weigh_to_the_end(search, candidates)
-    return _Mismatch(refit, mismatch, search, marginal, candidates, weighed)
+    return _Begun(search, mismatch, marginal, mistaken, own, transient)
 
 
 @dataclass(frozen=True, eq=False)

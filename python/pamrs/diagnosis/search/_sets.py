@@ -22,6 +22,7 @@ from pamrs.diagnosis.evidence import (
     significant,
 )
 from pamrs.diagnosis.fit import Start, acts_in, two_at_a_time
+from pamrs.diagnosis.noise import with_sizes
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.screen import (
     Score,
@@ -542,11 +543,18 @@ def _predicts_better(further: Candidate, best: Candidate, trial: Attempts) -> bo
 
 
 def far_above_noise(trial: Attempts, found: Candidate) -> bool:
-    """Whether what a hypothesis leaves is so far above the noise that signatures say little."""
+    """Whether what a hypothesis leaves is so far above the noise of the sensors that signatures say
+    little.
+    """
+    inside = found.fitted
+    if any(level.curves is not None for level in trial.noise_level.values()):
+        none = dict.fromkeys((b.name for b in trial.inner.blocks), 0.0)
+        bare = replace(trial, noise_level=with_sizes(trial.noise_level, none))
+        inside = {b.name: bare.excess(b, trial.inner, found.fit.residuals) for b in trial.suspects}
     return any(
         max(kept[b.name].ratio, kept[b.name].systematic ** 2) > _STRONG_RATIO
         for b in trial.suspects
-        for kept in (found.fitted, found.held_out)
+        for kept in (inside, found.held_out)
     )
 
 
