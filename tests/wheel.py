@@ -2,7 +2,7 @@
 
 ``python tests/wheel.py dist``, or ``make wheel-test``. The environment is new, and its PATH has
 neither cargo nor a C compiler. Every command that ``pamrs example`` prints is run, then the cells
-of the notebook.
+of the notebook and what the README types.
 """
 
 import json
@@ -18,6 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+README = Path(__file__).parents[1] / "README.md"
 TOOLS = ("cargo", "rustc", "cc", "gcc", "clang", "cl", "zig")
 NOTEBOOK = """
 import json
@@ -88,7 +89,23 @@ def main(dist: Path) -> None:
             assert page.startswith("<!DOCTYPE html>"), name
             assert page.count("<svg") > 3, name
         run("python", "-c", NOTEBOOK, folder=folder)
+        follow_readme(run, folder)
         check_cores(run, folder, result)
+
+
+def follow_readme(run: Callable[..., str], folder: Path) -> None:
+    """What the README types behind ``pamrs example``, and its Python, on the example's bench."""
+    shutil.copy(folder / "bench" / "bench.csv", folder / "my_log.csv")
+    shutil.copy(folder / "bench" / "rig.toml", folder / "my_rig.toml")
+    text = README.read_text(encoding="utf-8")
+    lines = [line.split("#")[0].strip() for line in text.splitlines()]
+    shown = [shlex.split(line) for line in lines if line.startswith("pamrs ") and "&&" not in line]
+    assert [words[1] for words in shown] == ["diagnose", "import", "diagnose"]
+    for words in shown:
+        run(*words, folder=folder)
+    run("python", "-c", text.partition("```python\n")[2].partition("```")[0], folder=folder)
+    assert (folder / "report.html").is_file()
+    assert (folder / "model.toml").is_file()
 
 
 def check_cores(run: Callable[..., str], folder: Path, result: dict[str, Any]) -> None:
