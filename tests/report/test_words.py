@@ -80,6 +80,7 @@ def test_a_settled_name_leads_the_title_whatever_else_is_located() -> None:
     assert story.title(found) == (
         "The model of the chamber leaves out a leak: muscle leak (0.93); something else in the arm"
     )
+    assert story.facts(found)[0][0] == "chamber"
     names = [row.name for row in story.rivals(found)]
     assert names[0] == "muscle leak in the chamber"
     assert any(name.endswith("in the arm") for name in names)

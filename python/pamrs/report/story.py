@@ -10,7 +10,6 @@ from typing import NamedTuple
 from pamrs.effects import EFFECTS, NONE, PARAMETERS, UNLISTED, Hypothesis
 from pamrs.findings import (
     HEALTHY,
-    BlockMismatch,
     BlockVerdict,
     EffectFound,
     EffectParameterFound,
@@ -118,11 +117,11 @@ def headline(diagnosis: Findings) -> str:
         return ". ".join([*first, "; ".join(reading.text for reading in diagnosis.misread)])
     groups = _answering(diagnosis)
     together = _together(diagnosis, groups)
-    told = [_phrase(diagnosis, block, MOST_RIVALS) for block in groups] if not together else []
-    behind = [". ".join(told or [together or title(diagnosis)])]
+    phrases = ". ".join(_phrase(diagnosis, block, MOST_RIVALS) for block in groups)
+    told = [together or phrases or title(diagnosis)]
     if groups and diagnosis.off:
-        behind.append(words.off_sentence(diagnosis))
-    return ". ".join([*first, "; ".join([*behind, *words.not_judged_words(diagnosis)])])
+        told.append(words.off_sentence(diagnosis))
+    return ". ".join([*first, "; ".join([*told, *words.not_judged_words(diagnosis)])])
 
 
 def _together(diagnosis: Findings, groups: Sequence[BlockVerdict]) -> str:
@@ -152,15 +151,7 @@ def _chance(diagnosis: Findings, block: BlockVerdict, answer: Hypothesis) -> flo
 
 def _place(diagnosis: Findings, block: BlockVerdict) -> str:
     """The block of a group with the mismatch, in words."""
-    worst = _worst(block)
-    name = worst.block if worst else next(iter(block.blocks), "rig")
-    located = diagnosis.where.block
-    return words.spoken_name(located if located in block.blocks else name)
-
-
-def _worst(block: BlockVerdict) -> BlockMismatch | None:
-    """The largest mismatch of a group."""
-    return max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
+    return words.spoken_name(words.located_block(diagnosis, block) or "rig")
 
 
 def _healthy(diagnosis: Findings) -> str:
@@ -254,7 +245,7 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     groups = _answering(diagnosis)
     if groups and groups[0].probabilities:
         block = groups[0]
-        located = diagnosis.where.block or next(iter(block.blocks), "rig")
+        located = words.located_block(diagnosis, block) or "rig"
         at = f" in {words.blocks_label(block)}" if len(block.blocks) > 1 else ""
         what = f"something is missing{at}: probability {words.format_probability(_missing(block))}"
         found.append((words.spoken_name(located), what))
@@ -377,7 +368,7 @@ def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
 
 def _why(diagnosis: Findings, block: BlockVerdict, key: str) -> str:
     """Why an explanation has the probability that it has."""
-    hypothesis, worst = Hypothesis.parse(key), _worst(block)
+    hypothesis, worst = Hypothesis.parse(key), words.worst_mismatch(block)
     channel = diagnosis.where.channel
     if worst and diagnosis.where.block not in block.blocks:
         channel = worst.channel

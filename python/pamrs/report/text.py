@@ -13,6 +13,7 @@ from pamrs.channels import unit_of
 from pamrs.effects import EFFECTS, Hypothesis, Term, effect_of
 from pamrs.findings import (
     HEALTHY,
+    BlockMismatch,
     BlockVerdict,
     BudgetTerm,
     ChannelError,
@@ -58,6 +59,7 @@ __all__ = [
     "kept_sentence",
     "label",
     "leading",
+    "located_block",
     "left_out_sentence",
     "mended_sentence",
     "miss",
@@ -81,6 +83,7 @@ __all__ = [
     "told_pairs",
     "told_terms",
     "told_probabilities",
+    "worst_mismatch",
 ]
 
 _LABELS = {
@@ -462,13 +465,24 @@ def told_blocks(diagnosis: Findings) -> list[BlockVerdict]:
     ]
 
 
+def worst_mismatch(block: BlockVerdict) -> BlockMismatch | None:
+    """The largest mismatch of a group of blocks."""
+    return max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
+
+
+def located_block(diagnosis: Findings, block: BlockVerdict) -> str | None:
+    """The block of a group that has the mismatch: the located one, or of another group the one that
+    misses most.
+    """
+    if diagnosis.where.block in block.blocks:
+        return diagnosis.where.block
+    worst = worst_mismatch(block)
+    return worst.block if worst else next(iter(block.blocks), None)
+
+
 def _place(diagnosis: Findings, block: BlockVerdict) -> str:
     """Where a group has its mismatch, as the end of a sentence."""
-    located = diagnosis.where.block
-    if located not in block.blocks:
-        # not the block that the answer is about first: the one of the group that misses most
-        worst = max(block.mismatch, key=lambda m: m.fitted.refit.noises, default=None)
-        located = worst.block if worst else next(iter(block.blocks), None)
+    located = located_block(diagnosis, block)
     return f" in the {spoken_name(located)}" if located else ""
 
 

@@ -56,7 +56,7 @@ def block_entries(
         outside = None if held is fitted else _sizes(block, held, out_found, noise_level)
         inside = _sizes(block, fitted, fit_found, noise_level)
         levels = [noise_level[block.name, p.recording.name] for p in fitted.recordings]
-        error = math.sqrt(sum(own.stated * own.binned**2 for own in levels) / len(levels))
+        error = math.sqrt(sum(own.error_variance for own in levels) / len(levels))
         unit = unit_of(block.channel)
         return BlockMismatch(block.name, block.channel, unit, inside, outside, error)
 

@@ -75,6 +75,16 @@ class NoiseLevel:
     curves: Array | None = field(default=None, repr=False, compare=False)
     inflation: float = 1.0
 
+    @property
+    def noise_variance(self) -> float:
+        """Variance of bin means by noise alone."""
+        return (1.0 - self.stated) * self.binned**2
+
+    @property
+    def error_variance(self) -> float:
+        """Variance of bin means by the error of the model."""
+        return self.stated * self.binned**2
+
 
 @dataclass(frozen=True)
 class Excess:
@@ -181,16 +191,12 @@ def noise_levels(
             if known:
                 bent = curves(block, core, base, prepared, ranges[block.name], known, width)
             error = 0.0 if bent is None else _power(bent[seen])
-            rest = _CURVE_REST * error
             found[key] = NoiseLevel(
                 math.sqrt(base.noise**2 + sample),
-                math.sqrt(noise + error),
-                scatter,
-                error / (noise + error),
-                math.sqrt(noise + rest),
-                rest / (noise + rest),
-                bent,
-                max(1.0, float(np.mean(weights))) if weights else 1.0,
+                scatter=scatter,
+                curves=bent,
+                inflation=max(1.0, float(np.mean(weights))) if weights else 1.0,
+                **_with_error(noise, error),
             )
     return found
 
@@ -227,7 +233,7 @@ def error_sizes(
         for prepared in problem.recordings:
             key = block.name, prepared.recording.name
             level = noise_level[key]
-            noise = level.binned * math.sqrt(max(0.0, 1.0 - level.stated))
+            noise = math.sqrt(max(0.0, level.noise_variance))
             if level.curves is None or not noise > 0.0:
                 continue
             means, counts = binned(found[key].value, found[key].rows, bins_of(prepared))
@@ -268,19 +274,21 @@ def with_sizes(
     def scaled(level: NoiseLevel, size: float) -> NoiseLevel:
         if level.curves is None:
             return level
-        error = size**2 * level.stated * level.binned**2
-        noise = (1.0 - level.stated) * level.binned**2
-        rest = _CURVE_REST * error
-        return replace(
-            level,
-            binned=math.sqrt(noise + error),
-            stated=error / (noise + error),
-            beside=math.sqrt(noise + rest),
-            rest=rest / (noise + rest),
-            curves=size * level.curves,
-        )
+        variances = _with_error(level.noise_variance, size**2 * level.error_variance)
+        return replace(level, **variances, curves=size * level.curves)
 
     return {key: scaled(level, sizes[key[0]]) for key, level in noise_level.items()}
+
+
+def _with_error(noise: float, error: float) -> dict[str, float]:
+    """What a noise level has of the variances of noise and of an error of the model."""
+    rest = _CURVE_REST * error
+    return {
+        "binned": math.sqrt(noise + error),
+        "stated": error / (noise + error),
+        "beside": math.sqrt(noise + rest),
+        "rest": rest / (noise + rest),
+    }
 
 
 def _power(curves: Array) -> float:
