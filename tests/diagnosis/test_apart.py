@@ -24,6 +24,7 @@ from pamrs.diagnosis.prepare import available_blocks
 from pamrs.diagnosis.search._hypotheses import _split_by_names
 from pamrs.effects import UNLISTED, Hypothesis
 from pamrs.simulation import core_rig
+from tests.diagnosis.likelihoods import leaving
 from tests.diagnosis.terms import terms
 
 SETTINGS = DiagnosisSettings()
@@ -66,7 +67,7 @@ def candidate(key: str, supply: float, chamber: float, **values: float) -> Candi
         name: Excess(1.0 + ratio, ratio**0.5, 0.0, 1.0, 1.0, 1.1, 0.02)
         for name, ratio in (("supply", supply), ("chamber", chamber))
     }
-    return Candidate(effects, fit, left, left, 0.0, wrong=wrong)
+    return Candidate(effects, fit, left, left, 0.0, wrong=wrong, likelihood=leaving(left))
 
 
 def group(*found: Candidate) -> BlockGroup:

@@ -26,7 +26,7 @@ from typing import Any
 
 from pamrs._progress import Steps
 from pamrs.channels import block_of, channel_of, dotted
-from pamrs.diagnosis.evidence import BlockGroup, calibrate
+from pamrs.diagnosis.evidence import BlockGroup
 from pamrs.diagnosis.explain import assemble, data_used, misread_diagnosis
 from pamrs.diagnosis.fit import Problem, fits, with_offsets
 from pamrs.diagnosis.model import conclude
@@ -286,7 +286,6 @@ def _physics(
     parts = [[b for b in inner.blocks if not b.mechanical], motion]
     groups = examine(inner, outer, case.rig, [part for part in parts if part], say)
     inner, outer = _judged_only(inner, outer, groups)
-    groups = [calibrate(group, inner.settings) for group in groups]
     unsettled = _unsettled(case.rig) if motion else []
     if unsettled:
         groups = [_capped(group, _UNKNOWN_GEOMETRY_PROBABILITY) for group in groups]

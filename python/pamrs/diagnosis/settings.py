@@ -264,19 +264,6 @@ class DiagnosisSettings:
         "times it is outside its tolerances",
         "docs/decisions/0025",
     )
-    form_share: float = _setting(
-        0.04,
-        "1",
-        "share of a mismatch that the difference between an equation of the catalogue and the "
-        "truth may leave",
-        "docs/decisions/0014",
-    )
-    form_error: float = _setting(
-        0.15,
-        "1",
-        "standard deviation of what a right effect of another form leaves of a mismatch's variance",
-        "docs/decisions/0022",
-    )
     drift_share: float = _setting(
         0.02,
         "1",
@@ -296,20 +283,11 @@ class DiagnosisSettings:
         0.985, "1", "largest probability of a name", "docs/decisions/0014", least=_TINY, most=1.0
     )
     # from probabilities to a verdict
-    certainty: float = _setting(
-        0.5,
-        "1",
-        "share of the logarithm of the odds between two hypotheses of a mismatch that counts: "
-        "with all of it names stated at 0.98 were right in 77 % of groups of blocks",
-        "docs/decisions/0014: calibrated on seeds 9201 and 9401 of the second plan",
-        least=_TINY,
-        most=1.0,
-    )
     settled: float = _setting(
         0.75,
         "1",
         "probability from which an answer is settled",
-        "docs/decisions/0014: odds of nine to one before they are calibrated",
+        "docs/decisions/0014: odds of three to one",
         least=_TINY,
         most=1.0,
     )

@@ -2,11 +2,12 @@
 
 Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
+`BlockLikelihood`, `Likelihood` (how probable recordings are);
 `weigh`, `explains`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
 `capped_probability`, `penalty`, `price`, `possible_gain`, `lacks_drift`, `loss_by_values`,
 `visited_ranges`, `Weighing` (their weights); `drop_undetermined`, `undetermined_effects`,
 `with_stated_std`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`,
-`calibrate`, `case_probabilities`, `case_ambiguity`, `parameters_at_wall` (verdicts).
+`case_probabilities`, `case_ambiguity`, `parameters_at_wall` (verdicts).
 """
 
 from __future__ import annotations
@@ -28,10 +29,10 @@ from pamrs.diagnosis.evidence._determined import (
     undetermined_effects,
     with_stated_std,
 )
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
 from pamrs.diagnosis.evidence._verdicts import (
     WALL_TOLERANCES,
     Judged,
-    calibrate,
     case_ambiguity,
     case_probabilities,
     case_verdict,
@@ -62,13 +63,14 @@ __all__ = [
     "FORM_SHARE_ALIKE",
     "STANDING_PRICE",
     "Attempts",
+    "BlockLikelihood",
     "Candidate",
     "BlockGroup",
     "Judged",
+    "Likelihood",
     "Weighing",
     "autocorrelation_of",
     "capped_probability",
-    "calibrate",
     "case_ambiguity",
     "case_probabilities",
     "case_verdict",

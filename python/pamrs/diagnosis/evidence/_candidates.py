@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 
 from pamrs.channels import block_of, channel_of
-from pamrs.diagnosis.evidence._predictive import Densities, log_densities
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
 from pamrs.diagnosis.fit import (
     FINAL_STEP_SHARE,
     FIT_BIN_TIME,
@@ -98,8 +98,8 @@ class Candidate:
     places : float
         Logarithm of how many places its effects could have been said to act at: by so much each is
         less probable before any data.
-    densities : callable
-        Logarithms of the density of what it leaves, by block and stretch of time.
+    likelihood : callable
+        How probable what it leaves of all recordings is, by block.
     forms_tried : bool
         Whether its effects were tried in other forms beside each other.
     """
@@ -113,7 +113,7 @@ class Candidate:
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
     places: float = 0.0
-    densities: Callable[[], Densities] = field(default=dict, repr=False)
+    likelihood: Callable[[], Mapping[str, BlockLikelihood]] = field(default=dict, repr=False)
     forms_tried: bool = False
 
     @property
@@ -279,6 +279,22 @@ class Attempts:
         """Weights of noise without autocorrelation."""
         return without_autocorrelation(self.inner.blocks)
 
+    @cached_property
+    def likelihood(self) -> Likelihood:
+        """By which hypotheses are weighed."""
+        held_out = [] if self.same else self.outer.recordings
+        recordings = [*self.inner.recordings, *held_out]
+        return Likelihood(self.inner.blocks, recordings, self.noise_level)
+
+    def likelihood_of(
+        self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
+    ) -> Callable[[], Mapping[str, BlockLikelihood]]:
+        """How probable what a hypothesis leaves of fitted and of held-out recordings is, by block,
+        once it is asked for.
+        """
+        found = inside if self.same else {**inside, **outside}
+        return cache(partial(self.likelihood.of, found))
+
     @property
     def same(self) -> bool:
         """Whether there is no held-out recording."""
@@ -399,18 +415,7 @@ class Attempts:
             gap,
             _scatter(effects, self.inner, found),
             places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
-            densities=cache(partial(self._densities, found.residuals, outside)),
-        )
-
-    def _densities(
-        self, inside: Mapping[Key, Residual], outside: Mapping[Key, Residual]
-    ) -> Densities:
-        """Logarithms of the density of what a set leaves of its recordings and of the others."""
-        return log_densities(
-            self.inner.blocks,
-            (self.inner.recordings, inside),
-            (self.outer.recordings, outside),
-            self.noise_level,
+            likelihood=self.likelihood_of(found.residuals, outside),
         )
 
     def terms_of(self, effect: str) -> list[Term]:

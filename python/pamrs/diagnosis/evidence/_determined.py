@@ -29,12 +29,12 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
 
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
-    """A group in which no name leads, and none stands beside another one, whose values are not told
-    from none by the standard deviations that are stated.
+    """A group in which no name leads alone whose values are not told from none by the standard
+    deviations that are stated.
 
-    A set falls to what is left of it without such names, where that was fitted; a name alone keeps
-    half of its probability, and the other half falls to ``unlisted``: something acts there, and
-    what it is was not told (to nothing, where no more than noise was left).
+    It keeps half of its probability, and the other half falls to ``unlisted``: something acts
+    there, and what it is was not told (to nothing, where no more than noise was left). Beside other
+    names the evidence of the set without it has said whether it is needed.
 
     Parameters
     ----------
@@ -51,21 +51,15 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     settings = problem.settings
     if group.mismatch is None:
         return group
-    known = {c.hypothesis.set: c.hypothesis for c in group.candidates if c.terms}
     found = dict(group.probabilities)
     for candidate in group.candidates:
         chance = group.probabilities.get(candidate.hypothesis, 0.0)
-        if not candidate.effects or chance < settings.in_set:
+        if len(candidate.terms) != 1 or not candidate.effects or chance < settings.in_set:
             continue
-        own = with_stated_std(problem, group, candidate)
-        unknown = set(undetermined_effects(own))
-        if not unknown:
-            continue
-        rest = known.get(candidate.hypothesis.set - unknown)
-        moved = chance if rest else 0.5 * chance
-        found[candidate.hypothesis] -= moved
-        to = rest or _without_name(group)
-        found[to] = found.get(to, 0.0) + moved
+        if undetermined_effects(with_stated_std(problem, group, candidate)):
+            found[candidate.hypothesis] -= 0.5 * chance
+            to = _without_name(group)
+            found[to] = found.get(to, 0.0) + 0.5 * chance
     return replace(group, probabilities=found)
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from pamrs.diagnosis.evidence._candidates import BlockGroup, Candidate, significant
 from pamrs.diagnosis.evidence._weighing import price_of_term
@@ -120,19 +120,6 @@ def _own(group: BlockGroup) -> dict[Hypothesis, float]:
     return {h: p for h, p in found.items() if p >= _COUNTED or h in WITHOUT_NAME}
 
 
-def calibrate(group: BlockGroup, settings: DiagnosisSettings) -> BlockGroup:
-    """A group whose probabilities are as often right as they say.
-
-    Where hypotheses compete for a mismatch, the logarithm of the odds between any two of them
-    counts a share (`certainty` of the settings) that was found on cases of another plant: what
-    speaks for a name are residuals of which no model is quite true.
-    """
-    if group.mismatch is None or group.below_noise:
-        return group
-    powers = {h: p**settings.certainty for h, p in group.probabilities.items() if p > 0.0}
-    return replace(group, probabilities=_normalised(powers))
-
-
 def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Judged]:
     """The verdict of every group, an effect that acts in several being judged once.
 
@@ -188,7 +175,7 @@ def _odds_shared(
         for group, c in holders
         if group.mismatch is not None and not group.below_noise
     ]
-    again = settings.certainty * (sum(prices) - max(prices, default=0.0))
+    again = sum(prices) - max(prices, default=0.0)
     return _SHARED_ODDS ** (len(holders) - 1) * math.exp(again)
 
 

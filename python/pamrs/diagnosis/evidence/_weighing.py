@@ -1,23 +1,23 @@
-"""Probabilities of sets of effects, and of ``unlisted``, from what each leaves of the mismatch."""
+"""Probabilities of sets of effects, and of ``unlisted``, by one evidence."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.stats import chi2
 
 from pamrs.channels import channel_of
 from pamrs.diagnosis.evidence._candidates import Candidate, significant
-from pamrs.diagnosis.evidence._predictive import bootstrapped
-from pamrs.diagnosis.fit import Problem, form_in, same_data_in, says_same
+from pamrs.diagnosis.fit import Problem, form_in, same_data_in
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import Block
 from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     EFFECTS,
+    UNDECIDED,
     UNLISTED,
     Hypothesis,
     SameData,
@@ -27,28 +27,23 @@ from pamrs.effects import (
     usual_values,
 )
 
-# log odds of explained variance, as probable as unlisted: a name carries half (decision 14)
-_LOG_ODDS_EXPLAINED = 0.0
-# the same of what takes up much of anything, 7 % left: events, parameters (decision 14)
-_LOG_ODDS_EXPLAINED_PLIABLE = 2.6
-_SOFTNESS = 0.4  # [log odds] width of that transition (decision 14)
-# [log odds] odds to unlisted that a set has at the least where it leaves only noise
-_LOG_ODDS_NOISE_LEFT = 3.0
-# share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
-_CLEAR_SHARE = 0.7
-# independent looks that a block's residual counts for (decision 14: tuned on seed 501)
-_LOOKS = 12.0
-# looks at what is left whatever a form is granted: the smaller wins (decision 14)
-_LOOKS_WITHIN = 1.0
-# share of names' odds by predictive density, the rest by what is left (decision 14)
-_PREDICTIVE_SHARE = 0.5
+# share of the logarithm of evidence that counts: least, most, and where the variance is that of
+# noise, since what no model explains depends on itself (decision 14)
+_LEAST_SHARE, _MOST_SHARE, _NOISE_SHARE = 0.01, 0.1, 0.3
+# share of what it explains that a right name leaves, as forms of equations err (decision 14)
+_FORM_ERROR = 0.2
+_FORM_SPREAD = math.log(3.0)  # spread of the logarithm of that share: a factor (decision 14)
+# [noise levels] error that is left beside whatever is explained: noise levels err (decision 14)
+_LEAST_ERROR = 0.1
+_UNLISTED_PRICE = 6.0  # [log odds] price of physics without a name (decision 14)
+_STRAIN_SHARE = 0.5  # share of the priors' sum of squares that counts (decision 14)
 # excess over noise from which a recording tests what an effect leaves (decision 14)
 _TELLING_EXCESS = 0.5
 _TELLING_SHARE = 0.9  # share of the largest excess from which recordings always are
-FORM_SHARE_ALIKE = 0.01  # form_share where sets of as many effects are compared (decision 20)
-_NOISE_ERROR = 0.06  # standard deviation of a noise level (decision 22)
-# [log odds] the most that what is left in one block, or the priors, count (decisions 22, 25)
-_DECIDED = 8.0
+# share left of hardly a mismatch by what explains it: it has to take 30 % (decision 20)
+_CLEAR_SHARE = 0.7
+# share of a mismatch by which forms that leave as much differ (decision 20)
+FORM_SHARE_ALIKE = 0.01
 # log odds: an effect like another, as a parameter is near zero; 7 to 1 (decision 20)
 STANDING_PRICE = 2.0
 _SAME_SHARE = 0.1  # part of an effect's size below which what tells it from another effect is zero
@@ -127,6 +122,111 @@ def probability_cap(fitted: Problem, mismatch: Block, left: float, *, alone: boo
     return settings.drift_probability if drifts else settings.most_probability
 
 
+def weigh(
+    candidates: list[Candidate], suspects: list[Block], weighing: Weighing
+) -> dict[Hypothesis, float]:
+    """Probabilities over sets of effects and ``unlisted`` (docs/decisions/0014).
+
+    One evidence for all: how probable each hypothesis makes the recordings, tempered, times its
+    odds before any data. Recordings that are held out were not fitted, and count as the others do.
+    The baseline as it is competes (`UNDECIDED`: nothing is missing, or parameters inside their
+    tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
+    the mismatch as a right name does. A set with an effect whose size is not told from none names
+    nothing.
+
+    Parameters
+    ----------
+    candidates : list of Candidate
+        The baseline first, then every hypothesis.
+    suspects : list of Block
+        Blocks by which they are compared.
+    weighing : Weighing
+        Prices, and the largest probability of all names together.
+    """
+    start = candidates[0]
+    named = [c for c in candidates if c.terms and not _is_absent(c)]
+    share = _counted([start, *named], suspects)
+    scores = {c.hypothesis: log_weight(c, start, suspects, weighing, share) for c in named}
+    scores[UNDECIDED] = log_weight(start, start, suspects, weighing, share)
+    scores[UNLISTED] = _log_weight_unlisted(start, suspects, share)
+    top = max(scores.values())
+    weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
+    total = sum(weights.values())
+    out = {h: weight / total for h, weight in weights.items()}
+    # what no name may have falls to physics without a name
+    beyond = {h: (1.0 - weighing.most) * out[h] for h in out if h.terms}
+    return (
+        out
+        | {h: out[h] - p for h, p in beyond.items()}
+        | {UNLISTED: out[UNLISTED] + sum(beyond.values())}
+    )
+
+
+def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
+    """Share of the logarithm of evidence that counts (a power posterior): more, the nearer to noise
+    the hypothesis is that is nearest. Noise is independent from bin to bin, and what no hypothesis
+    explains is not.
+    """
+    powers = [[c.likelihood()[block.name].power for block in suspects] for c in candidates]
+    left = min(max(own, default=1.0) for own in powers)
+    return min(_MOST_SHARE, max(_LEAST_SHARE, _NOISE_SHARE / max(left, 1e-9)))
+
+
+def log_weight(
+    candidate: Candidate,
+    baseline: Candidate,
+    suspects: list[Block],
+    weighing: Weighing,
+    share: float = _LEAST_SHARE,
+) -> float:
+    """Logarithm of what a hypothesis weighs beside others, up to a constant: a share of its
+    evidence in some blocks, its price, how far parameters moved, and its values.
+    """
+    unlikely = loss_by_values(candidate, weighing.ranges)
+    unlikely += STANDING_PRICE * lacks_drift(candidate, weighing.seconds)
+    unlikely += _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
+    told = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
+    return told - price(candidate, weighing.settings) - unlikely
+
+
+def _strain(candidate: Candidate) -> float:
+    """What a hypothesis loses by how far parameters moved."""
+    return 0.5 * _STRAIN_SHARE * candidate.fit.strain
+
+
+def _evidence(
+    candidate: Candidate, baseline: Candidate, suspects: list[Block], share: float
+) -> float:
+    """A share of the evidence of a hypothesis in some blocks, under the most probable size of the
+    error that nobody states: at most a part of what the hypothesis explains, more of it the less
+    probable.
+    """
+    total = 0.0
+    for name in (block.name for block in suspects):
+        own, before = candidate.likelihood()[name], baseline.likelihood()[name].power
+        expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(max(0.0, before - own.power))
+        beyond = np.log(np.maximum(own.sizes, expected) / expected) / _FORM_SPREAD
+        total += float((share * own.by_size - 0.5 * beyond**2).max())
+    return total
+
+
+def _log_weight_unlisted(baseline: Candidate, suspects: list[Block], share: float) -> float:
+    """What physics without a name weighs, as a right name would that explains all."""
+    total = 0.0
+    for found in (baseline.likelihood()[block.name] for block in suspects):
+        left = _LEAST_ERROR + _FORM_ERROR * math.sqrt(max(0.0, found.power - 1.0))
+        total += max(found.most, found.expected(left))
+    return share * total - _UNLISTED_PRICE - _strain(baseline)
+
+
+def possible_gain(candidate: Candidate, suspects: list[Block]) -> float:
+    """By how much the logarithm of a set's weight could rise with something beside it, which left
+    nothing but noise.
+    """
+    own = [candidate.likelihood()[block.name] for block in suspects]
+    return _LEAST_SHARE * sum(max(0.0, found.expected(0.0) - found.most) for found in own)
+
+
 def share_left(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
     """Share of the baseline's excess variance that a set of effects leaves in recordings that it
     was not fitted to.
@@ -170,196 +270,6 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
     return quiet and after < _CLEAR_SHARE * before
 
 
-def weigh(
-    candidates: list[Candidate],
-    suspects: list[Block],
-    weighing: Weighing,
-    own: Mapping[Candidate, list[Block]] | None = None,
-) -> dict[Hypothesis, float]:
-    """Probabilities over sets of effects and ``unlisted``.
-
-    The mean of two kinds of evidence (docs/decisions/0014): by what each set leaves, and by how
-    probable it makes the recordings, stretch by stretch of time; both pay the same prices.
-
-    Between sets, by what they leave: the logarithm of what each leaves of the mismatch, fitted and
-    held out, on a nominal number of independent looks (and one more of what is left, whatever is
-    granted); what the form of an equation may leave (``form_share`` of the settings) is granted to
-    all of them, so that no second effect is asked for to mend the form of the first; among sets of
-    as many effects less is granted (``form_share_alike``). What is left of a mismatch near the
-    noise counts by what noise could leave of it. Each parameter and each further effect has its
-    price, and so have a clock that does not drift and values that an effect hardly has
-    (:func:`loss_by_values`). Against ``unlisted``: the share of the mismatch that the set explains
-    in recordings that it was not fitted to (a name has to carry half of it; the rest may be what no
-    model has, and stands beside the name), its values (a set with an effect whose size is not told
-    from none names nothing), and whether its size is the same in all recordings; improbable sets
-    themselves say nothing against one that is. What a set is not trusted with falls to the part of
-    it that is trusted most, as far as that leads by itself: an event that may be anything takes
-    nothing from the effect beside it. What a wrong value leaves is no form's error, since the
-    equation stays the same: where a value explains more than the effects of a set do, they are
-    judged by what it leaves (docs/decisions/0025). The constants are those under which the stated
-    probabilities came true in a trial with other seeds than the published one
-    (docs/decisions/0014).
-
-    ``own`` are the blocks in which each set is judged against ``unlisted``, where these are not
-    all the suspects.
-    """
-    named = [c for c in candidates if c.terms and not _is_absent(c)]
-    if not named:
-        return {UNLISTED: 1.0}
-    start = candidates[0]
-    seconds, settings = weighing.seconds, weighing.settings
-    odd = {c: loss_by_values(c, weighing.ranges) for c in named}
-    against = {c: _loss_against_others(c, seconds, odd[c]) for c in named}
-
-    plain = _plain_scores(named, start, suspects, against, settings)
-    value = _leading_value(plain)
-    trusted = {
-        c: min(
-            _trust(one, other, suspects if own is None else own[c], weighing, odd[c])
-            for one, other in _explained_by(c, start, plain)
-        )
-        for c in named
-    }
-
-    def weights_of(granted: float) -> dict[Candidate, float]:
-        scores = _scores(plain, value, start, suspects, granted, against, settings)
-        top = max(scores.values())
-        return {c: trusted[c] * math.exp(max(-60.0, s - top)) for c, s in scores.items()}
-
-    coarse, fine = weights_of(settings.form_share), weights_of(FORM_SHARE_ALIKE)
-    weights: dict[Candidate, float] = {}
-    for count in {len(c.terms) for c in named}:
-        alike = [c for c in named if len(c.terms) == count]
-        share = sum(coarse[c] for c in alike) / sum(fine[c] for c in alike)
-        weights |= {c: share * fine[c] for c in alike}
-    weights = _share_between_places(weights, suspects)
-    out = _share_by_trust(weights, trusted)
-    lost = _lost_by_priors(plain)
-    prior = {c: -(_prior_loss(c, settings) + against[c] + lost[c] + _of_events(c)) for c in named}
-    predicted = _by_prediction(prior, suspects)
-    if predicted is not None:
-        by_prediction, share = _share_by_trust(predicted, trusted), _PREDICTIVE_SHARE
-        out = {key: (1.0 - share) * p + share * by_prediction[key] for key, p in out.items()}
-    _share_between_same_data(out, named, start, suspects, seconds)
-    out[UNLISTED] = max(0.0, 1.0 - sum(out.values()))
-    return out
-
-
-def _by_prediction(
-    prior: Mapping[Candidate, float], suspects: list[Block]
-) -> dict[Candidate, float] | None:
-    """Weights of sets by how probable each makes every stretch of the recordings; None where that
-    is not known of all of them. ``prior`` is the logarithm of what each weighs before.
-    """
-    densities = [c.densities() for c in prior]
-    if not all(b.name in d for b in suspects for d in densities):
-        return None
-    rows = [np.concatenate([d[b.name] for b in suspects]) for d in densities]
-    if len({row.size for row in rows}) > 1:
-        return None  # not the same stretches
-    scores = np.array(rows)
-    if scores.size == 0 or not np.isfinite(scores).all():
-        return None
-    shares = bootstrapped(scores, np.array(list(prior.values())))
-    return dict(zip(prior, shares.tolist(), strict=True))
-
-
-def _of_events(candidate: Candidate) -> float:
-    """What a set loses in prediction by events: their times and sizes were fitted in the recordings
-    that are predicted, a nat for each (as Akaike's criterion counts them).
-    """
-    events = candidate.fit.events
-    return 0.0 if events is None else float(sum(len(v) for v in events.values.values()))
-
-
-def _plain_scores(
-    named: list[Candidate],
-    start: Candidate,
-    suspects: list[Block],
-    against: Mapping[Candidate, float],
-    settings: DiagnosisSettings,
-) -> dict[Candidate, float]:
-    """Logarithms of weights, the same being granted to all."""
-    scores = {c: _score(c, start, suspects, FORM_SHARE_ALIKE, settings) - against[c] for c in named}
-    return _with_prior_losses(scores)
-
-
-def _leading_value(plain: Mapping[Candidate, float]) -> Candidate | None:
-    """The most probable wrong value, or values, alone."""
-    return max((c for c in plain if not c.effects), key=lambda c: plain[c], default=None)
-
-
-def _led_by_value(c: Candidate, plain: Mapping[Candidate, float], value: Candidate | None) -> bool:
-    """Whether a set with wrong values explains most by the value: none of its effects, alone or
-    together, weighs more than the most probable value does.
-    """
-    if value is None or not c.wrong:
-        return False
-    parts = [p for p in plain if p.effects and not p.wrong and set(p.effects) <= set(c.effects)]
-    return all(plain[p] <= plain[value] for p in parts)
-
-
-def _explained_by(
-    c: Candidate, start: Candidate, plain: Mapping[Candidate, float]
-) -> list[tuple[Candidate, Candidate]]:
-    """What has to carry half of a mismatch, beside what leaves that mismatch: a set beside the
-    baseline; and the effects of a set beside its wrong values, as far as these were fitted alone.
-    """
-    found = [(c, start)]
-    if c.effects and c.wrong:
-        values = [p for p in plain if not p.effects and set(p.wrong) <= set(c.wrong)]
-        if values:
-            most = max(values, key=lambda p: (len(p.wrong), plain[p]))
-            found.append((replace(c, wrong=()), most))
-    return found
-
-
-def _scores(
-    plain: Mapping[Candidate, float],
-    value: Candidate | None,
-    start: Candidate,
-    suspects: list[Block],
-    granted: float,
-    against: Mapping[Candidate, float],
-    settings: DiagnosisSettings,
-) -> dict[Candidate, float]:
-    """Logarithms of weights where a share of the mismatch is granted to the forms of equations; of
-    sets that a wrong value leads, of what the most probable value leaves.
-    """
-
-    def score(c: Candidate) -> float:
-        if value is not None and _led_by_value(c, plain, value):
-            return _score_with_value(c, value, start, suspects, granted, settings)
-        return _score(c, start, suspects, granted, settings)
-
-    return _with_prior_losses({c: score(c) - against[c] for c in plain})
-
-
-def _share_by_trust(
-    weights: Mapping[Candidate, float], trusted: Mapping[Candidate, float]
-) -> dict[Hypothesis, float]:
-    """Probabilities of sets: the weight of each times the trust in it. What a set is not trusted
-    with goes to its best part: by the trust in that part, times its share among sets of its size.
-    """
-    total, out = sum(weights.values()), dict.fromkeys((c.hypothesis for c in weights), 0.0)
-    by_size: dict[int, float] = {}
-    for c, weight in weights.items():
-        by_size[len(c.terms)] = by_size.get(len(c.terms), 0.0) + weight
-
-    def alone(part: Candidate) -> float:
-        whole = by_size[len(part.terms)]
-        return trusted[part] * weights[part] / whole if whole > 0.0 else 0.0
-
-    for c, weight in weights.items():
-        share = weight / total
-        out[c.hypothesis] += share * trusted[c]
-        parts = [p for p in weights if p.hypothesis.set < c.hypothesis.set]
-        best = max(parts, key=alone, default=None)
-        if best is not None:
-            out[best.hypothesis] += share * (1.0 - trusted[c]) * alone(best)
-    return out
-
-
 def _is_absent(candidate: Candidate) -> bool:
     """Whether the sizes of an effect of a set, taken together, are not told from none: a fit that
     goes on beside such an effect may end lower, which is not the effect's doing.
@@ -388,115 +298,6 @@ def _is_absent(candidate: Candidate) -> bool:
     return False
 
 
-def _score_with_value(
-    candidate: Candidate,
-    value: Candidate,
-    baseline: Candidate,
-    suspects: list[Block],
-    share: float,
-    settings: DiagnosisSettings,
-) -> float:
-    """The score of the most probable wrong value, and what a set with wrong values has beyond it;
-    ``share`` of what that value leaves is granted to the forms of equations beside it.
-
-    What the value leaves counts once, in its own score: beside itself it gains nothing.
-    """
-    alone, beside, left = (
-        _score(one, other, suspects, share, settings)
-        for one, other in ((value, baseline), (candidate, value), (value, value))
-    )
-    return alone + (beside - left)
-
-
-def log_weight(
-    candidate: Candidate,
-    baseline: Candidate,
-    suspects: list[Block],
-    weighing: Weighing,
-    value: Candidate | None = None,
-) -> float:
-    """Logarithm of what a hypothesis weighs beside others, up to a constant: by what it leaves, by
-    its price and by its values.
-
-    ``value`` is the most probable wrong value alone, where none of the effects alone weighs more.
-    """
-    settings = weighing.settings
-    if value is not None and candidate.wrong:
-        own = _score_with_value(candidate, value, baseline, suspects, FORM_SHARE_ALIKE, settings)
-    else:
-        own = _score(candidate, baseline, suspects, FORM_SHARE_ALIKE, settings)
-    unlikely = loss_by_values(candidate, weighing.ranges)
-    return own - _loss_against_others(candidate, weighing.seconds, unlikely)
-
-
-def _loss_against_others(candidate: Candidate, seconds: float, unlikely: float) -> float:
-    """What a set loses against others by a clock that does not drift, by times that were not seen,
-    and by its values (``loss_by_values``).
-    """
-    standing = STANDING_PRICE * lacks_drift(candidate, seconds)
-    return standing + _UNSEEN_PRICE * _has_unseen_time(candidate, seconds) + unlikely
-
-
-def _share_between_places(
-    weights: dict[Candidate, float], blocks: list[Block]
-) -> dict[Candidate, float]:
-    """Weights of sets of the same effects at other places shared out among them, by what each
-    leaves inside the noise as well.
-
-    Their equations are the same, so that no form of one is granted what it leaves; and a noise
-    level that was estimated too high makes all of them equal where one predicts better.
-    """
-    alike: dict[tuple[tuple[str, ...], tuple[str, ...]], list[Candidate]] = {}
-    for c in weights:
-        if c.places > 0.0:
-            alike.setdefault((tuple(sorted(e.id for e in c.effects)), c.wrong), []).append(c)
-    found = dict(weights)
-    for several in (cs for cs in alike.values() if len(cs) > 1):
-        within = {c: _inside_noise(c, blocks) for c in several}
-        least = min(within.values())
-        own = {c: weights[c] * math.exp(0.25 * _LOOKS * (least - within[c])) for c in within}
-        share = sum(weights[c] for c in several) / sum(own.values())
-        found |= {c: share * weight for c, weight in own.items()}
-    return found
-
-
-def _inside_noise(candidate: Candidate, blocks: list[Block]) -> float:
-    """Logarithm of what a set leaves of blocks in which that is less than the noise."""
-    stages = (candidate.fitted, candidate.held_out)
-    return sum(math.log(min(max(e[b.name].ratio, 1e-9), 1.0)) for e in stages for b in blocks)
-
-
-def _share_between_same_data(
-    out: dict[Hypothesis, float],
-    named: list[Candidate],
-    start: Candidate,
-    suspects: list[Block],
-    seconds: float,
-) -> None:
-    """Share probabilities out between sets that are the same data, by the odds before any data: a
-    late clock and the dead time of a regulator, left out or wrong in the file.
-    """
-    for one in named:
-        for effect in one.effects:
-            same = same_data_in(one.fit.rig, effect)
-            if same is None or not same_recordings(one, effect, seconds):
-                continue
-            shared = set(one.terms) - {effect}
-            others = (c for c in named if shared <= set(c.terms) and len(c.terms) == len(one.terms))
-            other = next(
-                (c for c in others if all(says_same(t, same) for t in set(c.terms) - shared)), None
-            )
-            # what explains more than the other could is something else as well
-            if other is None:
-                continue
-            left, beside = (share_left(c, start, suspects) for c in (one, other))
-            if left > beside + FORM_SHARE_ALIKE:
-                continue
-            first, second, odds = one.hypothesis, other.hypothesis, math.exp(STANDING_PRICE)
-            both = out.get(first, 0.0) + out.get(second, 0.0)
-            out[first], out[second] = both / (1.0 + odds), both * odds / (1.0 + odds)
-
-
 def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
     """Whether an effect of a set leaves the very recordings that another effect of the catalogue
     would leave.
@@ -519,58 +320,6 @@ def same_recordings(candidate: Candidate, effect: Term, seconds: float) -> bool:
     )
 
 
-def _with_prior_losses(scores: dict[Candidate, float]) -> dict[Candidate, float]:
-    """Scores of effects and of wrong values made comparable, by what their priors lose."""
-    lost = _lost_by_priors(scores)
-    return {c: score - lost[c] for c, score in scores.items()}
-
-
-def _lost_by_priors(scores: Mapping[Candidate, float]) -> dict[Candidate, float]:
-    """What the priors of the other parameters lose, which counts between effects and wrong values.
-
-    A value that is wrong lets the others go back to where they were expected; sets of effects keep
-    their order among each other, since what moves beside them is the form of their equations as
-    well.
-    """
-    if not any(c.wrong for c in scores):
-        return dict.fromkeys(scores, 0.0)
-    effects = [c for c in scores if not c.wrong]
-    shared = prior_strain(max(effects, key=lambda c: scores[c])) if effects else 0.0
-    return {c: prior_strain(c) if c.wrong else shared for c in scores}
-
-
-def prior_strain(candidate: Candidate) -> float:
-    """Half of the sum of squares of the priors of a hypothesis, as far as it counts."""
-    return min(0.5 * candidate.fit.strain, _DECIDED)
-
-
-def _trust(
-    candidate: Candidate,
-    baseline: Candidate,
-    suspects: list[Block],
-    weighing: Weighing,
-    unlikely: float,
-) -> float:
-    """Probability of a set against ``unlisted``; `unlikely` is what it loses by its values."""
-    left = min(max(share_left(candidate, baseline, suspects), 1e-6), 1.0 - 1e-6)
-    even = _LOG_ODDS_EXPLAINED_PLIABLE if _fits_anything(candidate) else _LOG_ODDS_EXPLAINED
-    odds = (math.log((1.0 - left) / left) - even) / _SOFTNESS
-    if explains(candidate, baseline, suspects):
-        odds = max(odds, _LOG_ODDS_NOISE_LEFT)
-    return capped_probability(odds - unlikely - penalty(candidate, weighing.seconds), weighing.most)
-
-
-def _fits_anything(candidate: Candidate) -> bool:
-    """Whether it takes up a good part of anything: values of the baseline, and what happens
-    differently in every recording; a line or a curve over its whole length does not.
-    """
-    events = candidate.fit.events
-    if events is None:
-        return bool(candidate.wrong)
-    info = events.effect.info
-    return bool(candidate.wrong) or not (info.own or info.leading.same_everywhere)
-
-
 def capped_probability(odds: float, most: float) -> float:
     """Probability of logarithmic odds, at most so much."""
     return most / (1.0 + math.exp(-min(60.0, max(-60.0, odds))))
@@ -591,14 +340,9 @@ def _has_unseen_time(candidate: Candidate, seconds: float) -> bool:
     std = candidate.fit.std
     return any(
         value > _UNSEEN_LENGTHS * seconds or value < _SAME_STDS * std.get(name, 0.0)
-        for name, value in _effect_values(candidate)
+        for name, value in candidate.fit.effect_values.items()
         if find_parameter(name).time_constant
     )
-
-
-def _effect_values(candidate: Candidate) -> list[tuple[str, float]]:
-    """Fitted parameters of its effects, by dotted name."""
-    return list(candidate.fit.effect_values.items())
 
 
 def lacks_drift(candidate: Candidate, seconds: float) -> bool:
@@ -661,62 +405,17 @@ def _contact_price(effect: str, values: Mapping[str, float], ranges: VisitedRang
     return lost
 
 
-def _score(
-    candidate: Candidate,
-    baseline: Candidate,
-    suspects: list[Block],
-    share: float,
-    settings: DiagnosisSettings,
-) -> float:
-    """Logarithm of the weight of a set of effects, up to a constant; ``share`` of the mismatch is
-    granted to the forms of equations.
+def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
+    """What a set pays for its names, for the parameters of its effects (of events
+    of one kind every time and size), for the places where they could have been, and for a file that
+    is wrong.
     """
-    lost = _lost_by_left(candidate, baseline, suspects, share, settings)
-    return -lost - _prior_loss(candidate, settings)
-
-
-def _lost_by_left(
-    candidate: Candidate,
-    baseline: Candidate,
-    suspects: list[Block],
-    share: float,
-    settings: DiagnosisSettings,
-) -> float:
-    """What a set loses by what it leaves, ``share`` of the mismatch being granted to forms."""
-    total = 0.0
-    once = candidate.fitted == candidate.held_out  # the same recordings twice
-    for was, now in ((baseline.fitted, candidate.fitted), (baseline.held_out, candidate.held_out)):
-        for block in suspects:
-            excess, left = (max(0.0, e[block.name].ratio - 1.0) for e in (was, now))
-            total += 0.25 * _LOOKS * math.log(1.0 + left + share * excess)
-            # of two that leave less than forms may, the one that leaves less is the more probable
-            total += 0.25 * _LOOKS_WITHIN * math.log(1.0 + left)
-            # of a mismatch near the noise the noise says how much may be left, of a strong one the
-            # forms
-            spread = math.hypot(now[block.name].scatter, settings.form_error * excess, _NOISE_ERROR)
-            total += min(0.5 * (left / spread) ** 2, _DECIDED) * (0.5 if once else 1.0)
-    return total
-
-
-def _prior_loss(candidate: Candidate, settings: DiagnosisSettings) -> float:
-    """What a set loses before any data: its price, and that of every name beyond the first."""
-    further = settings.further_price * (len(candidate.terms) - 1)
-    return price(candidate, settings) + further
-
-
-def possible_gain(
-    candidate: Candidate, baseline: Candidate, suspects: list[Block], settings: DiagnosisSettings
-) -> float:
-    """By how much the logarithm of a set's weight could rise with something beside it, which left
-    nothing at all.
-    """
-    share = settings.form_share
-    least = sum(
-        0.25 * _LOOKS * math.log(1.0 + share * max(0.0, was[block.name].ratio - 1.0))
-        for was in (baseline.fitted, baseline.held_out)
-        for block in suspects
-    )
-    return _lost_by_left(candidate, baseline, suspects, share, settings) - least
+    own = settings.wrong_price * len(candidate.wrong) + candidate.outside(settings.most_tolerances)
+    own += settings.further_price * len(candidate.terms)
+    counted = sum(not find_parameter(n).repeats for n in candidate.fit.effect_values)
+    events = candidate.fit.events
+    counted += 0 if events is None else sum(len(v) for v in events.values.values())
+    return own + settings.parameter_price * counted + candidate.places
 
 
 def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings) -> float:
@@ -730,12 +429,3 @@ def price_of_term(candidate: Candidate, term: Term, settings: DiagnosisSettings)
     rare = sum(_loss_by_value(candidate, n) for n in own)
     places = candidate.places / max(1, len(candidate.effects))
     return settings.parameter_price * counted + rare + places
-
-
-def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
-    """What a set pays for the parameters of its effects (of events of one kind only the first
-    counts), for the places where they could have been, and for a file that is wrong.
-    """
-    own = settings.wrong_price * len(candidate.wrong) + candidate.outside(settings.most_tolerances)
-    counted = [n for n, _ in _effect_values(candidate) if not find_parameter(n).repeats]
-    return own + settings.parameter_price * len(counted) + candidate.places

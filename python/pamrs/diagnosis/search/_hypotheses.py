@@ -110,7 +110,6 @@ _FITTED_HINT = 1.15
 _MARGINAL_MULTIPLE = 1.35
 # excess variance over that of the noise up to which it may (decisions 20, 22)
 _MARGINAL_EXCESS = 0.3
-_MARGINAL_PROBABILITY = 0.6  # probability that it is (decision 20: odds 3 to 2)
 # probability of unlisted that splits a group: no name is then more probable (decision 4)
 _SPLIT_FROM = 0.5
 _LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fitted (decision 13)
@@ -369,11 +368,13 @@ def _kept(
 
     apart = held_out_alone(out)
     if misses_only_held_out(now, out, same=same):
-        out = kept(outer, predicted_with_doubt(outer, baseline))
+        outside = predicted_with_doubt(outer, baseline)
+        out = kept(outer, outside)
     there = held_out_alone(out)
     suspects = [b for b in blocks if significant(now[b.name]) or b in there]
     trial = Attempts(inner, outer, nominal, noise_level, out, suspects)
-    start = Candidate((), baseline, out, now, 0.0)
+    told = trial.likelihood_of(baseline.residuals, outside)
+    start = Candidate((), baseline, out, now, 0.0, likelihood=told)
     return _Refit(trial, first, autocorrelation, was, start, apart, before, error)
 
 
@@ -474,8 +475,6 @@ class _Begun:
         Screen and weights.
     mismatch : Block
         The block that keeps most.
-    marginal : bool
-        Whether hardly more than noise is left.
     mistaken : list of Candidate
         Values that may be wrong.
     own, transient : list of Term
@@ -484,7 +483,6 @@ class _Begun:
 
     search: Search
     mismatch: Block
-    marginal: bool
     mistaken: list[Candidate]
     own: list[Term]
     transient: list[Term]
@@ -495,7 +493,7 @@ def _tried(refit: _Refit, tell: Say) -> _Mismatch:
     work = _begun(refit, tell)
     candidates = _fit_hypotheses(work.search, work.mistaken, work.own, work.transient)
     candidates, weighed = _weigh_to_the_end(work.search, candidates)
-    return _Mismatch(refit, work.mismatch, work.search, work.marginal, candidates, weighed)
+    return _Mismatch(refit, work.mismatch, work.search, candidates, weighed)
 
 
 def _begun(refit: _Refit, tell: Say) -> _Begun:
@@ -505,11 +503,10 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
     mismatch = max(suspects, key=lambda b: trial.out[b.name].ratio + now[b.name].ratio)
     size = f"{now[mismatch.name].systematic:.2g} noise levels"
     tell(Line(f"after the refit the residual of {mismatch.name} is {size}", _REFITTED))
-    marginal = _is_marginal(refit)
     acting = _acting_effects(trial, suspects)
     # events of free times would always mend a noise level that was estimated too low
     happens = [e for e in acting if not e.at and e.info.transient and not e.info.own]
-    transient = [] if marginal else happens
+    transient = [] if _is_marginal(refit) else happens
     # gauges do not drift together
     own = [e for e in acting if e.info.own and (e.at or len(trial.terms_of(e.id)) == 1)]
     persistent = [e for e in acting if e.info.lasting]
@@ -530,7 +527,7 @@ def _begun(refit: _Refit, tell: Say) -> _Begun:
         visited_ranges(trial.inner),
     )
     search = Search(trial, screened, start, weighing, tell)
-    return _Begun(search, mismatch, marginal, mistaken, own, transient)
+    return _Begun(search, mismatch, mistaken, own, transient)
 
 
 @dataclass(frozen=True, eq=False)
@@ -545,8 +542,6 @@ class _Mismatch:
         The one that keeps most.
     search : Search
         What hypotheses were found with, and are weighed by.
-    marginal : bool
-        Whether so little is left that the noise level may as well have been estimated too low.
     candidates : list of Candidate
         The baseline first, then every hypothesis.
     weighed : dict of Hypothesis to float
@@ -556,7 +551,6 @@ class _Mismatch:
     refit: _Refit
     block: Block
     search: Search
-    marginal: bool
     candidates: list[Candidate]
     weighed: dict[Hypothesis, float]
 
@@ -600,11 +594,7 @@ class _Mismatch:
 
     def groups(self, say: Say) -> list[BlockGroup]:
         """The blocks as one group, or in parts where names explain parts of them."""
-        refit, weighed = self.refit, dict(self.weighed)
-        if self.marginal:
-            unlisted = weighed[UNLISTED]
-            weighed[UNDECIDED] = _MARGINAL_PROBABILITY * unlisted
-            weighed[UNLISTED] = (1.0 - _MARGINAL_PROBABILITY) * unlisted
+        refit, weighed = self.refit, self.weighed
         now = refit.start.fitted[self.block.name]
         part = refit.trial.inner.losses.part
         shares: dict[Term, float] = {}
@@ -660,10 +650,7 @@ def _fit_hypotheses(
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
     singles += [c for e in own if (c := trial.fit_events(e, start)) is not None]
-    value = max(mistaken, key=alone, default=None)
-    if value is not None and all(alone(c) <= alone(value) for c in singles):
-        search = replace(search, value=value)
-    if transient and not any(cannot_gain(c, trial, start) for c in (*singles, *mistaken)):
+    if transient and not any(cannot_gain(c, trial) for c in (*singles, *mistaken)):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
@@ -799,7 +786,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
 
     def weighed(blocks: list[Block]) -> dict[Hypothesis, float]:
         there = [c for c in acting if any(b in blocks for b in acting[c])]
-        return weigh([start, *there], blocks, weighing, acting)
+        return weigh([start, *there], blocks, weighing)
 
     own = {
         b.name: weighed([b])

@@ -72,8 +72,6 @@ class Search:
         What they are weighed by.
     tell : callable
         Receives progress.
-    value : Candidate, optional
-        The most probable wrong value alone, where none of the effects alone weighs more.
     """
 
     trial: Attempts
@@ -81,12 +79,10 @@ class Search:
     start: Candidate
     weighing: Weighing
     tell: Say
-    value: Candidate | None = None
 
     def weight(self, candidate: Candidate) -> float:
         """Logarithm of what a hypothesis weighs against others."""
-        compared = self.trial.compared
-        return log_weight(candidate, self.start, compared, self.weighing, self.value)
+        return log_weight(candidate, self.start, self.trial.compared, self.weighing)
 
     def share_left(self, candidate: Candidate) -> float:
         """Share of the mismatch that a hypothesis leaves."""
@@ -563,11 +559,11 @@ def settles(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
     return explains(candidate, start, trial.compared)
 
 
-def cannot_gain(candidate: Candidate, trial: Attempts, start: Candidate) -> bool:
+def cannot_gain(candidate: Candidate, trial: Attempts) -> bool:
     """Whether no further one-parameter effect could pay for itself."""
     evidence = trial.settings
     least = evidence.further_price + evidence.parameter_price
-    return possible_gain(candidate, start, trial.compared, evidence) < least
+    return possible_gain(candidate, trial.compared) < least
 
 
 def log_misfit(candidate: Candidate) -> float:

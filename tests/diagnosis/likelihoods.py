@@ -1,0 +1,49 @@
+"""How probable made-up hypotheses make a recording, by the variance that they leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache
+
+import numpy as np
+
+from pamrs.diagnosis.evidence import BlockLikelihood
+from pamrs.diagnosis.evidence._likelihood import _Covariance
+from pamrs.diagnosis.noise import Excess
+
+BINS = 600
+TIMES = 0.1 * np.arange(BINS)
+
+
+@cache
+def _covariance() -> _Covariance:
+    return _Covariance([TIMES], [np.empty((BINS, 0))])
+
+
+@cache
+def _parts() -> tuple[np.ndarray, np.ndarray]:
+    """White noise and an error that is correlated over a second, each of variance one."""
+    rng = np.random.default_rng(5)
+    white, smooth = rng.normal(size=(2, BINS))
+    kept = np.exp(-0.1)
+    for k in range(1, BINS):
+        smooth[k] = kept * smooth[k - 1] + np.sqrt(1.0 - kept**2) * smooth[k]
+    smooth -= white * (white @ smooth) / (white @ white)
+    return white / np.sqrt(np.mean(white**2)), smooth / np.sqrt(np.mean(smooth**2))
+
+
+def rows_of(ratio: float) -> np.ndarray:
+    """A minute of bin means (n,) with so many times the variance of their noise."""
+    white, smooth = _parts()
+    return np.sqrt(min(ratio, 1.0)) * white + np.sqrt(max(ratio - 1.0, 0.0)) * smooth
+
+
+@cache
+def of_ratio(ratio: float) -> BlockLikelihood:
+    """How probable such a minute is."""
+    return _covariance().likelihood([rows_of(ratio)])
+
+
+def leaving(kept: Mapping[str, Excess]) -> Callable[[], Mapping[str, BlockLikelihood]]:
+    """That of what is left of each block."""
+    return lambda: {block: of_ratio(found.ratio) for block, found in kept.items()}

@@ -1,0 +1,52 @@
+"""The likelihood by which hypotheses are weighed, against dense algebra, and its laws."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from pamrs.diagnosis.evidence._likelihood import _SIZES, _Covariance
+from tests.diagnosis.likelihoods import BINS, of_ratio
+
+
+def test_it_is_that_of_noise_curves_and_an_error_that_forgets_itself() -> None:
+    """Two recordings with gaps; the curves are the same in both."""
+    rng = np.random.default_rng(2)
+    times = [np.sort(rng.choice(60, n, replace=False)) * 0.1 for n in (17, 1, 30)]
+    curves = [rng.normal(size=(t.size, 3)) for t in times]
+    curves[1] = np.empty((1, 0))  # no error acts in one of them
+    rows = [3.0 * rng.normal(size=t.size) for t in times]
+    found = _Covariance(times, curves).likelihood(rows)
+    bent = np.vstack([curves[0], np.zeros((1, 3)), curves[2]])
+    place = np.concatenate([t + 1e6 * k for k, t in enumerate(times)])
+    y = np.concatenate(rows)
+    for size, told in zip(_SIZES, found.by_size, strict=True):
+        error = np.exp(-np.abs(place[:, None] - place[None, :]))
+        covariance = np.eye(y.size) + bent @ bent.T + size**2 * error
+        dense = multivariate_normal(np.zeros(y.size), covariance, allow_singular=True).logpdf(y)
+        assert told - 0.5 * y.size * np.log(2.0 * np.pi) == pytest.approx(dense, rel=1e-6)
+    assert found.power == pytest.approx(np.mean(y**2))
+    assert found.count == y.size
+
+
+def test_the_size_that_made_the_rows_is_the_most_probable() -> None:
+    for size in _SIZES[2:8]:
+        found = of_ratio(1.0 + size**2)
+        assert found.sizes[np.argmax(found.by_size)] == size
+
+
+def test_less_left_is_more_probable() -> None:
+    told = [of_ratio(ratio).most for ratio in (1.0, 1.1, 2.0, 10.0, 1e4, 1e8)]
+    assert told == sorted(told, reverse=True)
+
+
+def test_what_is_expected_of_rows_with_an_error_is_about_what_they_have() -> None:
+    for size in (1.0, 30.0):
+        found = of_ratio(1.0 + size**2)
+        assert found.expected(size) == pytest.approx(found.most, abs=0.1 * BINS)
+
+
+def test_rows_that_nothing_is_known_of_say_nothing() -> None:
+    found = _Covariance([], []).likelihood([])
+    assert (found.most, found.count, found.power) == (0.0, 0, 0.0)
