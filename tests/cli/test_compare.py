@@ -68,7 +68,7 @@ def test_two_results_are_set_side_by_side(tmp_path: Path, capsys: Any) -> None:
     ]
     lines = [line.split() for line in text.splitlines()]
     assert ["muscle", "leak", "0.02", "0.90"] in lines
-    assert ["random:", "muscle_pressure", "0.61", "kPa", "6.1", "kPa"] in lines
+    assert ["random:", "muscle_pressure", "6.1", "mbar", "61", "mbar"] in lines
     html = page.read_text(encoding="utf-8")
     assert all(change in html for change in both["changed"])
     assert "src=" not in html

@@ -138,7 +138,7 @@ def test_the_page_has_the_drawing_and_the_free_runs() -> None:
     )
     assert 'class="chain"' in html
     row = html[html.index("<td>random</td>") :].partition("</tr>")[0]
-    assert re.findall(r">([^<>]+)</td>", row) == ["random", "5.00", "–", "0.900", "0.400"]
-    assert "kPa" in row
+    assert re.findall(r">([^<>]+)</td>", row) == ["random", "50.0", "–", "9.00", "4.00"]
+    assert "mbar" in row
     assert "Random: left its range" in html
     assert "No command in a" in html

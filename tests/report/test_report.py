@@ -89,7 +89,7 @@ def test_page_tells_the_story(page: str) -> None:
         "Next experiment",
         "sealed &lt;chamber&gt;",
         "frozen joint_angle",
-        "310 to 490 kPa",
+        "3.1 to 4.9 bar",
         "all as by default",
         "9.00 to 11.20 s",
         "How to read this page",
@@ -157,7 +157,7 @@ def test_the_free_run_is_drawn_first_with_what_it_misses() -> None:
     run = FreeRun("random", "held_out", 30.0, {"muscle_pressure": error})
     found = synthetic.diagnosis(free_run=[run], free_traces=[trace])
     (panel,) = figures.free_panels(found)
-    assert panel.title == "muscle pressure [kPa]: missed by 22.8, mended 0.61".replace("22.8", "23")
+    assert panel.title == "muscle pressure [bar]: missed by 0.23, mended 0.0061"
     assert [line.name for line in panel.lines] == ["measured", "your model", "mended model"]
     assert "Recording random, the whole rig from its commands alone" in render_html(found)
 

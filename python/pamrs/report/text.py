@@ -117,7 +117,7 @@ _INSTRUCTION = 40
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _DISPLAY = {
-    "Pa": (("kPa", 1e-3, 1e2), ("Pa", 1.0, 0.0)),
+    "Pa": (("bar", 1e-5, 1e4), ("mbar", 1e-2, 0.0)),
     "rad": (("°", 180.0 / math.pi, 0.0),),
     "m": (("m", 1.0, 1.0), ("mm", 1e3, 0.0)),
     "m2": (("m2", 1.0, 1e-2), ("mm2", 1e6, 0.0)),
@@ -617,7 +617,7 @@ def miss_of(error: ChannelError, channel: str, stage: str) -> Miss | None:
 
 
 def sized(value: float, unit: str) -> str:
-    """A size with its unit, as a terminal has it: ``0.85 kPa``."""
+    """A size with its unit, as a terminal has it: ``8.5 mbar``."""
     shown, factor = display_unit(unit, abs(value))
     size = format_number(value * factor, 2, unicode=False)
     return with_unit(size, shown.replace("°", "deg"))
