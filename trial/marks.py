@@ -53,7 +53,8 @@ class Mark:
     healthy cases whose model error is stated: `none` or `parameters`. `inside` and `shares`:
     whether intervals hold the truth, and shares of terms are right. `claims`: leading probability
     of each group of blocks, and whether its hypothesis is true. `placed`, of right names of effects
-    that act at a side of a pair: the place is right.
+    that act at a side of a pair: the place is right. `located`, where anything is wrong: the block
+    that is said first is one in which it is.
     """
 
     case: str
@@ -76,10 +77,12 @@ class Mark:
     claims: tuple[tuple[float, bool], ...] = ()
     blocks: tuple[BlockMark, ...] = ()
     placed: bool | None = None
+    located: bool | None = None
 
     def to_dict(self) -> dict[str, Any]:
-        """For the JSON of a score; without the place where that is no question."""
-        told = {k: v for k, v in self.__dict__.items() if k != "placed" or v is not None}
+        """For the JSON of a score; without places where these are no question."""
+        places = ("placed", "located")
+        told = {k: v for k, v in self.__dict__.items() if k not in places or v is not None}
         told["blocks"] = [b.__dict__ for b in self.blocks]
         return told
 
@@ -410,6 +413,13 @@ def _placed(truth: _Truth, told: _Told) -> bool | None:
     return said in ({""}, set(SIDES)) if right == BOTH else said == {right}
 
 
+def _located(truth: _Truth, result: dict[str, Any]) -> bool:
+    """Whether the block that is said first is one in which something is missing or wrong."""
+    said = (result.get("where") or {}).get("block")
+    wrong = {b for _, b in truth.listed} | {*truth.unlisted, *truth.wrong_block.values()}
+    return bool(said) and bool(covered([str(said)]) & wrong)
+
+
 def gap_of(result: dict[str, Any]) -> float | None:
     """Share of the gap to the noise that the diagnosis closed on held-out recordings.
 
@@ -480,6 +490,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
         claims=tuple(claims),
         blocks=_blocks(truth, told),
         placed=_placed(truth, told) if not missing else None,
+        located=None if healthy or missing else _located(truth, result or {}),
     )
 
 

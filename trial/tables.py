@@ -29,6 +29,7 @@ def _one(name: str) -> Counts:
 SHARES: dict[str, Counts] = {
     "leading name right": _one("leading"),
     "set holds the truth": _one("holds"),
+    "block located": _one("located"),
     "wrong parameter named": _one("wrong"),
     "false name": _one("false_name"),
     "unlisted right": _one("unlisted"),
@@ -40,6 +41,7 @@ SHARES: dict[str, Counts] = {
 WANTED: dict[str, tuple[float, bool]] = {
     "leading name right": (0.90, True),
     "set holds the truth": (0.98, True),
+    "block located": (0.97, True),
     "wrong parameter named": (0.95, True),
     "false name": (0.01, False),
     "unlisted right": (0.85, True),
@@ -201,6 +203,7 @@ def targets(marks: Sequence[Mark]) -> list[Target]:
             (t, WANTED[t][0])
             for t in (
                 "set holds the truth",
+                "block located",
                 "wrong parameter named",
                 "interval holds",
                 "share within 15 points",

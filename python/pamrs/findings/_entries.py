@@ -48,6 +48,9 @@ class Where(Entry):
     ----------
     block, channel : str or None
         Block of the chain that carries the excess residual, and the channel that tells.
+    probability : float or None
+        Probability that something is missing there or that a value of the rig file is wrong,
+        whatever its name.
     intervals : list of (start, stop)
         When [s].
     conditions : list of Condition
@@ -62,6 +65,10 @@ class Where(Entry):
         default=None, metadata=told("block of the chain that carries the excess residual")
     )
     channel: str | None = field(default=None, metadata=told("channel that tells"))
+    probability: float | None = field(
+        default=None,
+        metadata=told("probability that something is missing or wrong there, whatever its name"),
+    )
     intervals: list[list[float]] = field(
         default_factory=list, metadata=told("start and stop in s", kind="pairs")
     )

@@ -89,8 +89,9 @@ class Candidate:
         By block, on the recordings to fit.
     gap_closed : float
         Share of the baseline's excess that it removes on held-out recordings.
-    scatter : float
-        Relative scatter of its size between recordings, beyond its uncertainty.
+    scattered : callable
+        Relative scatter of its size between recordings, beyond its uncertainty, which takes
+        simulations.
     gain : float
         Gain in chi-square that the screen predicted for a single effect.
     wrong : tuple of str
@@ -109,7 +110,7 @@ class Candidate:
     held_out: dict[str, Excess]
     fitted: dict[str, Excess]
     gap_closed: float
-    scatter: float = 0.0
+    scattered: Callable[[], float] = field(default=float, repr=False)
     gain: float = 0.0
     wrong: tuple[str, ...] = ()
     places: float = 0.0
@@ -413,7 +414,7 @@ class Attempts:
             after,
             inside,
             gap,
-            _scatter(effects, self.inner, found),
+            scattered=cache(partial(_scatter, effects, self.inner, found)),
             places=sum(math.log(len(self.terms_of(e.id))) for e in effects),
             likelihood=self.likelihood_of(found.residuals, outside),
         )

@@ -329,7 +329,7 @@ def penalty(candidate: Candidate, seconds: float) -> float:
     """What a set's values take from the logarithm of its odds: a size that scatters between
     recordings, a time that was not seen.
     """
-    scatter = max(0.0, candidate.scatter - _SCATTER) / _SCATTER_WIDTH
+    scatter = max(0.0, candidate.scattered() - _SCATTER) / _SCATTER_WIDTH
     return scatter + _UNSEEN_PRICE * _has_unseen_time(candidate, seconds)
 
 

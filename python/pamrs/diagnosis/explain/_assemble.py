@@ -222,7 +222,7 @@ def _tried(groups: list[BlockGroup]) -> list[Tried]:
             fitted={b: e.ratio for b, e in candidate.fitted.items()},
             held_out={b: e.ratio for b, e in candidate.held_out.items()},
             gap_closed=candidate.gap_closed,
-            scatter=candidate.scatter,
+            scatter=candidate.scattered(),
             fitted_values=candidate.fit.effect_values,
             std={
                 n: s

@@ -7,14 +7,16 @@ import numpy as np
 from pamrs.channels import channel_of, unit_of
 from pamrs.diagnosis.evidence import Candidate, Judged, parameters_at_wall
 from pamrs.diagnosis.explain._conditions import Picture
-from pamrs.diagnosis.fit import Problem
+from pamrs.diagnosis.fit import Problem, concerns
 from pamrs.diagnosis.model import spoiled_channels
-from pamrs.effects import CATALOGUE, UNDECIDED
+from pamrs.diagnosis.prepare import Block
+from pamrs.effects import CATALOGUE, UNDECIDED, UNLISTED
 from pamrs.findings import ChannelError, Where
 from pamrs.recordings import Case
 from pamrs.report.text import (
     display_unit,
     format_number,
+    format_probability,
     miss_of,
     spoken_block,
     spoken_name,
@@ -60,10 +62,11 @@ def where(
     missed = miss_of(proof[block.channel], block.channel, "refit")
     place = spoken_block(located)
     parts = "" if block.covers == located else f" ({block.covers})"
+    chance = _missing_there(block, judged)
     text = (
-        f"The mismatch lies in the {place}{parts}. With the measured signals of its "
-        f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)} by "
-        f"{missed} on {on}."
+        f"The mismatch lies in the {place}{parts}, probability {format_probability(chance)}. With "
+        "the measured signals of its neighbours as inputs, the refitted model misses "
+        f"{spoken_name(block.channel)} by {missed} on {on}."
     )
     group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
@@ -111,11 +114,23 @@ def where(
     return Where(
         block=located,
         channel=block.channel,
+        probability=round(chance, 4),
         intervals=[] if below_noise else picture.intervals,
         conditions=[] if below_noise else picture.conditions[:6],
         text=text,
         recording=picture.recording,
     )
+
+
+def _missing_there(block: Block, judged: list[Judged]) -> float:
+    """Probability that something is missing in a block, or a value of the rig file wrong."""
+    total = 0.0
+    for found in (j for j in judged if block in j.group.blocks):
+        suspected = block in found.group.suspects
+        for hypothesis, chance in found.probabilities.items():
+            named = any(concerns(term, block) for term in hypothesis.terms)
+            total += chance * (named or (suspected and hypothesis == UNLISTED))
+    return min(1.0, total)
 
 
 def left_out(case: Case, judged: list[Judged]) -> list[str]:
@@ -177,9 +192,9 @@ def warnings(case: Case, judged: list[Judged], no_held_out: bool) -> list[str]:
         )
     for group in groups:
         best = group.best
-        if best.effects and best.scatter > _SCATTER:
+        if best.effects and (scatter := best.scattered()) > _SCATTER:
             out.append(
-                f"the size of {best.hypothesis} scatters by {100 * best.scatter:.0f} % between "
+                f"the size of {best.hypothesis} scatters by {100 * scatter:.0f} % between "
                 "recordings"
             )
     for name in unknown_volumes(case.rig):
