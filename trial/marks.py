@@ -490,7 +490,7 @@ def mark(key: dict[str, Any], result: dict[str, Any] | None) -> Mark:
         claims=tuple(claims),
         blocks=_blocks(truth, told),
         placed=_placed(truth, told) if not missing else None,
-        located=None if healthy or missing else _located(truth, result or {}),
+        located=None if healthy else _located(truth, result or {}),
     )
 
 

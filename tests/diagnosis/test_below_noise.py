@@ -203,12 +203,12 @@ def test_a_clock_that_does_not_drift_gives_way_to_a_lag() -> None:
 def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
     seen = candidate(
         terms("muscle_creep"),
-        1.0,
+        0.3,
         **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 8.0},
     )
     unseen = candidate(
         terms("muscle_creep"),
-        1.0,
+        0.3,
         **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 300.0},
     )
     assert weighed(seen)["muscle_creep"] > 0.6

@@ -254,7 +254,7 @@ class DiagnosisSettings:
     further_price: float = _setting(
         3.0,
         "log odds",
-        "price of a further effect or wrong parameter",
+        "price of each effect and each wrong parameter",
         "docs/decisions/0014: tuned on seed 501",
     )
     wrong_price: float = _setting(

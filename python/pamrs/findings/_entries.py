@@ -67,7 +67,9 @@ class Where(Entry):
     channel: str | None = field(default=None, metadata=told("channel that tells"))
     probability: float | None = field(
         default=None,
-        metadata=told("probability that something is missing or wrong there, whatever its name"),
+        metadata=told(
+            "probability that something is missing or wrong there, whatever its name", optional=True
+        ),
     )
     intervals: list[list[float]] = field(
         default_factory=list, metadata=told("start and stop in s", kind="pairs")

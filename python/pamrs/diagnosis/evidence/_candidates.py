@@ -806,7 +806,10 @@ def _scatter(effects: tuple[Term, ...], problem: Problem, best: Fit) -> float:
     size = abs(best.values.get(leading, 0.0))
     if size == 0.0:
         return 0.0
-    found = residuals(problem, best.rig, [leading])
+    try:
+        found = residuals(problem, best.rig, [leading])
+    except SimulationError:
+        return 0.0  # nothing is known of it
     steps, errors = [], []
     for prepared in problem.recordings:
         num = den = 0.0

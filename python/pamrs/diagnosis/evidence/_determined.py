@@ -29,12 +29,12 @@ def with_stated_std(problem: Problem, group: BlockGroup, candidate: Candidate) -
 
 
 def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
-    """A group in which no name leads alone whose values are not told from none by the standard
-    deviations that are stated.
+    """A group in which a name alone, whose values are not told from none by the standard deviations
+    that are stated, has half of its probability.
 
-    It keeps half of its probability, and the other half falls to ``unlisted``: something acts
-    there, and what it is was not told (to nothing, where no more than noise was left). Beside other
-    names the evidence of the set without it has said whether it is needed.
+    The other half falls to ``unlisted``: something acts there, and which effect was not told (to
+    nothing, where no more than noise was left). Whether a set needs such a name is told by the
+    evidence of the set without it.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def drop_undetermined(group: BlockGroup, problem: Problem) -> BlockGroup:
     Returns
     -------
     BlockGroup
-        With other probabilities; the same where every name is determined.
+        With other probabilities; the same where every single name is determined.
     """
     settings = problem.settings
     if group.mismatch is None:

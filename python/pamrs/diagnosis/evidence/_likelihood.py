@@ -7,9 +7,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from threading import Lock
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 
 from pamrs.diagnosis.fit import Key
@@ -17,8 +19,10 @@ from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
 _ERROR_TIME = 1.0  # [s] correlation time of the error that nobody states (decision 14)
-# [noise levels] sizes of that error that are tried, half a decade apart
-_SIZES = np.array([0.0, *10.0 ** np.arange(-1.0, 5.1, 0.5)])
+# [noise levels] sizes of that error that are worked out, and those between that are tried
+_SIZES = 10.0 ** np.arange(-1.0, 7.1, 0.5)
+_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)
+_LEAST_SQUARE = 1e-3  # square below which differences say nothing
 
 
 Array = NDArray[np.float64]
@@ -30,21 +34,21 @@ class BlockLikelihood:
 
     Attributes
     ----------
-    by_size : (k,) array
-        Logarithm of the density of the bin means for each size of the error that nobody states.
-    volume : (k,) array
-        Logarithm of the determinant of their covariance for each size.
     sizes : (k,) array
-        Those sizes, in noise levels.
+        Sizes of the error that nobody states, in noise levels; the first is none.
+    by_size : (k,) array
+        Logarithm of the density of the bin means for each.
+    volume : (k,) array
+        Logarithm of the determinant of their covariance for each.
     count : int
         How many bins there are.
     power : float
         Mean square of the bin means, in noise levels squared.
     """
 
+    sizes: Array
     by_size: Array
     volume: Array
-    sizes: Array
     count: int
     power: float
 
@@ -55,9 +59,7 @@ class BlockLikelihood:
 
     def expected(self, size: float) -> float:
         """Logarithm of the density of rows that have an error of this size, and no more."""
-        known = np.log(np.maximum(self.sizes, self.sizes[1]))
-        volume = float(np.interp(math.log(max(size, self.sizes[1])), known, self.volume))
-        return -0.5 * (self.count + volume)
+        return -0.5 * (self.count + float(np.interp(size, self.sizes, self.volume)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +83,15 @@ class Likelihood:
     blocks: list[Block]
     recordings: list[Prepared]
     noise_level: Mapping[Key, NoiseLevel]
-    _known: dict[tuple[str, bytes], _Covariance] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[object, ...], _Covariance] = field(default_factory=dict, repr=False)
+    _lock: Lock = field(default_factory=Lock, repr=False)
 
     def of(self, found: Mapping[Key, Residual]) -> dict[str, BlockLikelihood]:
         """How probable residuals are, by block."""
         return {block.name: self._of_block(block.name, found) for block in self.blocks}
 
     def _of_block(self, name: str, found: Mapping[Key, Residual]) -> BlockLikelihood:
+        at: list[object] = [name]
         rows: list[Array] = []
         times: list[Array] = []
         curves: list[Array] = []
@@ -98,30 +102,44 @@ class Likelihood:
             means, counts = binned(found[key].value, found[key].rows, width)
             seen = np.flatnonzero(counts)
             if seen.size and noise > 0.0:
+                at += [prepared.recording.name, seen.tobytes()]
                 rows.append(means[seen] / noise)
                 times.append(width * prepared.dt * seen.astype(np.float64))
                 bent = level.curves
                 curves.append(np.empty((seen.size, 0)) if bent is None else bent[seen] / noise)
-        at = name, b"".join(t.tobytes() for t in times)
-        if at not in self._known:
-            self._known[at] = _Covariance(times, curves)
-        return self._known[at].likelihood(rows)
+        with self._lock:  # hypotheses are judged two at a time
+            known = self._known.get(tuple(at))
+            if known is None:
+                known = self._known[tuple(at)] = _Covariance(times, curves)
+        return known.likelihood(rows)
 
 
 class _Covariance:
     """The covariance of a block's bin means under each size of the error that nobody states."""
 
     def __init__(self, times: list[Array], curves: list[Array]) -> None:
+        self._without = _Sized(0.0, times, curves)
         self._each = [_Sized(size, times, curves) for size in _SIZES]
-        self._volume = np.array([sized.volume for sized in self._each])
+        self._sizes = np.array([0.0, *_BETWEEN])
+        volume = self._between([sized.volume for sized in self._each])
+        self._volume = np.array([self._without.volume, *volume])
+
+    def _between(self, values: list[float]) -> Array:
+        """Values for each size worked out, for all those that are tried."""
+        return np.asarray(CubicSpline(np.log(_SIZES), values)(np.log(_BETWEEN)), dtype=np.float64)
 
     def likelihood(self, rows: list[Array]) -> BlockLikelihood:
-        """That of bin means, recording by recording."""
-        power = sum(float(y @ y) for y in rows)
-        square = np.array([sized.square(rows) for sized in self._each])
-        count = sum(y.size for y in rows)
+        """That of bin means, recording by recording; nothing is less probable than what is not
+        finite.
+        """
+        count, power = sum(y.size for y in rows), sum(float(y @ y) for y in rows)
+        if not math.isfinite(power):
+            never = np.full(self._sizes.size, -math.inf)
+            return BlockLikelihood(self._sizes, never, self._volume, count, math.inf)
+        logs = [math.log(max(sized.square(rows), _LEAST_SQUARE)) for sized in self._each]
+        square = np.array([self._without.square(rows), *np.exp(self._between(logs))])
         by_size = -0.5 * (square + self._volume)
-        return BlockLikelihood(by_size, self._volume, _SIZES, count, power / max(1, count))
+        return BlockLikelihood(self._sizes, by_size, self._volume, count, power / max(1, count))
 
 
 class _Sized:
@@ -133,8 +151,10 @@ class _Sized:
 
     def __init__(self, size: float, times: list[Array], curves: list[Array]) -> None:
         self._factors: list[Array | None] = []
+        self._curves = curves
         self.volume = 0.0
         for t in times:
+            factor = None
             if size > 0.0:
                 bands, forgotten = _inverse(t)
                 bands /= size**2
@@ -142,15 +162,11 @@ class _Sized:
                 factor = cholesky_banded(bands, lower=True)
                 self.volume += t.size * math.log(size**2) + forgotten
                 self.volume += 2.0 * float(np.log(factor[0]).sum())
-                self._factors.append(factor)
-            else:
-                self._factors.append(None)
-        self._curves = [self._white(k, c) for k, c in enumerate(curves)]
-        most = max((c.shape[1] for c in curves), default=0)
-        normal = np.eye(most)
-        for c, white in zip(curves, self._curves, strict=True):
-            normal[: c.shape[1], : c.shape[1]] += c.T @ white
-        self._normal = cho_factor(normal, lower=True) if most else None
+            self._factors.append(factor)
+        normal = np.eye(max((c.shape[1] for c in curves), default=0))
+        for k, c in enumerate(curves):
+            normal[: c.shape[1], : c.shape[1]] += c.T @ self._white(k, c)
+        self._normal = cho_factor(normal, lower=True) if normal.size else None
         if self._normal is not None:
             self.volume += 2.0 * float(np.log(np.diag(self._normal[0])).sum())
 
@@ -161,12 +177,13 @@ class _Sized:
 
     def square(self, rows: list[Array]) -> float:
         """Rows times the inverse of their covariance times rows."""
-        found = sum(float(y @ self._white(k, y)) for k, y in enumerate(rows))
+        found, told = 0.0, np.zeros(0 if self._normal is None else len(self._normal[0]))
+        for k, y in enumerate(rows):
+            white, curves = self._white(k, y), self._curves[k]
+            found += float(y @ white)
+            told[: curves.shape[1]] += curves.T @ white
         if self._normal is None:
             return found
-        told = np.zeros(len(self._normal[0]))
-        for white, y in zip(self._curves, rows, strict=True):
-            told[: white.shape[1]] += white.T @ y
         return found - float(told @ cho_solve(self._normal, told))
 
 

@@ -27,8 +27,8 @@ from pamrs.effects import (
     usual_values,
 )
 
-# share of the logarithm of evidence that counts: least, most, and where the variance is that of
-# noise, since what no model explains depends on itself (decision 14)
+# share of the logarithm of evidence that counts: at least, at most, and as a numerator over the
+# variance that is left, since what no model explains depends on itself (decision 14)
 _LEAST_SHARE, _MOST_SHARE, _NOISE_SHARE = 0.01, 0.1, 0.3
 # share of what it explains that a right name leaves, as forms of equations err (decision 14)
 _FORM_ERROR = 0.2
@@ -80,7 +80,7 @@ class Weighing:
     seconds : float
         Length of the longest recording that was fitted [s].
     settings : DiagnosisSettings
-        Prices, and what is allowed to the forms of equations.
+        Prices.
     ranges : dict, optional
         What was visited in these recordings, by kind of channel [SI].
     """
@@ -203,10 +203,12 @@ def _evidence(
     """
     total = 0.0
     for name in (block.name for block in suspects):
-        own, before = candidate.likelihood()[name], baseline.likelihood()[name].power
-        expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(max(0.0, before - own.power))
+        own, before = candidate.likelihood()[name], baseline.likelihood()[name]
+        expected = _LEAST_ERROR + _FORM_ERROR * math.sqrt(max(0.0, before.power - own.power))
         beyond = np.log(np.maximum(own.sizes, expected) / expected) / _FORM_SPREAD
-        total += float((share * own.by_size - 0.5 * beyond**2).max())
+        # windows that are too short for a hypothesis leave it fewer bins
+        told = share * before.count / max(1, own.count) * own.by_size
+        total += float((told - 0.5 * beyond**2).max())
     return total
 
 

@@ -63,8 +63,9 @@ def where(
     place = spoken_block(located)
     parts = "" if block.covers == located else f" ({block.covers})"
     chance = _missing_there(block, judged)
+    sure = f", probability {format_probability(chance)}" if chance > 0.5 else ""
     text = (
-        f"The mismatch lies in the {place}{parts}, probability {format_probability(chance)}. With "
+        f"The mismatch lies in the {place}{parts}{sure}. With "
         "the measured signals of its neighbours as inputs, the refitted model misses "
         f"{spoken_name(block.channel)} by {missed} on {on}."
     )
