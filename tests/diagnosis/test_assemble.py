@@ -179,7 +179,7 @@ def test_a_channel_that_a_new_model_spoils_is_told() -> None:
     channels = {name: ChannelError(**row) for name, row in table.items()}
     spoiled = replace(channels["muscle_pressure"], after=9100.0)
     (told,) = words.worse({**channels, "muscle_pressure": spoiled})
-    assert "muscle pressure by 9.10 kPa, the nominal one by 7.50 kPa" in told
+    assert "muscle pressure by 91.0 mbar, the nominal one by 75.0 mbar" in told
     assert words.worse({"joint_angle": channels["joint_angle"]}) == []
 
 

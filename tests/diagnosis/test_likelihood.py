@@ -44,7 +44,7 @@ def test_less_left_is_more_probable() -> None:
 def test_what_is_expected_of_rows_with_an_error_is_about_what_they_have() -> None:
     for size in (1.0, 30.0):
         found = of_ratio(1.0 + size**2)
-        assert found.expected(size) == pytest.approx(found.most, abs=0.05 * BINS)
+        assert found.expected(size) == pytest.approx(found.most, rel=0.05)
     assert of_ratio(1.0).expected(0.0) == -0.5 * BINS
 
 

@@ -152,7 +152,7 @@ def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
     assert words.is_open(loud)
     assert loud.headline == (
         "The model of the arm may leave out a slow change of the muscle: muscle creep (0.98); the "
-        "whole rig from its commands alone misses muscle pressure by 23 kPa (57 times the noise "
+        "whole rig from its commands alone misses muscle pressure by 0.23 bar (57 times the noise "
         "level)"
     )
     assert "whole rig" not in quiet.headline

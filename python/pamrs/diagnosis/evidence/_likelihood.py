@@ -19,9 +19,9 @@ from pamrs.diagnosis.noise import NoiseLevel, bins_of
 from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
 
 _ERROR_TIME = 1.0  # [s] correlation time of the error that nobody states (decision 14)
-# [noise levels] sizes of that error that are worked out, and those between that are tried
+# [noise levels] sizes of that error that are worked out; half a decade apart splines are smooth
 _SIZES = 10.0 ** np.arange(-1.0, 7.1, 0.5)
-_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)
+_BETWEEN = 10.0 ** np.linspace(-1.0, 7.0, 321)  # [noise levels] those between that are tried
 _LEAST_SQUARE = 1e-3  # square below which differences say nothing
 
 

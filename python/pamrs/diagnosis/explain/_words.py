@@ -58,22 +58,20 @@ def where(
         return Where(text=text)
     block = next(b for b in problem.blocks if b.name == located)
     proof = errors["held_out"] or errors["fit"]
-    on = "held-out recordings" if errors["held_out"] else "the fitted recordings"
     missed = miss_of(proof[block.channel], block.channel, "refit")
     place = spoken_block(located)
-    parts = "" if block.covers == located else f" ({block.covers})"
+    parts = f" ({block.covers})" * (block.covers != located)
     chance = _missing_there(block, judged)
     sure = f", probability {format_probability(chance)}" if chance > 0.5 else ""
     text = (
-        f"The mismatch lies in the {place}{parts}{sure}. With "
-        "the measured signals of its neighbours as inputs, the refitted model misses "
-        f"{spoken_name(block.channel)} by {missed} on {on}."
+        f"The mismatch lies in the {place}{parts}{sure}. With the measured signals of its "
+        f"neighbours as inputs, the refitted model misses {spoken_name(block.channel)} by "
+        f"{missed} on {'held-out' if errors['held_out'] else 'the fitted'} recordings."
     )
-    group = next((g for g in groups if g.mismatch is not None and g.mismatch.name == located), None)
+    group = next((g for g in groups if g.mismatch and g.mismatch.name == located), None)
     wrong = next((j.wrong for j in judged if block in j.group.blocks), ())
     below_noise = group is not None and group.below_noise
-    mistaken = bool(wrong) and (group is None or below_noise)
-    if mistaken:
+    if wrong and (group is None or below_noise):
         text = (
             f"The {place}{parts} fits down to the noise level, but only with parameters at "
             "the ends of their tolerances. With another value of the "
