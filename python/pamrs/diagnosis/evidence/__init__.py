@@ -2,7 +2,7 @@
 
 Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
-`BlockLikelihood`, `Likelihood` (how probable recordings are);
+`BlockLikelihood` (how probable recordings are);
 `weigh`, `explains`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
 `capped_probability`, `penalty`, `price`, `possible_gain`, `lacks_drift`, `loss_by_values`,
 `visited_ranges`, `Weighing` (their weights); `drop_undetermined`, `undetermined_effects`,
@@ -29,7 +29,7 @@ from pamrs.diagnosis.evidence._determined import (
     undetermined_effects,
     with_stated_std,
 )
-from pamrs.diagnosis.evidence._likelihood import BlockLikelihood, Likelihood
+from pamrs.diagnosis.evidence._likelihood import BlockLikelihood
 from pamrs.diagnosis.evidence._verdicts import (
     WALL_TOLERANCES,
     Judged,
@@ -67,7 +67,6 @@ __all__ = [
     "Candidate",
     "BlockGroup",
     "Judged",
-    "Likelihood",
     "Weighing",
     "autocorrelation_of",
     "capped_probability",

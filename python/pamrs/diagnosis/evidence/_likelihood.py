@@ -15,8 +15,8 @@ from scipy.interpolate import CubicSpline
 from scipy.linalg import cho_factor, cho_solve, cho_solve_banded, cholesky_banded
 
 from pamrs.diagnosis.fit import Key
-from pamrs.diagnosis.noise import NoiseLevel, bins_of
-from pamrs.diagnosis.prepare import Block, Prepared, Residual, binned
+from pamrs.diagnosis.noise import NoiseLevel, bins_of, means_in_noises
+from pamrs.diagnosis.prepare import Block, Prepared, Residual
 
 _ERROR_TIME = 1.0  # [s] correlation time of the error that nobody states (decision 14)
 # [noise levels] sizes of that error that are worked out; half a decade apart splines are smooth
@@ -93,25 +93,28 @@ class Likelihood:
     def _of_block(self, name: str, found: Mapping[Key, Residual]) -> BlockLikelihood:
         at: list[object] = [name]
         rows: list[Array] = []
-        times: list[Array] = []
-        curves: list[Array] = []
+        seen_in: list[tuple[Prepared, NDArray[np.intp]]] = []
         for prepared in self.recordings:
-            key, width = (name, prepared.recording.name), bins_of(prepared)
-            level = self.noise_level[key]
-            noise = math.sqrt(max(0.0, level.noise_variance))
-            means, counts = binned(found[key].value, found[key].rows, width)
-            seen = np.flatnonzero(counts)
-            if seen.size and noise > 0.0:
+            key = name, prepared.recording.name
+            seen, own = means_in_noises(prepared, found[key], self.noise_level[key])
+            if own.size:
                 at += [prepared.recording.name, seen.tobytes()]
-                rows.append(means[seen] / noise)
-                times.append(width * prepared.dt * seen.astype(np.float64))
-                bent = level.curves
-                curves.append(np.empty((seen.size, 0)) if bent is None else bent[seen] / noise)
+                rows.append(own)
+                seen_in.append((prepared, seen))
         with self._lock:  # hypotheses are judged two at a time
             known = self._known.get(tuple(at))
             if known is None:
-                known = self._known[tuple(at)] = _Covariance(times, curves)
+                known = self._known[tuple(at)] = self._covariance(name, seen_in)
         return known.likelihood(rows)
+
+    def _covariance(
+        self, name: str, seen_in: list[tuple[Prepared, NDArray[np.intp]]]
+    ) -> _Covariance:
+        """That of a block's bin means where they are usable."""
+        times = [bins_of(p) * p.dt * seen.astype(np.float64) for p, seen in seen_in]
+        levels = [self.noise_level[name, p.recording.name] for p, _ in seen_in]
+        both = zip(levels, seen_in, strict=True)
+        return _Covariance(times, [level.curves_in_noises(seen) for level, (_, seen) in both])
 
 
 class _Covariance:

@@ -153,13 +153,11 @@ def weigh(
     weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
-    # what no name may have falls to physics without a name
-    beyond = {h: (1.0 - weighing.most) * out[h] for h in out if h.terms}
-    return (
-        out
-        | {h: out[h] - p for h, p in beyond.items()}
-        | {UNLISTED: out[UNLISTED] + sum(beyond.values())}
-    )
+    for hypothesis in [h for h in out if h.terms]:
+        # what no name may have falls to physics without a name
+        out[UNLISTED] += (1.0 - weighing.most) * out[hypothesis]
+        out[hypothesis] *= weighing.most
+    return out
 
 
 def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
@@ -408,9 +406,8 @@ def _contact_price(effect: str, values: Mapping[str, float], ranges: VisitedRang
 
 
 def price(candidate: Candidate, settings: DiagnosisSettings) -> float:
-    """What a set pays for its names, for the parameters of its effects (of events
-    of one kind every time and size), for the places where they could have been, and for a file that
-    is wrong.
+    """What a set pays for its names, for the parameters of its effects (of events of one kind every
+    time and size), for the places where they could have been, and for a file that is wrong.
     """
     own = settings.wrong_price * len(candidate.wrong) + candidate.outside(settings.most_tolerances)
     own += settings.further_price * len(candidate.terms)

@@ -60,7 +60,7 @@ def where(
     proof = errors["held_out"] or errors["fit"]
     missed = miss_of(proof[block.channel], block.channel, "refit")
     place = spoken_block(located)
-    parts = f" ({block.covers})" * (block.covers != located)
+    parts = "" if block.covers == located else f" ({block.covers})"
     chance = _missing_there(block, judged)
     sure = f", probability {format_probability(chance)}" if chance > 0.5 else ""
     text = (

@@ -6,7 +6,7 @@ Public: `Problem`, `Fit`, `Scaling`, `fit`, `residuals`, `changes`, `stacked`, `
 `starts_of`, `CHOSEN` (where the fit of an effect begins); `form_in`, `entry_of`,
 `with_effects_of`, `with_entry`, `without_term` (effects of a rig and their forms);
 `Events`, `events_of`, `fit_events`, `look_for_events` (transient effects); `acts_in`, `concerns`,
-`depends`, `fits`, `places_of`, `same_data_in`, `says_same` (where effects act); `holdable`,
+`depends`, `fits`, `places_of`, `same_data_in` (where effects act); `holdable`,
 `without_passing`, `known_parameters`, `with_known` (effects that the nominal model holds, and what
 is known of all parameters); `spread_over_pieces` (standard deviations of coloured residuals).
 """
@@ -20,7 +20,6 @@ from pamrs.diagnosis.fit._acting import (
     fits,
     places_of,
     same_data_in,
-    says_same,
 )
 from pamrs.diagnosis.fit._fitting import (
     FINAL_STEP_SHARE,
@@ -94,7 +93,6 @@ __all__ = [
     "predicted_with_doubt",
     "residuals",
     "same_data_in",
-    "says_same",
     "spread_over_pieces",
     "stacked",
     "starts_of",

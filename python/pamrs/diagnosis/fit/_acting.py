@@ -124,14 +124,6 @@ def same_data_in(rig: Rig, effect: Term) -> SameData | None:
     return same and replace(same, held=same.held if rig.tables(same.held_at) else ())
 
 
-def says_same(term: Term, same: SameData) -> bool:
-    """Whether a term is the effect of ``same``, or the value of a rig file that states it."""
-    if not term.is_value:
-        return term == Term(same.effect)
-    block, _, key = split_name(term.id)
-    return f"{block}.{key}" in EFFECTS[same.effect].stated_by
-
-
 def _acts_on(rig: Rig, info: EffectInfo) -> bool:
     """Whether a rig has what an effect acts on."""
     usual = info.at or ("joint" if info.block == "arm" else "chamber")

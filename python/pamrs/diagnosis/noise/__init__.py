@@ -1,9 +1,8 @@
 """When a residual is more than noise: noise levels with the noise of the drives, excess over them,
 autocorrelation.
 
-Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `model_error`,
-`error_sizes`, `with_sizes`,
-`correlation_time`, `inflation`.
+Public: `NoiseLevel`, `noise_levels`, `Excess`, `excess`, `bins_of`, `means_in_noises`,
+`model_error`, `error_sizes`, `with_sizes`, `correlation_time`, `inflation`.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from pamrs.diagnosis.noise._levels import (
     bins_of,
     error_sizes,
     excess,
+    means_in_noises,
     noise_levels,
     with_sizes,
 )
@@ -31,6 +31,7 @@ __all__ = [
     "error_sizes",
     "excess",
     "inflation",
+    "means_in_noises",
     "model_error",
     "noise_levels",
     "with_sizes",

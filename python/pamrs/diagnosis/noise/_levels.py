@@ -85,6 +85,15 @@ class NoiseLevel:
         """Variance of bin means by the error of the model."""
         return self.stated * self.binned**2
 
+    @property
+    def noise(self) -> float:
+        """Standard deviation of bin means by noise alone."""
+        return math.sqrt(max(0.0, self.noise_variance))
+
+    def curves_in_noises(self, seen: NDArray[np.intp]) -> Array:
+        """The curves at some bins (n, k) in units of that noise; no column where there are none."""
+        return np.empty((seen.size, 0)) if self.curves is None else self.curves[seen] / self.noise
+
 
 @dataclass(frozen=True)
 class Excess:
@@ -201,6 +210,17 @@ def noise_levels(
     return found
 
 
+def means_in_noises(
+    prepared: Prepared, found: Residual, level: NoiseLevel
+) -> tuple[NDArray[np.intp], Array]:
+    """The bins of a recording that are usable (n,), and the means of a residual in them in units of
+    their noise (n,); none where there is no noise.
+    """
+    means, counts = binned(found.value, found.rows, bins_of(prepared))
+    seen = np.flatnonzero(counts if level.noise > 0.0 else ())
+    return seen, means[seen] / level.noise if seen.size else np.empty(0)
+
+
 def error_sizes(
     problem: Problem, found: dict[Key, Residual], noise_level: dict[Key, NoiseLevel]
 ) -> tuple[dict[str, float], float]:
@@ -233,15 +253,12 @@ def error_sizes(
         for prepared in problem.recordings:
             key = block.name, prepared.recording.name
             level = noise_level[key]
-            noise = math.sqrt(max(0.0, level.noise_variance))
-            if level.curves is None or not noise > 0.0:
+            seen, own = means_in_noises(prepared, found[key], level)
+            if level.curves is None or not own.size:
                 continue
-            means, counts = binned(found[key].value, found[key].rows, bins_of(prepared))
-            seen = counts > 0
-            rows.append(means[seen] / noise)
-            bent.append(level.curves[seen] / noise)
-            own = _CURVE_REST * level.stated / (1.0 - level.stated)
-            rest.append(np.full(int(seen.sum()), own))
+            rows.append(own)
+            bent.append(level.curves_in_noises(seen))
+            rest.append(np.full(own.size, _CURVE_REST * level.stated / (1.0 - level.stated)))
         sizes[block.name] = 1.0
         if rows:
             y, c, r = np.concatenate(rows), np.concatenate(bent), np.concatenate(rest)

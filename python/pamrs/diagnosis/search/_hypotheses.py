@@ -85,6 +85,7 @@ from pamrs.diagnosis.search._sets import (
     without_needless,
 )
 from pamrs.diagnosis.search._wrong_parameters import find_wrong_values, free_suspects
+from pamrs.diagnosis.settings import DiagnosisSettings
 from pamrs.effects import (
     CATALOGUE,
     EFFECTS,
@@ -265,7 +266,7 @@ class _Refit:
     @property
     def error_is_given(self) -> bool:
         """Whether the size of the error is stated: by the rig file, or that there is none."""
-        return bool(self.trial.nominal.model_error) or not self.trial.settings.usual_error
+        return _error_is_given(self.trial.nominal, self.trial.settings)
 
     def beside_less(self, candidates: list[Candidate]) -> _Refit | None:
         """The same beside the error that the most probable hypothesis leaves to the model; None
@@ -274,12 +275,8 @@ class _Refit:
         trial, (usual, sizes) = self.trial, self.error
         if self.error_is_given:
             return None
-        each = [
-            (told - _price(c, trial), left)
-            for c in candidates
-            for left, told in (error_sizes(trial.inner, c.fit.residuals, usual),)
-        ]
-        left = max(each, key=lambda own: own[0])[1]
+        each = [(c, *error_sizes(trial.inner, c.fit.residuals, usual)) for c in candidates]
+        _, left, _ = max(each, key=lambda one: one[2] - _price(one[0], trial))
         if all(left[name] > _CLEARLY_LESS * size for name, size in sizes.items()):
             return None
         return self.beside({name: min(size, left[name]) for name, size in sizes.items()})
@@ -322,9 +319,14 @@ def _refit(inner: Problem, outer: Problem, nominal: Rig, *, same: bool) -> _Refi
     if not same:
         noise_level |= noise_levels(outer, core_rig(first.rig, outer.core), stated)
     usual, sizes = noise_level, dict.fromkeys((b.name for b in blocks), 1.0)
-    if settings.usual_error and not nominal.model_error:
+    if not _error_is_given(nominal, settings):
         sizes, _ = error_sizes(inner, first.residuals, usual)
     return _kept(inner, outer, nominal, first, before, (usual, sizes), same=same)
+
+
+def _error_is_given(nominal: Rig, settings: DiagnosisSettings) -> bool:
+    """Whether the size of the model's error is stated: by the rig file, or that there is none."""
+    return bool(nominal.model_error) or not settings.usual_error
 
 
 def _kept(
@@ -456,11 +458,7 @@ def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
     if least is None:
         return None
     work = _begun(least, tell)
-    events = [
-        c
-        for e in (*work.own, *work.transient)
-        if (c := least.trial.fit_events(e, least.start)) is not None
-    ]
+    events = _fit_events(work.search, [*work.own, *work.transient])
     singles = [*_fit_singles(work.search), *events, *work.mistaken]
     return refit.beside_less([refit.start, *singles])
 
@@ -649,12 +647,12 @@ def _fit_hypotheses(
     part = trial.inner.losses.part
     what = "the effects that are the same data as others"
     singles = part(what, lambda: _add_same_data(search, singles), singles)
-    singles += [c for e in own if (c := trial.fit_events(e, start)) is not None]
+    singles += _fit_events(search, own)
     if transient and not any(cannot_gain(c, trial) for c in (*singles, *mistaken)):
         search.tell(
             f"looking for what happens at times of its own ({', '.join(map(str, transient))})"
         )
-        singles += [c for e in transient if (c := trial.fit_events(e, start)) is not None]
+        singles += _fit_events(search, transient)
         singles = _best_of_each(singles)
     if any(settles(c, trial, start) for c in (*singles, *mistaken)):
         lasting = sorted((c for c in singles if c.fit.events is None), key=log_misfit)
@@ -667,6 +665,12 @@ def _fit_hypotheses(
     sets = part("the search for sets of names", more, [])
     asked = part("what was asked for", lambda: fit_considered(search), [])
     return [start, *_best_of_each([*singles, *sets, *mistaken, *asked])]
+
+
+def _fit_events(search: Search, effects: list[Term]) -> list[Candidate]:
+    """Effects with sizes or times of their own in each recording, each by itself."""
+    tried = (search.trial.fit_events(effect, search.start) for effect in effects)
+    return [c for c in tried if c is not None]
 
 
 def _nearly_as_heavy(
