@@ -109,7 +109,7 @@ def _parameters(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     }
     found |= {own["name"]: own for own in result["wrong_parameters"]}
     every = result["parameters"] | found
-    keys = ("value", "std", "unit")
+    keys = ("value", "std", "unit", "identifiable")
     return {n: {k: every[n].get(k) for k in keys} for n in [*found, *every]}
 
 

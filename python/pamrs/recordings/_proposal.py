@@ -37,6 +37,7 @@ _TRIALS: Final = (
 _LONG: Final = 50.0  # usual intervals: a longer pause, of a second at least, parts recordings
 _MOST_PARTS: Final = 200
 _SHORTEST: Final = 32  # samples of a part that is worth a recording
+_MOST_UNUSED: Final = 6  # series that are no channel and are named
 
 
 @dataclass(frozen=True)
@@ -324,6 +325,8 @@ def _proposal(
     if missing and rig is not None:
         told = ", ".join(_spoken(name, rig) for name in missing)
         remarks.append(f"not found in this log: {told}")
+    taken = {each.series.name for each in matches} | {each.series for each in left}
+    remarks += _unused([series.name for series in candidates if series.name not in taken])
     stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
     split, pieces, short = _split(log, stepped[0] if stepped else None)
     listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
@@ -339,6 +342,15 @@ def _proposal(
         read.append(f"{short} of {count} parts have fewer than {_SHORTEST} samples: left out")
     log = replace(log, remarks=read)
     return LogProposal(log, listed, matches, shared, left, split, pieces, short, remarks)
+
+
+def _unused(names: list[str]) -> list[str]:
+    """What to say of series that are no channel, in at most one line."""
+    if not names:
+        return []
+    more = f" and {len(names) - _MOST_UNUSED} more" if len(names) > _MOST_UNUSED else ""
+    told = f"{', '.join(names[:_MOST_UNUSED])}{more}"
+    return [f"not used: {told}; where one is a channel of the rig, name it in case.toml"]
 
 
 def _unit(match: Match) -> str:

@@ -20,6 +20,8 @@ def _value(own: dict[str, Any] | None) -> str:
     """A parameter with its standard deviation and unit."""
     if own is None or own["value"] is None:
         return _NOTHING
+    if own["identifiable"] is False:
+        return "not determined"
     unit, factor = words.display_unit(own["unit"] or "", abs(own["value"]))
     std = None if own["std"] is None else own["std"] * factor
     told = words.format_uncertain(own["value"] * factor, std, unicode=False)

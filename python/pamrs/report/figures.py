@@ -25,6 +25,7 @@ from pamrs.report.text import (
     format_number,
     hypothesis_label,
     is_number,
+    model_name,
     spoken_name,
 )
 
@@ -185,7 +186,7 @@ def _line(name: str, stage: str, time: FloatArray, values: FloatArray, **how: An
 
 
 def free_panels(diagnosis: Findings) -> list[Panel]:
-    """The worst recording from its commands alone: measured, your model and the mended one, the
+    """The worst recording from its commands alone: measured, your model and the final one, the
     channels first that your model misses most; the telling trace where there is no free run.
     """
     runs = {run.recording: run.channels for run in diagnosis.free_run or []}
@@ -199,8 +200,9 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
         if error is None:
             return ""
         before, after = (format_number(v * factor, 2) for v in (error.before, error.after))
-        return f": missed by {before}, mended {after}"
+        return f": missed by {before}, {final.removesuffix(' model')} {after}"
 
+    final = model_name(diagnosis)
     traces = sorted(diagnosis.free_traces, key=missed, reverse=True)
     if not traces:
         told = telling_trace(diagnosis)
@@ -211,7 +213,7 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
         lines = [_line("measured", "measured", trace.time, trace.measured * factor, width=2.6)]
         lines.append(_line("your model", "before", trace.time, trace.before * factor))
         if trace.after is not None and _has(trace.after, trace.before):
-            lines.append(_line("mended model", "after", trace.time, trace.after * factor))
+            lines.append(_line(final, "after", trace.time, trace.after * factor))
         title = _quantity(spoken_name(trace.channel), unit) + missed_by(trace, factor)
         panels.append(Panel(title, lines))
     return panels

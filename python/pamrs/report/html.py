@@ -25,6 +25,7 @@ from pamrs.report import figures, story
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
+from pamrs.report.verdict import FORM
 
 __all__ = ["render"]
 
@@ -176,13 +177,14 @@ def _fit(errors: dict[str, ChannelError]) -> list[tuple[str, str, list[tuple[str
     return rows
 
 
-def _fits(diagnosis: Findings) -> list[tuple[str, list[Any]]]:
-    """The tables of errors with their titles."""
+def _fits(diagnosis: Findings) -> list[tuple[str, list[Any], str]]:
+    """The tables of errors with their titles, and which errors the refit makes worse."""
+    held, fitted = diagnosis.fit.held_out, diagnosis.fit.channels
     tables = (
-        ("Held-out recordings (not used for the fit)", _fit(diagnosis.fit.held_out)),
-        ("Fitted recordings", _fit(diagnosis.fit.channels)),
+        ("Held-out recordings (not used for the fit)", _fit(held), words.worse_sentence(held)),
+        ("Fitted recordings", _fit(fitted), ""),
     )
-    return [(title, rows) for title, rows in tables if rows]
+    return [own for own in tables if own[1]]
 
 
 def _free_run(diagnosis: Findings) -> list[tuple[str, str, str, list[str]]]:
@@ -234,15 +236,18 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
     """What was found, as cells: name, in the rig file, on the bench, value and interval, unit."""
     rows: list[tuple[str, ...]] = []
     for effect in diagnosis.effects:
-        bench = dict(story.bench_value(effect))
+        bench, vague = dict(story.bench_value(effect)), words.undetermined(effect)
         for name, own in effect.parameters.items():
-            title = f"{words.label(effect.term)}: {words.label(name)}"
-            if own.identifiable is False or not words.is_number(own.value):
-                rows.append((title, "these recordings do not determine it"))
+            if name in vague:
                 continue
+            title = f"{words.label(effect.term)}: {words.label(name)}"
             told = _typeset(bench.get(words.label(name), ""))
             value = words.format_uncertain(own.value, own.std)
             rows.append((title, "", told, value, _span(words.span95(own)), _unit(own.unit)))
+        if vague:
+            names = ", ".join(map(words.label, vague))
+            title = f"{words.label(effect.term)}: not determined"
+            rows.append((title, f"these recordings do not determine {names}"))
     for entry in diagnosis.wrong_parameters:
         unit, factor = words.display_unit(entry.unit, abs(entry.nominal))
         low, high = (float(v) * factor for v in entry.interval)
@@ -255,6 +260,12 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
 
 def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
     return Markup(figures.curves(panels, prefix)) if panels else None  # noqa: S704
+
+
+def _forms(diagnosis: Findings) -> list[str]:
+    """The paragraph that says what a mismatch without a name is a function of, if there is one."""
+    paragraphs = (p.strip() for p in diagnosis.text.split("\n\n"))
+    return [_typeset(p.removeprefix(FORM)) for p in paragraphs if p.startswith(FORM)]
 
 
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
@@ -306,7 +317,7 @@ def _separating(diagnosis: Findings) -> Markup | None:
 
 def _sentence(text: str) -> str:
     """The first sentence of an instruction, no longer than a glance."""
-    return textwrap.shorten(re.split(r"(?<=[a-z)%])[.:;] ", text)[0].rstrip("."), 180) + "."
+    return textwrap.shorten(re.split(r"(?<=[a-z)%])[.;] ", text)[0].rstrip("."), 180) + "."
 
 
 def render(diagnosis: Findings) -> str:
@@ -351,6 +362,7 @@ def render(diagnosis: Findings) -> str:
         title=_typeset(story.title(diagnosis)),
         headline=_typeset(story.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
+        form=next(iter(_forms(diagnosis)), ""),
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",

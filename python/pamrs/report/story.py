@@ -160,7 +160,7 @@ def _healthy(diagnosis: Findings) -> str:
         channel, error = next(iter(diagnosis.off.items()))
         size = words.sized(error.after, error.unit)
         what = words.spoken_name(channel)
-        return f"From its commands alone the whole rig misses {what} by {size}"
+        return f"From its commands alone the {words.model_name(diagnosis)} misses {what} by {size}"
     place = words.judged_place(diagnosis) + words.beside_held(diagnosis)
     if diagnosis.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
@@ -268,7 +268,7 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     channel = channel or next(iter(diagnosis.fit.held_out or diagnosis.fit.channels), None)
     last = words.miss(diagnosis, channel, "after")
     if channel and last:
-        model = "mended model" if diagnosis.effects or diagnosis.wrong_parameters else "model"
+        model = words.model_name(diagnosis)
         what = f"{words.spoken_name(channel)} missed by the {model} ({last.size})"
         found.append((f"{words.format_number(last.noises, 2)} × noise", what))
     return found
@@ -357,13 +357,13 @@ def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
 def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
     """Share of the mismatch that a set takes on held-out recordings, if it was fitted."""
     wanted = Hypothesis.of(list(names))
+    alone = (1.0 - row.left for row in diagnosis.tested if [row.id] == list(names) and row.left)
     fitted = (
         own.gap_closed
         for own in diagnosis.tried
         if Hypothesis.of([*own.effects, *own.wrong_parameters]) == wanted
     )
-    alone = (1.0 - row.left for row in diagnosis.tested if [row.id] == list(names) and row.left)
-    return next((float(v) for v in (*fitted, *alone) if words.is_number(v)), None)
+    return next((float(v) for v in (*alone, *fitted) if words.is_number(v)), None)
 
 
 def _why(diagnosis: Findings, block: BlockVerdict, key: str) -> str:

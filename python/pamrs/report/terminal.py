@@ -33,14 +33,16 @@ def summary(diagnosis: Findings) -> str:
         lines.append("")
         lines.append(words.effect_heading(diagnosis, effect))
         bench = dict(story.bench_value(effect, own_units=True))
+        vague = words.undetermined(effect)
         for name, own in effect.parameters.items():
-            if own.identifiable is not False:
+            if name not in vague:
                 value = words.format_uncertain(own.value, own.std, unicode=False)
                 told = with_unit(f"  {name} = {value}", own.unit)
                 usual = bench.get(words.label(name))
                 lines.append(f"{told}: {usual}" if usual else told)
-            else:
-                lines.append(f"  {name}: these recordings do not determine it")
+        if vague:
+            names = f"  these recordings do not determine {', '.join(vague)}"
+            lines += textwrap.wrap(names, 96, subsequent_indent="    ")
     for wrong in diagnosis.wrong_parameters:
         lines += ["", *textwrap.wrap(words.sentence_of(wrong), 96)]
     lines += _budget(diagnosis)
@@ -57,6 +59,8 @@ def summary(diagnosis: Findings) -> str:
     if len(diagnosis.ambiguity) > 1:
         sets = "; ".join(words.set_label(s) for s in diagnosis.ambiguity)
         lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
+    for bench_line in story.to_do(diagnosis):
+        lines += textwrap.wrap(f"On the bench: {bench_line}", 96, subsequent_indent="  ")
     lines += _next(diagnosis)
     lines += _data(diagnosis)
     for warning in diagnosis.warnings[:3]:

@@ -62,6 +62,7 @@ __all__ = [
     "located_block",
     "left_out_sentence",
     "mended_sentence",
+    "model_name",
     "miss",
     "miss_of",
     "name_chance",
@@ -83,6 +84,8 @@ __all__ = [
     "told_pairs",
     "told_terms",
     "told_probabilities",
+    "undetermined",
+    "worse_sentence",
     "worst_mismatch",
 ]
 
@@ -94,7 +97,7 @@ _LABELS = {
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
 
-TELLING = 1.0
+TELLING = 0.25
 """How far below nothing or above everything a share is still told by itself."""
 
 FARTHEST = 3.0
@@ -234,6 +237,15 @@ def format_probability(p: Any) -> str:
     if float(p) > 0.995:
         return "> 0.99"
     return "< 0.01" if float(p) < 0.005 else f"{float(p):.2f}"
+
+
+def undetermined(effect: EffectFound) -> list[str]:
+    """The parameters of an effect that the recordings do not determine."""
+    return [
+        name
+        for name, own in effect.parameters.items()
+        if own.identifiable is False or not is_number(own.value)
+    ]
 
 
 def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
@@ -428,10 +440,39 @@ def off_sentence(diagnosis: Findings) -> str:
     told = []
     for channel, error in diagnosis.off.items():
         size, times = sized(error.after, error.unit), format_number(error.noises, 2, unicode=False)
-        told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level)")
+        own = f"; your model: {sized(error.before, error.unit)}" if is_number(error.before) else ""
+        told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level{own})")
     if not told:
         return ""
-    return f"the whole rig from its commands alone misses {' and '.join(told)}"
+    model = model_name(diagnosis)
+    return f"from its commands alone the {model} of the whole rig misses {' and '.join(told)}"
+
+
+def model_name(diagnosis: Findings) -> str:
+    """What the final model is called: ``mended model`` where anything was found, an effect, a value
+    or a form without a name, else ``refitted model``.
+    """
+    found = diagnosis.wrong_parameters or any(t.kind == "form" for t in diagnosis.budget)
+    named = diagnosis.verdict == "effects" and diagnosis.effects
+    return "mended model" if found or named else "refitted model"
+
+
+def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
+    """Channels that the refitted model misses by more than the model of the rig file; empty where
+    there are none.
+    """
+    worse = [
+        spoken_name(channel)
+        for channel, error in errors.items()
+        if is_number(error.before)
+        and error.refit > _CLEARLY_WORSE * max(error.before, 2.0 * (error.noise or 0.0))
+    ]
+    if not worse:
+        return ""
+    return (
+        f"Values fitted to the other recordings make the {' and the '.join(worse)} worse here: "
+        "values alone do not explain the difference"
+    )
 
 
 def not_judged_words(diagnosis: Findings) -> list[str]:
@@ -841,6 +882,7 @@ def format_interval(interval: Sequence[float]) -> str:
     return " to ".join(_percent(share) for share in interval)
 
 
+_CLEARLY_WORSE = 1.1  # ratio of two errors that is no accident of the noise
 _MORE_THAN_NOISE = 2.0
 """[noise levels] Error of a channel that is not called noise."""
 _TOLD_LOGS = 3

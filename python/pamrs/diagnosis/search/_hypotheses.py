@@ -5,7 +5,7 @@ recordings.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -111,8 +111,6 @@ _FITTED_HINT = 1.15
 _MARGINAL_MULTIPLE = 1.35
 # excess variance over that of the noise up to which it may (decisions 20, 22)
 _MARGINAL_EXCESS = 0.3
-# probability of unlisted that splits a group: no name is then more probable (decision 4)
-_SPLIT_FROM = 0.5
 _LEAST_GAIN_SHARE = 0.08  # share of the largest gain from which an effect is fitted (decision 13)
 # share of an effect's best gain from which another of its starts is fitted (decision 13)
 _NEAR_START = 0.6
@@ -604,7 +602,7 @@ class _Mismatch:
             inclusion=part("the screen of resampled recordings", resampled, shares),
             predicted_gain=_predicted_gain(self.search.screened, now, _MARGINAL_EXCESS),
         )
-        if weighed[UNLISTED] > _SPLIT_FROM:
+        if _has_no_name(weighed):
             what = "the division of the blocks by their names"
             parts = part(
                 what, lambda: _split_by_names(group, refit.trial, self.search.weighing), []
@@ -613,6 +611,11 @@ class _Mismatch:
                 return parts
         what = "the search for a form of what is missing"
         return [part(what, lambda: _add_form(group, refit, say, self.search.tell), group)]
+
+
+def _has_no_name(weighed: Mapping[Hypothesis, float]) -> bool:
+    """Whether physics without a name is most probable."""
+    return weighed[UNLISTED] >= max(weighed.values())
 
 
 def _is_marginal(refit: _Refit) -> bool:
@@ -797,7 +800,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
         for b in group.suspects
         if any(found == [b] for found in acting.values())
     }
-    named = [b for b in group.suspects if own.get(b.name, {UNLISTED: 1.0})[UNLISTED] < _SPLIT_FROM]
+    named = [b for b in group.suspects if b.name in own and not _has_no_name(own[b.name])]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
