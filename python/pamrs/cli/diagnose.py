@@ -23,9 +23,12 @@ from pamrs.cli._shared import (
 
 if TYPE_CHECKING:
     from pamrs.diagnosis import Diagnosis
+    from pamrs.findings import Protocol
     from pamrs.recordings import Case
 
 __all__ = ["diagnose_command"]
+
+_MARGIN = 0.05  # share of the recorded range by which commands may leave it unsaid
 
 
 def diagnose_command(
@@ -168,6 +171,33 @@ def diagnose_command(
         report: result.report,
     }
     write(files, result.summary())
+    if experiment is not None and protocol is not None:
+        for line in _outside_recorded(protocol, loaded):
+            typer.echo(f"{experiment}: {line}", err=True)
+
+
+def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
+    """Commands of an experiment that leave the range in which the recordings have them."""
+    import numpy as np
+
+    from pamrs.report.text import format_number
+
+    told = []
+    for name, values in protocol.commands.items():
+        recorded = [r.channels[name] for r in case.recordings if name in r.channels]
+        seen = np.concatenate([v[np.isfinite(v)] for v in recorded] or [np.empty(0)])
+        if not seen.size:
+            continue
+        low, high = float(seen.min()), float(seen.max())
+        margin = _MARGIN * (high - low)
+        if values.min() < low - margin or values.max() > high + margin:
+            ends = (float(values.min()), float(values.max()), low, high)
+            first, last, low_told, high_told = (format_number(v, unicode=False) for v in ends)
+            told.append(
+                f"{name} goes from {first} to {last} {protocol.units[name]}, recorded are "
+                f"{low_told} to {high_told}: look whether the rig bears it"
+            )
+    return told
 
 
 def _model_text(result: Diagnosis, case: Case, file: Path) -> str:

@@ -110,5 +110,11 @@ def _rig_new(
     check_new(file)
     called = resolved(file).parent.name if file.stem == "rig" else file.stem
     called = (called or file.stem) if name is None else name
-    write_atomically(file, rigs.template(like, called, gas))
+    text = rigs.template(like, called, gas)
+    write_atomically(file, text)
+    if gas == "energy_balance" and "energy_balance" in text and rigs.named(like).tables("chamber"):
+        typer.echo(
+            f"the chambers have an energy balance; the packaged {like} has coefficients, which do "
+            "not keep mass: --gas coefficients"
+        )
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

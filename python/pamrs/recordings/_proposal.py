@@ -325,10 +325,11 @@ def _proposal(
     if missing and rig is not None:
         told = ", ".join(_spoken(name, rig) for name in missing)
         remarks.append(f"not found in this log: {told}")
-    taken = {each.series.name for each in matches} | {each.series for each in left}
-    remarks += _unused([series.name for series in candidates if series.name not in taken])
     stepped = [known[m.channel] for m in matches if not m.hold and m.channel in known]
     split, pieces, short = _split(log, stepped[0] if stepped else None)
+    taken = {each.series.name for each in matches} | {each.series for each in left}
+    taken |= {split["column"]} if isinstance(split, dict) and "column" in split else set()
+    remarks += _unused([series.name for series in candidates if series.name not in taken])
     listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
     read = [*log.remarks, *clocks.remarks]
     read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]

@@ -134,9 +134,9 @@ def weigh(
     odds before any data. Recordings that are held out were not fitted, and count as the others do.
     The baseline as it is competes (`UNDECIDED`: nothing is missing, or parameters inside their
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
-    the mismatch as a right name does. The right name may have been fitted badly, or in a form that the
-    catalogue lacks: then it leaves as much, and names share that chance as they weigh beside each
-    other. A set with an effect whose size is not told from none names nothing.
+    the mismatch as a right name does. The right name may have been fitted badly, or in a form that
+    the catalogue lacks: then it leaves as much, and names share that chance as they weigh beside
+    each other. A set with an effect whose size is not told from none names nothing.
 
     Parameters
     ----------

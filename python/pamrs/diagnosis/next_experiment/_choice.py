@@ -544,7 +544,7 @@ def _text(best: Outcome, hypotheses: Sequence[Modelled], uncertainty: float) -> 
         f"{_instruction(best)}. If it is {spoken(hypotheses[0][0])}, a model with "
         f"{spoken(hypotheses[j][0])} then misses the {_missed(best, 0, j)}, whatever its "
         f"parameters. The expected information is {best.bits:.2f} of the {uncertainty:.2f} bit of "
-        "uncertainty."
+        "doubt between the hypotheses that were fitted."
     )
     if best.bits < _HOPELESS_SHARE * uncertainty:
         said += " No standard experiment does better with these channels: consider another sensor."
