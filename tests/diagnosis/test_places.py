@@ -213,7 +213,7 @@ def test_only_the_place_is_open() -> None:
     given = synthetic.diagnosis(effects=[], blocks=[block])
     assert headline(given) == (
         "Something acts in the chamber of flexor that the model leaves out: muscle leak at flexor "
-        "(0.50), muscle leak (0.40) or unlisted effect (0.10)"
+        "(0.50), muscle leak (0.40) or effect outside the catalogue (0.10)"
     )
 
 

@@ -118,7 +118,10 @@ def test_an_instruction_that_pairs_share_is_given_once() -> None:
     found = dataclasses.replace(synthetic.diagnosis(), next_experiment=own)
     summary = " ".join(found.summary().split())
     assert summary.count("watch for 4 s") == 1
-    assert "unlisted effect or muscle leak? The same experiment. A model with a leak" in summary
+    assert (
+        "effect outside the catalogue or muscle leak? The same experiment. A model with a leak"
+        in summary
+    )
     assert "or wrong pressure zero of flexor? Measure it by itself" in summary
     html = render_html(found)
     assert html.count("watch for 4 s") == 1

@@ -151,9 +151,9 @@ def test_nothing_is_settled_while_the_whole_rig_is_off() -> None:
     assert not words.is_open(quiet)
     assert words.is_open(loud)
     assert loud.headline == (
-        "The model of the arm may leave out a slow change of the muscle: muscle creep (0.98); the "
-        "whole rig from its commands alone misses muscle pressure by 0.23 bar (57 times the noise "
-        "level)"
+        "The model of the arm may leave out a slow change of the muscle: muscle creep (0.98); from "
+        "its commands alone the mended model of the whole rig misses muscle pressure by 0.23 bar "
+        "(57 times the noise level; your model: 0.30 bar)"
     )
     assert "whole rig" not in quiet.headline
     assert "not settled" in report.render_html(loud)

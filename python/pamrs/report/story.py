@@ -24,6 +24,8 @@ LONGEST = 20
 """Words of a title at most."""
 MOST_RIVALS = 7
 """Explanations that are ranked on the first screen."""
+LEAST_TOLD = 0.05
+"""Probability from which an explanation stands in the title."""
 AS_MUCH = 0.03
 """Difference of two shares of a mismatch below which both explain as much."""
 
@@ -191,8 +193,9 @@ def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
             acts = f"Something acts in the {_place(diagnosis, block)}"
             explains = "that no effect of the catalogue explains"
             return _with_chance(f"{acts} {explains}", chances[UNLISTED])
-        ranked = words.ranked_probabilities(block.probabilities, most)
-        chances = {Hypothesis.parse(key): p for key, p in ranked if key not in HEALTHY}
+        ranked = words.ranked_probabilities(block.probabilities, len(block.probabilities) + 1)
+        told_of = [(key, p) for key, p in ranked if key not in HEALTHY and p >= LEAST_TOLD]
+        chances = {Hypothesis.parse(key): p for key, p in told_of}
     head = _head(diagnosis, block, left)
     told = [_with_chance(words.set_label(h.words), p) for h, p in chances.items()]
     return f"{head}: {_listed(told, most, 'or')}" if most and told else head
@@ -206,14 +209,13 @@ def _with_chance(text: str, chance: float) -> str:
 def _head(diagnosis: Findings, block: BlockVerdict, left: Sequence[Hypothesis]) -> str:
     """What the answers of a group that are left share, in words."""
     place = _place(diagnosis, block)
-    if left == [UNLISTED]:
-        return f"Something acts in the {place}, and nothing is probable enough to be named"
     if left[0] == NONE:
         return f"The model of the {place} may be complete; not ruled out"
     if left[0] == PARAMETERS:
         return f"Values may explain what the {place} misses; not ruled out"
     # what the whole rig still misses says nothing against names that are open anyway
     doubt = NONE in left or PARAMETERS in left or (bool(diagnosis.off) and len(left) == 1)
+    doubt = doubt and left != [UNLISTED]
     values = [term.is_value for h in left for term in h.terms]
     if any(values):
         if all(values) and UNLISTED not in left:

@@ -92,7 +92,7 @@ __all__ = [
 _LABELS = {
     "none": "nothing missing",
     "parameters": "parameters in tolerance",
-    "unlisted": "unlisted effect",
+    "unlisted": "effect outside the catalogue",
     "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
