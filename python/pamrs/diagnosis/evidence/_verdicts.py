@@ -148,9 +148,22 @@ def judge(groups: Sequence[BlockGroup], settings: DiagnosisSettings) -> list[Jud
         for found, (hypothesis, _) in zip(joint, choice, strict=True):
             found[hypothesis] = found.get(hypothesis, 0.0) + weight
     return [
-        _judged(group, _normalised(found), settings)
+        _judged(group, _normalised(_capped(found, settings.most_probability)), settings)
         for group, found in zip(groups, joint, strict=True)
     ]
+
+
+def _capped(weights: dict[Hypothesis, float], most: float) -> dict[Hypothesis, float]:
+    """Weights of which names have at most this share together, however well several groups agree;
+    physics without a name has the rest.
+    """
+    total = sum(weights.values())
+    named = sum(w for h, w in weights.items() if h.terms)
+    if named <= most * total:
+        return weights
+    capped = {h: w * most * total / named if h.terms else w for h, w in weights.items()}
+    capped[UNLISTED] += named - most * total
+    return capped
 
 
 def _in_several(own: Sequence[Mapping[Hypothesis, float]]) -> list[Term]:

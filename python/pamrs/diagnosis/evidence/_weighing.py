@@ -136,7 +136,8 @@ def weigh(
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
     the mismatch as a right name does. The right name may have been fitted badly, or in a form that
     the catalogue lacks: then it leaves as much, and names share that chance as they weigh beside
-    each other. A set with an effect whose size is not told from none names nothing.
+    each other, each as far as it takes the mismatch. A set with an effect whose size is not told
+    from none names nothing.
 
     Parameters
     ----------
@@ -157,9 +158,10 @@ def weigh(
     weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
     best = max((scores[c.hypothesis] for c in named), default=0.0)
     alike = {c.hypothesis: math.exp(max(-60.0, scores[c.hypothesis] - best)) for c in named}
-    missed = _MISSED_ODDS * weights[UNLISTED]
-    for hypothesis, part in alike.items():
-        weights[hypothesis] += missed * part / sum(alike.values())
+    missed = _MISSED_ODDS * weights[UNLISTED] / max(sum(alike.values()), 1.0)
+    for candidate in named:
+        taken = _share_taken(candidate, start, suspects)
+        weights[candidate.hypothesis] += missed * alike[candidate.hypothesis] * taken
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
     for hypothesis in [h for h in out if h.terms]:
@@ -167,6 +169,15 @@ def weigh(
         out[UNLISTED] += (1.0 - weighing.most) * out[hypothesis]
         out[hypothesis] *= weighing.most
     return out
+
+
+def _share_taken(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -> float:
+    """Share of the power of what the baseline leaves, beyond noise, that a hypothesis takes."""
+    before, after = (
+        sum(max(0.0, found.likelihood()[b.name].power - 1.0) for b in suspects)
+        for found in (baseline, candidate)
+    )
+    return min(1.0, max(0.0, 1.0 - after / before)) if before > 0.0 else 0.0
 
 
 def _counted(candidates: list[Candidate], suspects: list[Block]) -> float:
