@@ -112,7 +112,7 @@ def assemble(
     changed = models.added or any(j.wrong for j in judged)
     gap = _gap(found.table, _LEAST_GAP) if changed else None
     blocks = block_entries(judged, fitted, found.inside, held, found.outside, noise_level)
-    forms = _forms(judged, fitted)
+    forms = _forms(models, fitted)
     stages = [(fitted, found.inside)]
     if held is not fitted:
         stages.insert(0, (held, found.outside))
@@ -182,13 +182,16 @@ def _worded(
     return replace(diagnosis, text=verdict_in_words(diagnosis, case, told, sought=sought))
 
 
-def _forms(judged: list[Judged], fitted: Problem) -> dict[str, str]:
-    """What a mismatch without a name is a function of, in words, by block."""
+def _forms(models: Models, fitted: Problem) -> dict[str, str]:
+    """What a mismatch without a name is a function of, in words, by block, as the final model has
+    it.
+    """
     found: dict[str, str] = {}
-    for group in (j.group for j in judged if j.verdict == "unlisted"):
-        if group.closure is not None:
+    for judged, chosen in zip(models.judged, models.chosen, strict=True):
+        group = judged.group
+        if judged.verdict == "unlisted" and group.closure is not None:
             own = replace(fitted, blocks=group.blocks)
-            told = forms_of(group.closure.fit, own, group.candidates[0].fit)
+            told = forms_of(chosen.fit, own, group.candidates[0].fit)
             text = "\n".join(map(form_sentence, told))
             found |= dict.fromkeys((b.name for b in group.blocks), text)
     return found
