@@ -12,11 +12,12 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence._verdicts import _capped
 from pamrs.diagnosis.evidence._weighing import loss_by_values
 from pamrs.diagnosis.fit import Events, Fit, Problem, fits
 from pamrs.diagnosis.noise import Excess
 from pamrs.diagnosis.prepare import available_blocks
-from pamrs.effects import EFFECTS, Term
+from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
 from tests.diagnosis.likelihoods import leaving
@@ -137,6 +138,27 @@ def test_a_name_has_to_leave_less_than_physics_without_a_name() -> None:
     assert chances == sorted(chances, reverse=True)
     assert chances[0] > 0.9
     assert chances[-1] < 0.2
+
+
+def test_a_name_that_leaves_much_may_have_been_missed() -> None:
+    """Physics without a name shares its odds with names, as far as they take the mismatch."""
+    taking = [weighed(hypothesis(CREEP, left)) for left in (0.2, 0.5, 0.8)]
+    odds = [found["muscle_creep"] / found["unlisted"] for found in taking]
+    assert odds == pytest.approx([0.8, 0.5, 0.2], rel=0.1)
+    two = weighed(hypothesis(DAMPING, 0.3), hypothesis(CREEP, 0.31))
+    assert two["muscle_rate_damping"] > two["muscle_creep"]
+    together = two["muscle_creep"] + two["muscle_rate_damping"]
+    assert together < two["unlisted"] * (1.0 + 2.0 * (1.0 - SETTINGS.most_probability))
+
+
+def test_names_that_groups_agree_on_are_capped() -> None:
+    most = SETTINGS.most_probability
+    own = {Hypothesis(terms("muscle_creep")): 50.0, UNLISTED: 0.1, NONE: 0.1}
+    found = _capped(own, most)
+    assert sum(found.values()) == pytest.approx(sum(own.values()))
+    assert found[Hypothesis(terms("muscle_creep"))] == pytest.approx(most * 50.2)
+    unsure = {Hypothesis(terms("muscle_creep")): 0.5, UNLISTED: 0.5}
+    assert _capped(unsure, most) == unsure
 
 
 def test_a_second_name_pays_for_itself_or_is_not_believed() -> None:

@@ -405,3 +405,21 @@ def test_channels_that_are_missing_are_explained(tmp_path: Path) -> None:
     (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.bench()).logs
     told = next(text for text in item.remarks if text.startswith("not found in this log: "))
     assert told.endswith("force (pull of the muscles, by a load cell)")  # which a frame needs
+
+
+def test_columns_that_are_no_channel_are_said(tmp_path: Path) -> None:
+    data = signals()
+    series = {
+        "t": data["t"],
+        "Ventil [V]": data["u"] if "u" in data else np.full(N, 5.0),
+        "Vordruck [bar]": 7.0 - 0.1 * data["t"],
+        "Druck [bar]": data["p1"],
+        "Winkel [deg]": data["angle"],
+        "Motorstrom [A]": np.sin(data["t"]),
+    }
+    np.savez(tmp_path / "run.npz", **series)
+    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    found = {match.channel: match.series.name for match in item.matches}
+    assert found["supply_pressure"] == "Vordruck"
+    assert found["muscle_pressure"] == "Druck"
+    assert any(text.startswith("not used: Motorstrom;") for text in item.remarks)

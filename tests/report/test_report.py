@@ -19,6 +19,7 @@ pytest.importorskip("jinja2")
 from pamrs._views import MAX_POINTS, decimate
 from pamrs.findings import (
     BudgetTerm,
+    ChannelError,
     EffectFound,
     EffectParameterFound,
     FreeRun,
@@ -231,6 +232,17 @@ def test_decimation_keeps_extremes_and_gaps() -> None:
     assert np.nanmax(v) == 9.0
     assert np.all(np.diff(t) > 0)
     assert np.isnan(v[(t >= 71_000) & (t < 79_000)]).all()
+
+
+def test_a_refit_that_spoils_held_out_recordings_is_said() -> None:
+    table = {
+        "joint_angle": ChannelError(noise=0.001, before=0.03, refit=0.05, after=0.05),
+        "muscle_pressure": ChannelError(noise=500.0, before=900.0, refit=990.0, after=600.0),
+    }
+    told = words.worse_sentence(table)
+    assert "joint angle worse here" in told
+    assert "muscle pressure" not in told  # within two noise levels it is chance
+    assert words.worse_sentence({"joint_angle": replace(table["joint_angle"], refit=0.03)}) == ""
 
 
 def test_a_whisker_is_drawn_where_its_text_says() -> None:
