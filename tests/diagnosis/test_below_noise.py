@@ -212,8 +212,7 @@ def test_creep_slower_than_any_recording_gets_a_penalty() -> None:
         **{"muscle_creep.stiffness": 1e3, "muscle_creep.time_constant": 300.0},
     )
     assert weighed(seen)["muscle_creep"] > 0.6
-    # the right creep may have been missed, so that half of what the name loses comes back to it
-    assert weighed(unseen)["unlisted"] > 0.4
+    assert weighed(unseen)["unlisted"] > 0.8
 
 
 def test_held_out_recordings_count_as_fitted_ones_do() -> None:

@@ -136,8 +136,8 @@ def weigh(
     tolerances are off), and so does `UNLISTED`: physics without a name leaves as large a share of
     the mismatch as a right name does. The right name may have been fitted badly, or in a form that
     the catalogue lacks: then it leaves as much, and names share that chance as they weigh beside
-    each other, each as far as it takes the mismatch. A set with an effect whose size is not told
-    from none names nothing.
+    each other, each as far as it takes the mismatch with values that its physics has. A set with an
+    effect whose size is not told from none names nothing.
 
     Parameters
     ----------
@@ -156,12 +156,15 @@ def weigh(
     scores[UNLISTED] = _log_weight_unlisted(start, suspects, share)
     top = max(scores.values())
     weights = {h: math.exp(max(-60.0, score - top)) for h, score in scores.items()}
-    best = max((scores[c.hypothesis] for c in named), default=0.0)
-    alike = {c.hypothesis: math.exp(max(-60.0, scores[c.hypothesis] - best)) for c in named}
+    rare = {c.hypothesis: _rarity(c, weighing) for c in named}
+    usual = {h: scores[h] + rare[h] for h in rare}
+    best = max(usual.values(), default=0.0)
+    alike = {h: math.exp(max(-60.0, score - best)) for h, score in usual.items()}
     missed = _MISSED_ODDS * weights[UNLISTED] / max(sum(alike.values()), 1.0)
     for candidate in named:
-        taken = _share_taken(candidate, start, suspects)
-        weights[candidate.hypothesis] += missed * alike[candidate.hypothesis] * taken
+        own = candidate.hypothesis
+        taken = _share_taken(candidate, start, suspects) * math.exp(-rare[own])
+        weights[own] += missed * alike[own] * taken
     total = sum(weights.values())
     out = {h: weight / total for h, weight in weights.items()}
     for hypothesis in [h for h in out if h.terms]:
@@ -200,11 +203,15 @@ def log_weight(
     """Logarithm of what a hypothesis weighs beside others, up to a constant: a share of its
     evidence in some blocks, its price, how far parameters moved, and its values.
     """
-    unlikely = loss_by_values(candidate, weighing.ranges)
-    unlikely += STANDING_PRICE * lacks_drift(candidate, weighing.seconds)
-    unlikely += _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
     told = _evidence(candidate, baseline, suspects, share) - _strain(candidate)
-    return told - price(candidate, weighing.settings) - unlikely
+    return told - price(candidate, weighing.settings) - _rarity(candidate, weighing)
+
+
+def _rarity(candidate: Candidate, weighing: Weighing) -> float:
+    """What a hypothesis loses by values that its physics hardly has."""
+    lost = loss_by_values(candidate, weighing.ranges)
+    lost += STANDING_PRICE * lacks_drift(candidate, weighing.seconds)
+    return lost + _UNSEEN_PRICE * _has_unseen_time(candidate, weighing.seconds)
 
 
 def _strain(candidate: Candidate) -> float:

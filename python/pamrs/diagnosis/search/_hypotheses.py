@@ -602,7 +602,7 @@ class _Mismatch:
             inclusion=part("the screen of resampled recordings", resampled, shares),
             predicted_gain=_predicted_gain(self.search.screened, now, _MARGINAL_EXCESS),
         )
-        if _has_no_name(weighed):
+        if _leading(weighed) == UNLISTED:
             what = "the division of the blocks by their names"
             parts = part(
                 what, lambda: _split_by_names(group, refit.trial, self.search.weighing), []
@@ -613,9 +613,9 @@ class _Mismatch:
         return [part(what, lambda: _add_form(group, refit, say, self.search.tell), group)]
 
 
-def _has_no_name(weighed: Mapping[Hypothesis, float]) -> bool:
-    """Whether physics without a name is most probable."""
-    return weighed[UNLISTED] >= max(weighed.values())
+def _leading(weighed: Mapping[Hypothesis, float]) -> Hypothesis:
+    """The most probable hypothesis; of two that are as probable, the one without a name."""
+    return max(weighed, key=lambda h: (weighed[h], not h.terms))
 
 
 def _is_marginal(refit: _Refit) -> bool:
@@ -800,7 +800,7 @@ def _split_by_names(group: BlockGroup, trial: Attempts, weighing: Weighing) -> l
         for b in group.suspects
         if any(found == [b] for found in acting.values())
     }
-    named = [b for b in group.suspects if b.name in own and not _has_no_name(own[b.name])]
+    named = [b for b in group.suspects if b.name in own and _leading(own[b.name]).terms]
     rest = [b for b in group.suspects if b not in named]
     if not named:
         return []
