@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -172,6 +173,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
     class Loaded:
         name = "a case"
         path = tmp_path
+        recordings = (SimpleNamespace(channels={"valve_command": np.array([4.0, np.nan, 4.9])}),)
 
     monkeypatch.setattr(pamrs.recordings, "load_case", lambda folder, **options: Loaded())
     monkeypatch.setattr(pamrs.diagnosis, "diagnose", lambda case, **options: FakeDiagnosis())
@@ -187,6 +189,10 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
         assert str(path) in err
     commands = paths["experiment"].read_text(encoding="utf-8").splitlines()
     assert commands == ["time [s],valve_command [V]", "0,5", "0.1,5", "0.2,5"]
+    assert "goes from" not in err  # within 5 % of what was recorded
+    Loaded.recordings = (SimpleNamespace(channels={"valve_command": np.full(3, 4.0)}),)
+    _, _, err = run(capsys, "diagnose", tmp_path, "--experiment", tmp_path / "far.csv")
+    assert "valve_command goes from 5.0 V to 5.0 V, and was recorded from 4.0 V to 4.0 V" in err
     code, out, err = run(capsys, "diagnose", tmp_path, "--json", "-", "--quiet")
     assert (code, json.loads(out), err) == (0, {"verdict": "none"}, "")
     # where there is nothing to play, that is said in the place of a file

@@ -207,8 +207,8 @@ def test_the_headline_says_what_each_block_misses() -> None:
     large = block_of("arm", "joint_angle", 175.0, more=True)
     told = seen(sure, replace(large, probabilities={"unlisted": 0.9})).headline
     assert told == (
-        "The model leaves out muscle creep in the chamber (0.90) and something without a name in "
-        "the arm (0.90)"
+        "The model leaves out muscle creep in the chamber (0.90) and an effect outside the "
+        "catalogue in the arm (0.90)"
     )
 
 

@@ -411,15 +411,25 @@ def test_columns_that_are_no_channel_are_said(tmp_path: Path) -> None:
     data = signals()
     series = {
         "t": data["t"],
-        "Ventil [V]": data["u"] if "u" in data else np.full(N, 5.0),
+        "Ventil [V]": np.full(N, 5.0),
         "Vordruck [bar]": 7.0 - 0.1 * data["t"],
         "Druck [bar]": data["p1"],
         "Winkel [deg]": data["angle"],
         "Motorstrom [A]": np.sin(data["t"]),
+        "seq": np.arange(N),
     }
     np.savez(tmp_path / "run.npz", **series)
     (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
     found = {match.channel: match.series.name for match in item.matches}
     assert found["supply_pressure"] == "Vordruck"
     assert found["muscle_pressure"] == "Druck"
-    assert any(text.startswith("not used: Motorstrom;") for text in item.remarks)
+    told = [text for text in item.remarks if text.startswith("not used: ")]
+    assert len(told) == 1
+    assert "seq" not in told[0]
+
+
+def test_a_preposition_is_no_supply(tmp_path: Path) -> None:
+    data = signals()
+    np.savez(tmp_path / "run.npz", **{"t": data["t"], "Druck vor Kolben [bar]": data["p1"]})
+    (item,) = propose([tmp_path / "run.npz"], pamrs.rigs.shoulder()).logs
+    assert [match.channel for match in item.matches] == ["muscle_pressure"]

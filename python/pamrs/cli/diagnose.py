@@ -180,7 +180,7 @@ def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
     """Commands of an experiment that leave the range in which the recordings have them."""
     import numpy as np
 
-    from pamrs.report.text import format_number
+    from pamrs.report.text import sized
 
     told = []
     for name, values in protocol.commands.items():
@@ -189,13 +189,13 @@ def _outside_recorded(protocol: Protocol, case: Case) -> list[str]:
         if not seen.size:
             continue
         low, high = float(seen.min()), float(seen.max())
-        margin = _MARGIN * (high - low)
+        margin = _MARGIN * max(high - low, abs(high), abs(low))
         if values.min() < low - margin or values.max() > high + margin:
             ends = (float(values.min()), float(values.max()), low, high)
-            first, last, low_told, high_told = (format_number(v, unicode=False) for v in ends)
+            first, last, least, most = (sized(v, protocol.units[name]) for v in ends)
             told.append(
-                f"{name} goes from {first} to {last} {protocol.units[name]}, recorded are "
-                f"{low_told} to {high_told}: look whether the rig bears it"
+                f"{name} goes from {first} to {last}, and was recorded from {least} to {most}: "
+                "check that the rig can take this before you play it"
             )
     return told
 

@@ -112,9 +112,9 @@ def _rig_new(
     called = (called or file.stem) if name is None else name
     text = rigs.template(like, called, gas)
     write_atomically(file, text)
-    if gas == "energy_balance" and "energy_balance" in text and rigs.named(like).tables("chamber"):
+    if gas == "energy_balance" and rigs.named(like).tables("chamber"):
         typer.echo(
-            f"the chambers have an energy balance; the packaged {like} has coefficients, which do "
-            "not keep mass: --gas coefficients"
+            "the chambers of this file keep mass (energy balance); the gas coefficients of the "
+            f"packaged {like}, which do not, come with --gas coefficients"
         )
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

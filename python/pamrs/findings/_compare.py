@@ -37,7 +37,8 @@ class Compared:
     candidates : dict of str to pair of float
         Probability of each hypothesis about that block.
     parameters : dict of str to pair of dict
-        ``value``, ``std``, ``unit`` of parameters of effects and of the rig, SI.
+        ``value``, ``std``, ``unit`` and ``identifiable`` of parameters of effects and of the rig,
+        SI.
     missed : dict of str to pair of float
         Root mean square error of each channel with what was found, in noise levels, on held-out
         recordings (fitted ones where there are none).
@@ -177,7 +178,11 @@ def _named(result: Mapping[str, Any]) -> set[str]:
 
 
 def _apart(old: Mapping[str, Any], new: Mapping[str, Any]) -> float:
-    """Distance of two values in their joint standard deviation; 0 where it is not known."""
+    """Distance of two values in their joint standard deviation; 0 where it is not known, or one of
+    them is not determined.
+    """
+    if False in (old["identifiable"], new["identifiable"]):
+        return 0.0
     std = math.hypot(old["std"] or 0.0, new["std"] or 0.0)
     known = std > 0.0 and old["value"] is not None and new["value"] is not None
     return abs(new["value"] - old["value"]) / std if known else 0.0

@@ -43,7 +43,7 @@ _QUANTITIES: Final = frozenset(
     for word in CHANNELS[channel].strong
 )
 _PLAYED: Final = with_trait("played")
-_NOT: Final = frozenset(
+NOT_A_CHANNEL: Final = frozenset(
     ("rate", "velocity", "speed", "dot", "acc", "effort", "stamp", "sec", "nanosec", "seq", "id")
     + ("status", "flag", "error", "variance", "covariance")
 )
@@ -361,7 +361,7 @@ def _like_weather(values: np.ndarray[Any, np.dtype[np.float64]], written: Writte
 
 def _called(series: Series, channel: str, words: set[str]) -> float:
     """How well the name of a series fits a channel; 0 where it does not."""
-    if _NOT & words:
+    if NOT_A_CHANNEL & words:
         return 0.0
     strong, weak = CHANNELS[channel].strong, CHANNELS[channel].weak
     role = _role(series)
@@ -415,7 +415,8 @@ def _lonely(
             row
             for row, series in enumerate(candidates)
             if (written := understood_unit(series.unit)) and _measures(written, channel)
-            if not _NOT & set(words_of(series.name)) and not _named_otherwise(series, channel)
+            if not NOT_A_CHANNEL & set(words_of(series.name))
+            and not _named_otherwise(series, channel)
         ]
         alone = column not in taken and rivals == [name] and len(rows) == 1
         if alone and rows[0] not in taken.values():

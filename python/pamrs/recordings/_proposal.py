@@ -19,7 +19,14 @@ from pamrs.recordings._clock import Array, usual_interval
 from pamrs.recordings._doubts import suspicions
 from pamrs.recordings._from_log import Clocks
 from pamrs.recordings._mapping import Clock
-from pamrs.recordings._matching import Match, Open, channels_of, matched, words_of
+from pamrs.recordings._matching import (
+    NOT_A_CHANNEL,
+    Match,
+    Open,
+    channels_of,
+    matched,
+    words_of,
+)
 from pamrs.recordings._several_clocks import SLOW, UNTOLD, Sampled, sampled
 from pamrs.recordings._splitting import Cut, Split, stretches_of
 from pamrs.recordings._stamps import CLOCK_WORDS, Ticks, ticks, unit_of_stamps
@@ -329,7 +336,16 @@ def _proposal(
     split, pieces, short = _split(log, stepped[0] if stepped else None)
     taken = {each.series.name for each in matches} | {each.series for each in left}
     taken |= {split["column"]} if isinstance(split, dict) and "column" in split else set()
-    remarks += _unused([series.name for series in candidates if series.name not in taken])
+    known_otherwise = NOT_A_CHANNEL | CLOCK_WORDS
+    remarks += _unused(
+        [
+            series.name
+            for series in candidates
+            if series.name not in taken
+            and known_otherwise.isdisjoint(words_of(series.name))
+            and not any(text.startswith(f"{series.name} ") for text in remarks)
+        ]
+    )
     listed = [_listed(series, clocks.of(series), matches) for series in log.series.values()]
     read = [*log.remarks, *clocks.remarks]
     read += [f"{name}: {text}" for name, item in laid.items() for text in item.remarks]

@@ -21,6 +21,7 @@ from matplotlib.figure import Figure
 from pamrs._views import decimate
 from pamrs.findings import Curves, Findings, Trace
 from pamrs.report.text import (
+    YOURS,
     display_unit,
     format_number,
     hypothesis_label,
@@ -200,7 +201,7 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
         if error is None:
             return ""
         before, after = (format_number(v * factor, 2) for v in (error.before, error.after))
-        return f": missed by {before}, {final.removesuffix(' model')} {after}"
+        return f": missed by {before}, {final.split()[0]} {after}"
 
     final = model_name(diagnosis)
     traces = sorted(diagnosis.free_traces, key=missed, reverse=True)
@@ -212,7 +213,7 @@ def free_panels(diagnosis: Findings) -> list[Panel]:
         unit, factor = display_unit(trace.unit, _largest(trace.measured))
         lines = [_line("measured", "measured", trace.time, trace.measured * factor, width=2.6)]
         lines.append(_line("your model", "before", trace.time, trace.before * factor))
-        if trace.after is not None and _has(trace.after, trace.before):
+        if trace.after is not None and final != YOURS and _has(trace.after, trace.before):
             lines.append(_line(final, "after", trace.time, trace.after * factor))
         title = _quantity(spoken_name(trace.channel), unit) + missed_by(trace, factor)
         panels.append(Panel(title, lines))
@@ -229,7 +230,7 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
     traces : sequence of Trace
         Channels of one recording, at least one.
     """
-    panels = []
+    panels, final = [], model_name(diagnosis)
     for trace in traces:
         # the intervals are those of one recording
         marked = diagnosis.where.recording == trace.recording
@@ -241,8 +242,8 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
         if trace.refit is not None and refitted:
             curve = trace.refit * factor
             lines.append(_line("refitted", "refit", trace.time, curve, dashed=True))
-        if trace.after is not None and _has(trace.after, trace.refit):
-            lines.append(_line("mended model", "after", trace.time, trace.after * factor))
+        if trace.after is not None and final != YOURS and _has(trace.after, trace.refit):
+            lines.append(_line(final, "after", trace.time, trace.after * factor))
         panels.append(Panel(_quantity(spoken_name(trace.channel), unit), lines, 0.0, spans))
         before, after = trace.residual_before, trace.residual_after
         unit, factor = display_unit(trace.unit, _largest(before, after))
@@ -250,7 +251,7 @@ def trace_panels(diagnosis: Findings, traces: Sequence[Trace]) -> list[Panel]:
         first = ("refitted", "refit") if refitted else ("your model", "before")
         lines = [
             _line(*told, trace.time, values * factor, width=1.0)
-            for values, told in ((before, first), (after, ("mended model", "after")))
+            for values, told in ((before, first), (after, (final, "after")))
             if values is not None and _has(values, before if told[1] == "after" else None)
         ]
         name = f"not explained of {spoken_name(trace.channel)}"

@@ -15,6 +15,7 @@ from markupsafe import Markup
 
 from pamrs._losses import Losses
 from pamrs.findings import (
+    HEALTHY,
     BlockMismatch,
     BlockVerdict,
     ChannelError,
@@ -25,12 +26,12 @@ from pamrs.report import figures, story
 from pamrs.report import text as words
 from pamrs.report.chain import chain_svg
 from pamrs.report.page import render_page
-from pamrs.report.verdict import FORM
 
 __all__ = ["render"]
 
 TRACES = 3
 """Channels of a recording that are drawn."""
+_LEAST_CONDITION = 0.005  # share of the excess below which a condition is not told: 0 %
 THROUGHOUT = 0.9
 """Share of a recording from which an excess is throughout it."""
 BADGES = {
@@ -163,12 +164,18 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _fit(errors: dict[str, ChannelError]) -> list[tuple[str, str, list[tuple[str, str, str]]]]:
-    """Errors by channel: its name and unit, and of each stage its key, value and noise levels."""
+def _fit(
+    errors: dict[str, ChannelError], final: str
+) -> list[tuple[str, str, list[tuple[str, str, str]]]]:
+    """Errors by channel: its name and unit, and of each stage its key, value and noise levels; the
+    final model where it is another one than those before.
+    """
     rows = []
     for channel, unit, factor, entry in words.shown_errors(errors):
         noise, cells = entry.noise, []
         for key, value in entry.items():
+            if key == "after" and final != words.MENDED:
+                continue
             known = words.is_number(value) and words.is_number(noise) and noise > 0
             times = f"{words.format_number(value / noise, 2)}×" if known else "–"
             shown = words.format_number(value * factor) if words.is_number(value) else "–"
@@ -180,9 +187,11 @@ def _fit(errors: dict[str, ChannelError]) -> list[tuple[str, str, list[tuple[str
 def _fits(diagnosis: Findings) -> list[tuple[str, list[Any], str]]:
     """The tables of errors with their titles, and which errors the refit makes worse."""
     held, fitted = diagnosis.fit.held_out, diagnosis.fit.channels
+    worse = "" if diagnosis.verdict in HEALTHY else words.worse_sentence(held)
+    final = words.model_name(diagnosis)
     tables = (
-        ("Held-out recordings (not used for the fit)", _fit(held), words.worse_sentence(held)),
-        ("Fitted recordings", _fit(fitted), ""),
+        ("Held-out recordings (not used for the fit)", _fit(held, final), worse),
+        ("Fitted recordings", _fit(fitted, final), ""),
     )
     return [own for own in tables if own[1]]
 
@@ -260,12 +269,6 @@ def _found(diagnosis: Findings) -> list[tuple[str, ...]]:
 
 def _curves(panels: list[figures.Panel], prefix: str) -> Markup | None:
     return Markup(figures.curves(panels, prefix)) if panels else None  # noqa: S704
-
-
-def _forms(diagnosis: Findings) -> list[str]:
-    """The paragraph that says what a mismatch without a name is a function of, if there is one."""
-    paragraphs = (p.strip() for p in diagnosis.text.split("\n\n"))
-    return [_typeset(p.removeprefix(FORM)) for p in paragraphs if p.startswith(FORM)]
 
 
 def _recordings(diagnosis: Findings) -> tuple[list[dict[str, Any]], int]:
@@ -362,7 +365,9 @@ def render(diagnosis: Findings) -> str:
         title=_typeset(story.title(diagnosis)),
         headline=_typeset(story.headline(diagnosis)),
         paragraphs=[_typeset(p.strip()) for p in diagnosis.text.split("\n\n") if p.strip()],
-        form=next(iter(_forms(diagnosis)), ""),
+        forms=list(dict.fromkeys(_typeset(u.form) for u in diagnosis.unexplained if u.form)),
+        conditions=[c for c in diagnosis.where.conditions if c.share >= _LEAST_CONDITION],
+        mended=words.model_name(diagnosis) == words.MENDED,
         # said above already, where the text has it
         where_text="" if diagnosis.where.text in diagnosis.text else diagnosis.where.text,
         bits=words.format_number(bits, 2) if words.is_number(bits) else "",

@@ -135,7 +135,7 @@ def _together(diagnosis: Findings, groups: Sequence[BlockVerdict]) -> str:
     places: dict[str, list[str]] = {}
     for block in groups:
         (answer,) = _answer(block)
-        name = words.set_label(answer.words) if answer.terms else "something without a name"
+        name = words.set_label(answer.words) if answer.terms else "an effect outside the catalogue"
         where = _with_chance(
             f"in the {_place(diagnosis, block)}", _chance(diagnosis, block, answer)
         )
@@ -162,7 +162,8 @@ def _healthy(diagnosis: Findings) -> str:
         channel, error = next(iter(diagnosis.off.items()))
         size = words.sized(error.after, error.unit)
         what = words.spoken_name(channel)
-        return f"From its commands alone the {words.model_name(diagnosis)} misses {what} by {size}"
+        model = words.with_article(words.model_name(diagnosis))
+        return f"From its commands alone {model} of the whole rig misses {what} by {size}"
     place = words.judged_place(diagnosis) + words.beside_held(diagnosis)
     if diagnosis.verdict == "parameters":
         by = "values inside their tolerances explain the difference"
@@ -270,8 +271,8 @@ def facts(diagnosis: Findings) -> list[tuple[str, str]]:
     channel = channel or next(iter(diagnosis.fit.held_out or diagnosis.fit.channels), None)
     last = words.miss(diagnosis, channel, "after")
     if channel and last:
-        model = words.model_name(diagnosis)
-        what = f"{words.spoken_name(channel)} missed by the {model} ({last.size})"
+        model = words.with_article(words.model_name(diagnosis))
+        what = f"{words.spoken_name(channel)} missed by {model} ({last.size})"
         found.append((f"{words.format_number(last.noises, 2)} × noise", what))
     return found
 
@@ -282,10 +283,11 @@ def bench_value(effect: EffectFound, *, own_units: bool = False) -> list[tuple[s
     those alone that have a unit of their own there.
     """
     found, info = [], EFFECTS.get(effect.id)
+    vague = words.undetermined(effect)
     for name, own in effect.parameters.items():
         if own_units and not (info and info.on_bench(name, effect.form)):
             continue
-        if own.identifiable is not False and words.is_number(own.value) and own.std:
+        if name not in vague and own.std:
             found.append((words.label(name), _on_bench(effect, name, own)))
     return found
 
@@ -357,13 +359,20 @@ def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
 
 
 def _taken(diagnosis: Findings, names: Iterable[str]) -> float | None:
-    """Share of the mismatch that a set takes on held-out recordings, if it was fitted."""
+    """Share of the mismatch, as a variance, that a set takes on held-out recordings, if it was
+    fitted.
+    """
     wanted = Hypothesis.of(list(names))
-    alone = (1.0 - row.left for row in diagnosis.tested if [row.id] == list(names) and row.left)
+    alone = (
+        1.0 - row.left
+        for row in diagnosis.tested
+        if [row.id] == list(names) and row.left is not None
+    )
     fitted = (
-        own.gap_closed
+        1.0 - (1.0 - own.gap_closed) ** 2
         for own in diagnosis.tried
         if Hypothesis.of([*own.effects, *own.wrong_parameters]) == wanted
+        and words.is_number(own.gap_closed)
     )
     return next((float(v) for v in (*alone, *fitted) if words.is_number(v)), None)
 

@@ -18,7 +18,7 @@ _ASCII: Final = str.maketrans({"°": "deg", "−": "-", "–": "-", "×": "x"})
 
 
 def summary(diagnosis: Findings) -> str:
-    """Return the result as plain text for a terminal, about 20 lines."""
+    """Return the result as plain text for a terminal."""
     lines = [f"Diagnosis of {diagnosis.case}", *textwrap.wrap(story.headline(diagnosis) + ".", 96)]
     left_out = words.left_out_sentence(diagnosis)
     lines += textwrap.wrap(left_out + "." * bool(left_out), 96, subsequent_indent="  ")
@@ -59,8 +59,8 @@ def summary(diagnosis: Findings) -> str:
     if len(diagnosis.ambiguity) > 1:
         sets = "; ".join(words.set_label(s) for s in diagnosis.ambiguity)
         lines += ["", *textwrap.wrap(f"Not separable: {sets}.", 96, subsequent_indent="  ")]
-    for bench_line in story.to_do(diagnosis):
-        lines += textwrap.wrap(f"On the bench: {bench_line}", 96, subsequent_indent="  ")
+    for instruction in story.to_do(diagnosis)[: 1 if diagnosis.next_experiment.text else 2]:
+        lines += textwrap.wrap(f"On the bench: {instruction}", 96, subsequent_indent="  ")
     lines += _next(diagnosis)
     lines += _data(diagnosis)
     for warning in diagnosis.warnings[:3]:

@@ -32,7 +32,9 @@ __all__ = [
     "beside_held",
     "blocks_label",
     "BUDGET_NOTE",
+    "MENDED",
     "SETTLED",
+    "YOURS",
     "budget_sentence",
     "budget_sentences",
     "budgets",
@@ -85,6 +87,7 @@ __all__ = [
     "told_terms",
     "told_probabilities",
     "undetermined",
+    "with_article",
     "worse_sentence",
     "worst_mismatch",
 ]
@@ -96,6 +99,9 @@ _LABELS = {
     "dahl": "Dahl",
     **{effect.id: effect.label for effect in EFFECTS.values() if effect.label},
 }
+
+MENDED, YOURS = "mended model", "your model"
+"""What the model with what was found is called, and that of the rig file."""
 
 TELLING = 0.25
 """How far below nothing or above everything a share is still told by itself."""
@@ -437,24 +443,32 @@ def off_sentence(diagnosis: Findings) -> str:
     """What the whole rig misses from its commands alone, in words; empty where it misses no more
     than noise and the uncertainty of its values explain.
     """
-    told = []
+    told, model = [], model_name(diagnosis)
     for channel, error in diagnosis.off.items():
         size, times = sized(error.after, error.unit), format_number(error.noises, 2, unicode=False)
-        own = f"; your model: {sized(error.before, error.unit)}" if is_number(error.before) else ""
+        differs = model != YOURS and is_number(error.before)
+        own = f"; {YOURS}: {sized(error.before, error.unit)}" if differs else ""
         told.append(f"{spoken_name(channel)} by {size} ({times} times the noise level{own})")
     if not told:
         return ""
-    model = model_name(diagnosis)
-    return f"from its commands alone the {model} of the whole rig misses {' and '.join(told)}"
+    said = " and ".join(told)
+    return f"from its commands alone {with_article(model)} of the whole rig misses {said}"
 
 
 def model_name(diagnosis: Findings) -> str:
     """What the final model is called: ``mended model`` where anything was found, an effect, a value
-    or a form without a name, else ``refitted model``.
+    or a form without a name; ``your model`` where nothing is missing; else ``refitted model``.
     """
-    found = diagnosis.wrong_parameters or any(t.kind == "form" for t in diagnosis.budget)
+    if diagnosis.verdict == "none":
+        return YOURS
+    found = diagnosis.wrong_parameters or any(kept.form for kept in diagnosis.unexplained)
     named = diagnosis.verdict == "effects" and diagnosis.effects
-    return "mended model" if found or named else "refitted model"
+    return MENDED if found or named else "refitted model"
+
+
+def with_article(model: str) -> str:
+    """The name of a model in a sentence: ``the mended model``, ``your model``."""
+    return model if model == YOURS else f"the {model}"
 
 
 def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
@@ -465,13 +479,14 @@ def worse_sentence(errors: Mapping[str, ChannelError]) -> str:
         spoken_name(channel)
         for channel, error in errors.items()
         if is_number(error.before)
-        and error.refit > _CLEARLY_WORSE * max(error.before, 2.0 * (error.noise or 0.0))
+        and is_number(error.refit)
+        and error.refit > _CLEARLY_WORSE * max(error.before, _MORE_THAN_NOISE * error.noise)
     ]
     if not worse:
         return ""
     return (
         f"Values fitted to the other recordings make the {' and the '.join(worse)} worse here: "
-        "values alone do not explain the difference"
+        "values inside their tolerances do not explain the difference"
     )
 
 

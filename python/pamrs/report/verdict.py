@@ -28,10 +28,7 @@ from pamrs.report.text import (
 from pamrs.rig import Rig
 from pamrs.rig.schema import qualified
 
-__all__ = ["FORM", "unknown_volumes", "verdict"]
-
-FORM = "What is missing, as a form without a name. "
-"""How the paragraph begins that says what a mismatch without a name is a function of."""
+__all__ = ["unknown_volumes", "verdict"]
 
 _MENDED = 0.98  # share of a channel's error from which a wrong value is not said to mend it
 
@@ -117,7 +114,7 @@ def _of_blocks(
                 "refitted one."
             )
         closes = _closed(diagnosis, "With it in the model,", case)
-        return f"{text}\n\n{FORM}{' '.join(forms)}{closes}"
+        return text + "\n\nWhat is missing, as a form without a name. " + " ".join(forms) + closes
     names = " and ".join(
         f"{effect_name(e)} ({e.id}, probability {name_chance(diagnosis, e)})"
         for e in diagnosis.effects

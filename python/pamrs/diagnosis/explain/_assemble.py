@@ -187,11 +187,11 @@ def _forms(models: Models, fitted: Problem) -> dict[str, str]:
     it.
     """
     found: dict[str, str] = {}
-    for judged, chosen in zip(models.judged, models.chosen, strict=True):
+    for judged, start, chosen in zip(models.judged, models.starts, models.chosen, strict=True):
         group = judged.group
         if judged.verdict == "unlisted" and group.closure is not None:
             own = replace(fitted, blocks=group.blocks)
-            told = forms_of(chosen.fit, own, group.candidates[0].fit)
+            told = forms_of(chosen.fit, own, start.fit)
             text = "\n".join(map(form_sentence, told))
             found |= dict.fromkeys((b.name for b in group.blocks), text)
     return found

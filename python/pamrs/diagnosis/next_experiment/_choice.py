@@ -519,7 +519,7 @@ def _missing(rig: Rig, own: tuple[str, ...], sensors: Mapping[str, float]) -> li
 _WITHOUT_NAME = {
     "none": "nothing missing",
     "parameters": "parameters inside their tolerances",
-    "unlisted": "something that is not listed",
+    "unlisted": "an effect outside the catalogue",
 }
 """What is said without a name, in words."""
 
