@@ -246,21 +246,6 @@ def test_the_final_model_is_called_what_it_is() -> None:
     assert "<th>mended model</th>" not in render_html(refitted)
 
 
-def test_shares_that_take_back_each_other_are_told_together() -> None:
-    def term(kind: str, name: str, share: float, interval: list[float]) -> BudgetTerm:
-        return BudgetTerm("arm", kind, name, "", share, interval, None, 3.0, 0.01, "rad")
-
-    sentence = words.budget_sentence(
-        [
-            term("parameters", "", -0.66, [-3.07, 0.38]),
-            term("effect", "muscle_creep", 1.656, [0.3, 2.5]),
-            term("unexplained", "", 0.004, [0.0, 0.01]),
-        ]
-    )
-    together = "parameters inside tolerance and muscle creep together 100 % (99 to 100)"
-    assert sentence == f"{together}; under 1 % unexplained."
-
-
 def test_a_refit_that_spoils_held_out_recordings_is_said() -> None:
     table = {
         "joint_angle": ChannelError(noise=0.001, before=0.03, refit=0.05, after=0.05),

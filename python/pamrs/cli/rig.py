@@ -114,7 +114,7 @@ def _rig_new(
     write_atomically(file, text)
     if gas == "energy_balance" and rigs.named(like).tables("chamber"):
         typer.echo(
-            "the chambers of this file keep mass (energy balance); the gas coefficients of the "
-            f"packaged {like}, which do not, come with --gas coefficients"
+            "the gas of this file is an energy balance, which keeps mass; that of the packaged "
+            f"{like} has coefficients of the literature: --gas coefficients writes it as it is"
         )
     typer.echo(f"written: {file}; change it, then: pamrs rig check {file}")

@@ -95,10 +95,9 @@ def simulate_command(
     recorded: dict[str, tuple[Any, Any]] = {}
     recording = None
     if input is not None:
-        from pamrs.recordings import load_recording
         from pamrs.simulation import replay
 
-        recording = load_recording(input)
+        recording = _recorded(input)
         _say_what_is_held(loaded, recording, input)
         with progress(f"simulating {loaded.name}"):
             result = replay(loaded, recording)
@@ -125,6 +124,19 @@ def simulate_command(
         animation: lambda path: _animate(path, result, speed),
     }
     write(files, "\n".join(lines))
+
+
+def _recorded(path: Path) -> Recording:
+    """A recording of inputs; what a laboratory wrote is played by another command."""
+    from pamrs.errors import RecordingError
+    from pamrs.recordings import load_recording
+
+    try:
+        return load_recording(path)
+    except RecordingError as error:
+        raise RecordingError(
+            f"{error}; a log that pamrs import has read is simulated by pamrs replay CASE"
+        ) from None
 
 
 def _animate(path: Path, result: Simulation, speed: float) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
-from pamrs.findings._entries import NOT_JUDGED
+from pamrs.findings._entries import NOT_JUDGED, VERDICTS
 from pamrs.findings._entry import to_plain
 from pamrs.units import with_unit
 
@@ -35,7 +35,7 @@ class Compared:
     verdict, block : (str or None, str or None)
         The verdicts, and the blocks with the mismatch.
     candidates : dict of str to pair of float
-        Probability of each hypothesis about that block.
+        Probability of each hypothesis about that block, and of names in other blocks.
     parameters : dict of str to pair of dict
         ``value``, ``std``, ``unit`` and ``identifiable`` of parameters of effects and of the rig,
         SI.
@@ -94,10 +94,18 @@ def compare_results(
 
 
 def _candidates(result: Mapping[str, Any]) -> dict[str, float]:
-    """Probabilities of the group of blocks with the mismatch; those of the case where none has."""
+    """Probabilities of the group of blocks with the mismatch (those of the case where none has),
+    and those of names in other groups.
+    """
     located = result["where"]["block"]
-    judged = (b for b in result["blocks"] if b["verdict"] != NOT_JUDGED and located in b["blocks"])
-    return dict(next((b["probabilities"] for b in judged), result["probabilities"]))
+    judged = [b for b in result["blocks"] if b["verdict"] != NOT_JUDGED]
+    own = [b["probabilities"] for b in judged if located in b["blocks"]]
+    found = dict(own[0] if own else result["probabilities"])
+    for block in judged:
+        for name, p in block["probabilities"].items():
+            if name not in VERDICTS and p > found.get(name, 0.0):
+                found[name] = p
+    return found
 
 
 def _parameters(result: Mapping[str, Any]) -> dict[str, dict[str, Any]]:

@@ -139,6 +139,7 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
     rows = []
     for name, p in diagnosis.parameters.items():
         known, size = p.identifiable is not False, abs(p.moved_sigmas)
+        unit, factor = words.display_unit(p.unit, max(abs(p.nominal), abs(p.value)))
         told = known and math.isfinite(size)
         flag = "the rig file is wrong" if name in wrong else ""
         if not flag and not known:
@@ -148,11 +149,11 @@ def _parameters(diagnosis: Findings) -> list[dict[str, Any]]:
         rows.append(
             {
                 "cells": (
-                    words.format_number(p.nominal, 4),
-                    words.format_uncertain(p.value, p.std) if known else "–",
+                    words.format_number(p.nominal * factor, 4),
+                    words.format_uncertain(p.value * factor, p.std * factor) if known else "–",
                 ),
                 "name": name,
-                "unit": _unit(p.unit),
+                "unit": _unit(unit),
                 "moved": _signed(p.moved_sigmas) if told else "–",
                 "bar": min(1.0, size / 4.0) if told else 0.0,
                 "right": p.moved_sigmas >= 0,

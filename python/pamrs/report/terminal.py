@@ -149,7 +149,8 @@ def _fit(diagnosis: Findings) -> list[str]:
     if not channels:
         return []
     title = "held-out error" if diagnosis.fit.held_out else "error (fit)"
-    lines = ["", f"{title:<22}{'noise':>11}{'before':>11}{'refit':>11}{'after':>11}"]
+    stages = ("noise", "your model", "refitted", words.model_name(diagnosis).split()[0])
+    lines = ["", f"{title:<22}{''.join(f'{stage:>11}' for stage in stages)}"]
     for channel, unit, factor, entry in words.shown_errors(channels):
         name = with_unit(channel, f"[{unit.replace('°', 'deg')}]" if unit else "")
         shown = [float(v) * factor if words.is_number(v) else None for v in entry.values()]

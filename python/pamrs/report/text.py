@@ -849,8 +849,10 @@ def budget_sentence(terms: Sequence[BudgetTerm], *, noise_only: bool = False) ->
         for name, term in before
         if _tellable(term.share)
     ]
-    share = format_share(last.share) if _tellable(last.share) else "more than the nominal model has"
-    left = f"{share} unexplained" if last.noises > 0.0 and not noise_only else "only noise is left"
+    share = f"{format_share(last.share)} unexplained"
+    if not _tellable(last.share):
+        share = "more is unexplained than with the nominal model"
+    left = share if last.noises > 0.0 and not noise_only else "only noise is left"
     return "; ".join([*told, left]) + "."
 
 
@@ -932,8 +934,8 @@ def left_out_sentence(diagnosis: Findings) -> str:
     if not told:
         return ""
     more = len(told) - _TOLD_LOGS
-    rest = f". {more} more recordings have such samples" if more > 0 else ""
-    return f"Left out or mended: {'. '.join(told[:_TOLD_LOGS])}{rest}"
+    rest = f". The same of {more} more recordings" if more > 0 else ""
+    return f"As read: {'. '.join(told[:_TOLD_LOGS])}{rest}"
 
 
 def data_sentence(diagnosis: Findings) -> str:
