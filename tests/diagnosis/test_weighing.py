@@ -212,3 +212,13 @@ def test_the_order_of_hypotheses_does_not_matter() -> None:
     one, other = weighed(poor, good, beside), weighed(good, poor, beside)
     assert one == pytest.approx(other)
     assert one[MODULUS] > 0.9
+
+
+@pytest.mark.parametrize(
+    ("std", "named"), [(0.1, True), (2.0, True), (2.6, False), (np.inf, False)]
+)
+def test_a_wrong_value_is_told_from_one_inside_its_tolerances(std: float, *, named: bool) -> None:
+    """Seven tolerances off, it has to be two standard deviations beyond the third."""
+    wrong = with_wrong(hypothesis({}, 1e-4), MODULUS)
+    wrong = replace(wrong, fit=replace(wrong.fit, std={MODULUS: std * wrong.fit.scales[MODULUS]}))
+    assert (weighed(wrong).get(MODULUS, 0.0) > 0.5) == named

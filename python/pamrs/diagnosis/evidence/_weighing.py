@@ -149,7 +149,8 @@ def weigh(
         Prices, and the largest probability of all names together.
     """
     start = candidates[0]
-    named = [c for c in candidates if c.terms and not _is_absent(c)]
+    walls = weighing.settings.most_tolerances
+    named = [c for c in candidates if c.terms and not _is_absent(c, walls)]
     share = _counted([start, *named], suspects)
     scores = {c.hypothesis: log_weight(c, start, suspects, weighing, share) for c in named}
     scores[UNDECIDED] = log_weight(start, start, suspects, weighing, share)
@@ -297,14 +298,20 @@ def explains(candidate: Candidate, baseline: Candidate, suspects: list[Block]) -
     return quiet and after < _CLEAR_SHARE * before
 
 
-def _is_absent(candidate: Candidate) -> bool:
-    """Whether the sizes of an effect of a set, taken together, are not told from none: a fit that
-    goes on beside such an effect may end lower, which is not the effect's doing.
+def _is_absent(candidate: Candidate, walls: float) -> bool:
+    """Whether a wrong value of a set is not told from one inside its tolerances (so many of them),
+    or the sizes of an effect, taken together, are not told from none: a fit that goes on beside
+    such an effect may end lower, which is not the effect's doing.
 
     Two sizes that do nearly the same may each be as uncertain as it is large, and their sum known
     well. The shape is taken as it was fitted: that of what is not there is anything.
     """
     found = candidate.fit
+    if any(
+        abs(found.moved[name]) - walls < _SAME_STDS * found.std.get(name, 0.0) / found.scales[name]
+        for name in candidate.wrong
+    ):
+        return True
     if found.events is not None:
         return False
     names, sealed = list(found.values), found.rig.model["valve"] is None
