@@ -37,9 +37,9 @@ def median_interval(values: Sequence[float]) -> tuple[float, float] | None:
     below, k = 0.5**n, 0
     if n < 6:
         return None
-    while below + math.comb(n, k + 1) * 0.5**n <= 0.025:
+    while below + math.comb(n, k + 1) / 2**n <= 0.025:
         k += 1
-        below += math.comb(n, k) * 0.5**n
+        below += math.comb(n, k) / 2**n
     return ordered[k], ordered[n - 1 - k]
 
 
