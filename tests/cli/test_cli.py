@@ -140,6 +140,7 @@ class FakeDiagnosis:
     rig = None
 
     class next_experiment:
+        excitation: dict = {}
         protocol = Protocol(
             "staircase",
             np.arange(3) * 0.1,
@@ -201,7 +202,7 @@ def test_diagnose_writes_what_it_is_asked_for(capsys, tmp_path, monkeypatch):
     code, _, err = run(capsys, "diagnose", tmp_path, "--experiment", absent)
     assert code == 0
     assert not absent.exists()
-    assert f"not written: {absent}" in err
+    assert f"not written: {absent}: no experiment is proposed" in err
 
 
 def test_runs_as_a_module():

@@ -156,11 +156,9 @@ def diagnose_command(
         result = diagnose(loaded, settings=settings, consider=consider or (), progress=say)
     protocol = result.next_experiment.protocol
     if experiment is not None and protocol is None:
-        typer.echo(
-            f"not written: {experiment}: the next experiment has no commands to play "
-            "(it is none, or done by hand)",
-            err=True,
-        )
+        proposed = bool(result.next_experiment.excitation)
+        why = "the proposed experiment is done by hand" if proposed else "no experiment is proposed"
+        typer.echo(f"not written: {experiment}: {why}", err=True)
         experiment = None
     files: Contents = {
         json: result.to_json() if json == STDOUT else result.to_json,
