@@ -44,7 +44,7 @@ def test_a_length_beyond_the_load_does_not_end_the_run(value: float) -> None:
     assert own.read == ["rows without a time: 3 of 1204"]
     first = " ".join(line.strip() for line in found.summary().splitlines()[1:6])
     wanted = f"rows without a time: 3 of 1204; length: 47 of {len(bad)} samples masked."
-    assert f"Left out or mended: {bad.name}: {wanted}" in first
+    assert f"As read: {bad.name}: {wanted}" in first
 
 
 @pytest.mark.parametrize(
