@@ -125,8 +125,7 @@ CHANNELS: Final[dict[str, Channel]] = {
         Channel(
             "supply_pressure", "Pa", -1.3e5, 1e8, "supply",
             "supply tank reservoir source versorgung psup ps psupply ptank vorrat speise kessel "
-            "behälter behaelter regulator regler vordruck netzdruck zuluft "
-            "upstream", _PRESSURE,
+            "behälter behaelter regulator regler vordruck netzdruck zuluft upstream", _PRESSURE,
             "pressure in the tank or behind the regulator", "pressure clips strong steady",
         ),
         Channel(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import os
 import shlex
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -98,9 +97,9 @@ def import_command(
     beside = file.parent / "rig.toml"
     missing = "" if rig is not None or beside.exists() else f", put the rig file there as {beside}"
     folder_name = shlex.quote(str(file.parent))
-    held = [row["file"] for row in tomllib.loads(text)["recording"] if row["role"] == "held_out"]
-    if held:
-        typer.echo(f"held out: {', '.join(held)}; role in {file} chooses others")
+    if (held := proposal.held_out) is not None:
+        name = Path(os.path.relpath(resolved(held.log.path), resolved(folder))).as_posix()
+        typer.echo(f"held out: {name}; role in {file} chooses others")
     typer.echo(f"look at {file}{missing}, then: pamrs diagnose {folder_name}{allowed}")
 
 

@@ -165,16 +165,29 @@ class Proposal:
             'schema = "pamrs.case/1"',
             f"rig = {_toml(rig)}",
         ]
-        usable = [item for item in self.logs if item.matches]
-        for place, item in enumerate(usable):
-            last = place == len(usable) - 1
-            if len(item.pieces) > 2 and last:
+        held = self.held_out
+        for item in self._usable:
+            if item is held and len(item.pieces) > 2:
                 lines += self._entry(item, folder, "fit", item.pieces[:-1])
                 lines += self._entry(item, folder, "held_out", item.pieces[-1:])
             else:
-                role = "held_out" if last and len(usable) > 1 else "fit"
+                role = "held_out" if item is held else "fit"
                 lines += self._entry(item, folder, role, item.pieces if item.short else None)
         return "\n".join(lines) + "\n"
+
+    @property
+    def _usable(self) -> list[LogProposal]:
+        """The logs of which a channel was recognised."""
+        return [item for item in self.logs if item.matches]
+
+    @property
+    def held_out(self) -> LogProposal | None:
+        """The log that is held out, of three parts or more the last one alone; None where there is
+        nothing to hold out.
+        """
+        usable = self._usable
+        several = len(usable) > 1 or any(len(item.pieces) > 2 for item in usable)
+        return usable[-1] if several else None
 
     def _entry(
         self, item: LogProposal, folder: Path, role: str, pieces: list[int] | None

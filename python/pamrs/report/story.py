@@ -194,7 +194,7 @@ def _phrase(diagnosis: Findings, block: BlockVerdict, most: int) -> str:
             acts = f"Something acts in the {_place(diagnosis, block)}"
             explains = "that no effect of the catalogue explains"
             return _with_chance(f"{acts} {explains}", chances[UNLISTED])
-        ranked = words.ranked_probabilities(block.probabilities, len(block.probabilities) + 1)
+        ranked = words.ranked_probabilities(block.probabilities, None)
         told_of = [(key, p) for key, p in ranked if key not in HEALTHY and p >= LEAST_TOLD]
         chances = {Hypothesis.parse(key): p for key, p in told_of}
     head = _head(diagnosis, block, left)
@@ -335,7 +335,7 @@ def rivals(diagnosis: Findings) -> list[Rival]:
 
 def _ranked(diagnosis: Findings, block: BlockVerdict, most: int) -> list[Rival]:
     """At most so many explanations of what one group of blocks misses."""
-    ranked = words.ranked_probabilities(block.probabilities, len(block.probabilities) + 1)
+    ranked = words.ranked_probabilities(block.probabilities, None)
     shown = [(key, p) for key, p in ranked if p >= 0.005]
     shown += [(key, p) for key, p in ranked if p < 0.005 and key in ("none", "parameters")]
     known = {key for key, _ in ranked}

@@ -266,12 +266,14 @@ def span95(entry: EffectParameterFound) -> tuple[float, float] | None:
 
 
 def ranked_probabilities(
-    probabilities: Mapping[str, float], count: int = 8
+    probabilities: Mapping[str, float], count: int | None = 8
 ) -> list[tuple[str, float]]:
-    """Most probable hypotheses first, at most `count`; the rest is pooled under ``all others``."""
+    """Most probable hypotheses first, at most `count` (None for all); the rest is pooled under
+    ``all others``.
+    """
     known = [(k, float(v)) for k, v in probabilities.items() if is_number(v)]
     known.sort(key=lambda item: (-item[1], item[0]))
-    if len(known) <= count:
+    if count is None or len(known) <= count:
         return known
     rest = known[count - 1 :]
     return [*known[: count - 1], (f"all others ({len(rest)})", sum(p for _, p in rest))]
