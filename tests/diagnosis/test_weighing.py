@@ -12,6 +12,7 @@ import pytest
 import pamrs
 from pamrs.diagnosis import DiagnosisSettings
 from pamrs.diagnosis.evidence import Attempts, Candidate, Weighing, possible_gain, weigh
+from pamrs.diagnosis.evidence._likelihood import _Covariance
 from pamrs.diagnosis.evidence._verdicts import _capped
 from pamrs.diagnosis.evidence._weighing import loss_by_values
 from pamrs.diagnosis.fit import Events, Fit, Problem, fits
@@ -20,7 +21,7 @@ from pamrs.diagnosis.prepare import available_blocks
 from pamrs.effects import EFFECTS, NONE, UNLISTED, Hypothesis, Term
 from pamrs.simulation import core_rig
 from tests.diagnosis import again
-from tests.diagnosis.likelihoods import leaving
+from tests.diagnosis.likelihoods import TIMES, leaving, rows_of
 from tests.diagnosis.terms import by_text, terms
 
 SETTINGS = DiagnosisSettings()
@@ -141,14 +142,40 @@ def test_a_name_has_to_leave_less_than_physics_without_a_name() -> None:
 
 
 def test_a_name_that_leaves_much_may_have_been_missed() -> None:
-    """Physics without a name shares its odds with names, as far as they take the mismatch."""
+    """An effect of the catalogue is twice as probable as physics without a name, as far as it takes
+    the mismatch, and a set of two costs what a further name costs.
+    """
+    most = SETTINGS.most_probability
+
+    def odds(found: dict[str, float], name: str) -> float:
+        return found[name] / (most * found["unlisted"] - (1.0 - most) * found[name])
+
     taking = [weighed(hypothesis(CREEP, left)) for left in (0.2, 0.5, 0.8)]
-    odds = [found["muscle_creep"] / found["unlisted"] for found in taking]
-    assert odds == pytest.approx([0.8, 0.5, 0.2], rel=0.1)
+    shared = [odds(found, "muscle_creep") for found in taking]
+    assert shared == pytest.approx([1.6, 1.0, 0.4], rel=0.1)
+    both = weighed(hypothesis({**CREEP, **DAMPING}, 0.5))
+    expected = shared[1] * math.exp(-SETTINGS.further_price)
+    assert odds(both, "muscle_creep+muscle_rate_damping") == pytest.approx(expected, rel=0.1)
     two = weighed(hypothesis(DAMPING, 0.3), hypothesis(CREEP, 0.31))
     assert two["muscle_rate_damping"] > two["muscle_creep"]
-    together = two["muscle_creep"] + two["muscle_rate_damping"]
-    assert together < two["unlisted"] * (1.0 + 2.0 * (1.0 - SETTINGS.most_probability))
+    assert two["muscle_creep"] + two["muscle_rate_damping"] < 2.0 * two["unlisted"]
+
+
+def test_what_follows_a_curve_of_the_model_is_not_left_by_a_name() -> None:
+    """Two names leave as large a residual as the baseline, and one of them half of its error."""
+    curve = np.sin(0.5 * TIMES)[:, None] * 100.0
+    covariance = _Covariance([TIMES], [curve])
+    error = rows_of(401.0) - rows_of(1.0)
+
+    def leaving_rows(found: Candidate, along: float, size: float) -> Candidate:
+        rows = along * curve[:, 0] + size * error + rows_of(1.0)
+        return replace(found, likelihood=lambda: {"arm": covariance.likelihood([rows])})
+
+    start = leaving_rows(hypothesis({}, 1.0), 1.0, 1.0)
+    creep = leaving_rows(hypothesis(CREEP, 1.0), 1.05, 0.5)
+    damping = leaving_rows(hypothesis(DAMPING, 1.0), 0.95, 1.0)
+    found = by_text(weigh([start, creep, damping], ARM, Weighing(0.985, 30.0, SETTINGS)))
+    assert found["muscle_creep"] > 0.5 > 0.01 > found["muscle_rate_damping"]
 
 
 def test_names_that_groups_agree_on_are_capped() -> None:

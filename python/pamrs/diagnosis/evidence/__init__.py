@@ -3,7 +3,7 @@
 Public: `Candidate`, `BlockGroup`, `Attempts`, `significant`, `misses_only_held_out`,
 `autocorrelation_of`, `without_autocorrelation`, `parts_of`, `start_of` (hypotheses and their fits);
 `BlockLikelihood` (how probable recordings are);
-`weigh`, `explains`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
+`weigh`, `explains`, `is_absent`, `log_weight`, `share_left`, `same_recordings`, `probability_cap`,
 `capped_probability`, `penalty`, `price`, `possible_gain`, `lacks_drift`, `loss_by_values`,
 `visited_ranges`, `Weighing` (their weights); `drop_undetermined`, `undetermined_effects`,
 `with_stated_std`, `put_aside` (names that do not hold); `Judged`, `judge`, `case_verdict`,
@@ -45,6 +45,7 @@ from pamrs.diagnosis.evidence._weighing import (
     Weighing,
     capped_probability,
     explains,
+    is_absent,
     lacks_drift,
     log_weight,
     loss_by_values,
@@ -76,6 +77,7 @@ __all__ = [
     "drop_undetermined",
     "misses_only_held_out",
     "explains",
+    "is_absent",
     "judge",
     "log_weight",
     "parts_of",

@@ -57,6 +57,12 @@ class BlockLikelihood:
         """Logarithm of the density under the most probable size."""
         return float(self.by_size.max())
 
+    @property
+    def size(self) -> float:
+        """The most probable size; infinite where nothing is probable."""
+        best = int(self.by_size.argmax())
+        return float(self.sizes[best]) if math.isfinite(self.by_size[best]) else math.inf
+
     def expected(self, size: float) -> float:
         """Logarithm of the density of rows that have an error of this size, and no more."""
         return -0.5 * (self.count + float(np.interp(size, self.sizes, self.volume)))

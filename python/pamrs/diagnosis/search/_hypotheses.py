@@ -20,6 +20,7 @@ from pamrs.diagnosis.evidence import (
     Candidate,
     Weighing,
     explains,
+    is_absent,
     misses_only_held_out,
     probability_cap,
     same_recordings,
@@ -456,8 +457,16 @@ def _hidden(refit: _Refit, tell: Say) -> _Refit | None:
     if least is None:
         return None
     work = _begun(least, tell)
+    # a few steps show whether the error is smaller beside an effect, which is then fitted anew
+    ranked = by_effect(work.search.screened.scores())
+    best = [_scaled_starts(best_of_each_kind(scores)) for scores in ranked.values()]
+    baseline = work.search.start.fit
+    tried = two_at_a_time(
+        lambda start: least.trial.fit_shortly([start], baseline),
+        [start for starts in best for start in starts],
+    )
     events = _fit_events(work.search, [*work.own, *work.transient])
-    singles = [*_fit_singles(work.search), *events, *work.mistaken]
+    singles = [*(c for c in tried if c is not None), *events, *work.mistaken]
     return refit.beside_less([refit.start, *singles])
 
 
@@ -962,7 +971,11 @@ def _shortlist(
 
     best_of = {places[0]: best_of_each_kind(ranked[places[0]]) for places in worth}
     begin({effect: _scaled_starts(best) for effect, best in best_of.items()})
-    first = sorted(worth, key=lambda places: -most(places[0]))[: settings.most_singles]
+    # an effect that came to nothing from the best start of each form has nothing to explain here
+    walls = settings.most_tolerances
+    absent = {e for e, own in short.items() if own and all(is_absent(c, walls) for c in own)}
+    there = [places for places in worth if places[0] not in absent]
+    first = sorted(there, key=lambda places: -most(places[0]))[: settings.most_singles]
     begin(
         {p[0]: _scaled_starts(s for s in ranked[p[0]] if s not in best_of[p[0]]) for p in first}
         | {
