@@ -18,26 +18,6 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "as_numbers",
-    "as_said",
-    "by_hand",
-    "check_column",
-    "checked_number",
-    "checked_table",
-    "doubt",
-    "doubt_pascals",
-    "finite",
-    "is_quantity",
-    "one_of",
-    "plain",
-    "positive",
-    "quantities",
-    "rising",
-    "whole",
-    "without_units",
-]
-
 Given = ParamSpec("Given")
 Result = TypeVar("Result")
 _LEAST_PRESSURE = 50.0  # [Pa] below which no muscle notices a pressure

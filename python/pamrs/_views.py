@@ -17,18 +17,6 @@ from typing import Any, Final, TypeAlias
 from pamrs.channels import channel_of, laboratory_unit
 from pamrs.errors import ParameterError, meant
 
-__all__ = [
-    "COLOURS",
-    "MAX_POINTS",
-    "Panels",
-    "Curve",
-    "View",
-    "decimate",
-    "in_laboratory_units",
-    "legend",
-    "over_time",
-]
-
 #: What draws each panel, by its name, the most telling one first.
 Panels: TypeAlias = "dict[str, Callable[[Any], object]]"
 #: Label, times [s], values [SI], and how the line is drawn.

@@ -13,8 +13,6 @@ from typing import Final
 
 from pamrs.errors import ParameterError
 
-__all__ = ["check_writable", "write_atomically"]
-
 _ROOM: Final = 1 << 20
 """Bytes that must fit where a file is to be written: a result with its page and pictures."""
 

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import typer
 
 from pamrs._files import shown
-from pamrs._writing import check_writable
 from pamrs.cli._streams import terminal
 
 if TYPE_CHECKING:
@@ -26,28 +25,6 @@ if TYPE_CHECKING:
 
     from pamrs.recordings import Recording
     from pamrs.rig import Muscle, Rig
-
-__all__ = [
-    "GEOMETRY",
-    "QUANTITY",
-    "QUIET",
-    "STDOUT",
-    "Contents",
-    "as_given",
-    "check_new",
-    "check_writable",
-    "document",
-    "exact",
-    "file_of",
-    "json_help",
-    "named_muscle",
-    "note",
-    "progress",
-    "quantity",
-    "rig_named",
-    "usable_samples",
-    "write",
-]
 
 _NUMBER = r"[-+]?\d*\.?\d+(?:[eE][-+]?\d+)?"
 QUANTITY = re.compile(

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     Contents,
-    check_writable,
     document,
     exact,
     file_of,

@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from pamrs._files import resolved
+from pamrs._writing import check_writable
 from pamrs.channels import channel_of, with_trait
 from pamrs.cli._shared import (
     STDOUT,
     Contents,
-    check_writable,
     exact,
     file_of,
     json_help,

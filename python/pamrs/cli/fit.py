@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Final
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     GEOMETRY,
     Contents,
-    check_writable,
     document,
     file_of,
     json_help,

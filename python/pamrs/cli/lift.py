@@ -7,9 +7,9 @@ from typing import Annotated, Final
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     as_given,
-    check_writable,
     document,
     exact,
     file_of,

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.channels import channel_of, laboratory_unit
 from pamrs.cli._shared import (
-    check_writable,
     progress,
     rig_named,
     usable_samples,

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
     Contents,
-    check_writable,
     exact,
     progress,
     rig_named,

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 import typer
 
+from pamrs._writing import check_writable
 from pamrs.cli._shared import (
     QUANTITY,
     as_given,
-    check_writable,
     document,
     exact,
     file_of,

@@ -15,15 +15,6 @@ from numpy.typing import NDArray
 from pamrs.errors import RecordingError
 from pamrs.units import parse_unit
 
-__all__ = [
-    "FORCE_HIGH",
-    "PRESSURE_HIGH",
-    "absolute_pressures",
-    "check_forces",
-    "check_units",
-    "reachable",
-]
-
 Array = NDArray[np.float64]
 
 PRESSURE_HIGH: Final = 5e6  # [Pa]; a map whose pressures lie beyond is in another unit

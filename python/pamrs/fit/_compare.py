@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
 
-__all__ = ["ModelComparison", "compare_models"]
-
 _NEAR: Final = 1.25  # times the best leave-one-pressure-out error, for a recommendation
 
 Array = NDArray[np.float64]

@@ -28,8 +28,6 @@ from pamrs.fit._ways import table_ways
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["LEFT_OUT", "ForceMap"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Index = NDArray[np.intp]

@@ -20,8 +20,6 @@ from pamrs.rig.muscle_models import ELASTIC_PARAMETERS, MODELS, POLYNOMIAL_MODEL
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["CONSTANTS", "Design", "template"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 

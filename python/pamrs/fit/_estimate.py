@@ -19,8 +19,6 @@ from pamrs.fit._problem import decompose, project_out, solve
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["Estimate", "Free", "Known", "Problem", "estimate"]
-
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]

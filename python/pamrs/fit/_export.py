@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from pamrs.fit._result import MuscleFit
     from pamrs.rig import Rig
 
-__all__ = ["fit_report", "to_dict", "to_lmfit", "to_rig"]
-
-
 _NUMBERS: Final = (
     *("errors", "ndata", "nvarys", "chisqr", "redchi", "aic", "aicc", "bic", "rsquared"),
     *("condition_number", "rms_error", "max_error"),

@@ -28,8 +28,6 @@ from pamrs.recordings.table import (
 )
 from pamrs.units import parse_unit, same_dimension, to_si
 
-__all__ = ["Columns", "read_map"]
-
 Array = NDArray[np.float64]
 
 # channel -> SI unit

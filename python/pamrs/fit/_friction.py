@@ -26,8 +26,6 @@ from pamrs.fit.levels import LawParameter, LevelLine, fit_levels
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["FrictionFit", "FrictionLevel", "fit_friction"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

@@ -16,8 +16,6 @@ from pamrs.fit._files import Columns, read_map
 if TYPE_CHECKING:
     from pamrs.rig import Muscle
 
-__all__ = ["MeasuredMuscle", "load_force_map", "load_measured_muscle"]
-
 
 @dataclass(frozen=True, eq=False)
 class MeasuredMuscle:

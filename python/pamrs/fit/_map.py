@@ -24,8 +24,6 @@ from pamrs.fit._data import ForceMap
 if TYPE_CHECKING:
     from pamrs.rig import Muscle, Rig
 
-__all__ = ["MapFit", "fit_map"]
-
 Array = NDArray[np.float64]
 
 _MOST_LEVELS: Final = 24

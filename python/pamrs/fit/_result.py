@@ -17,7 +17,7 @@ from pamrs._views import Panels, View
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
 from pamrs.fit._estimate import geometry_slopes
-from pamrs.fit._statistics import FitParameter, FitStatistics, determination
+from pamrs.fit._statistics import FitStatistics, determination
 from pamrs.fit._validation import CrossValidation, PressureErrors, leave_one_out, summary
 from pamrs.units import with_unit
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from pamrs.fit._compare import ModelComparison
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle, Rig
-
-__all__ = ["OUTSIDE_CONTRACTION", "OUTSIDE_PRESSURE", "FitParameter", "MuscleFit"]
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.uint8]

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from pamrs.fit._data import ForceMap
     from pamrs.rig import Muscle
 
-__all__ = ["COEFFICIENTS", "GEOMETRY", "fit_muscle", "has_effect", "level_indices"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

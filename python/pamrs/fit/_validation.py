@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from pamrs.errors import FitError
 from pamrs.fit._estimate import Estimate, Problem, refitted
 
-__all__ = ["CrossValidation", "PressureErrors", "leave_one_out"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

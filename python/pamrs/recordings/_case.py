@@ -27,7 +27,6 @@ from pamrs.recordings._case_keys import (
     FORMAT,
     LOG,
     OF_A_LOG,
-    SCHEMA,
     TOP,
 )
 from pamrs.recordings._doubts import ambient_of, limits_of
@@ -38,8 +37,6 @@ from pamrs.recordings._recording import Issue, OwnValue, Recording
 from pamrs.recordings.logs import Log, Series, TextFormat, check_readable, read_log
 from pamrs.rig import Parameter, Rig, effect_parameter, load_rig
 from pamrs.units import to_si
-
-__all__ = ["SCHEMA", "Case", "load_case", "model_and_case"]
 
 _OPTIONS: Final = ("name", "sample_time", "start", "stop", *LOG)
 _RIG: Final = "rig.toml"

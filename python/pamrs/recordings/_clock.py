@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 from pamrs._files import MOST_ROWS
 from pamrs.errors import RecordingError
 
-__all__ = ["GAP", "Event", "Grid", "check_samples", "gaps", "lay_grid", "usual_interval"]
-
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 

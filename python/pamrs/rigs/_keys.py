@@ -7,8 +7,6 @@ from itertools import groupby
 
 from pamrs.rig.schema import BLOCKS, PORTS, SINGLE_BLOCKS, Key, Port
 
-__all__ = ["every_key"]
-
 _INTRODUCTION = """\
 Every key that a rig file may have. Each number is { value, unit }, any unit \
 of the right dimension; with tol (one standard

@@ -31,8 +31,6 @@ from pamrs.studio._check import Check, checked
 from pamrs.studio._run import RESULT, Run
 from pamrs.units import to_si
 
-__all__ = ["ROLES", "Studio", "Table"]
-
 ROLES: Final = {
     "fit": "fitted",
     "held_out": "held out, for the proof",

@@ -14,8 +14,6 @@ from typing import Any, Final
 
 from pamrs.report.text import hypothesis_label
 
-__all__ = ["FILES", "RESULT", "Run"]
-
 RESULT: Final = "result"
 """Folder of the results, in the case folder."""
 FILES: Final = ("report.html", "result.json", "model.toml", "experiment.csv")

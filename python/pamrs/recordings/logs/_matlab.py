@@ -16,8 +16,6 @@ from pamrs.recordings.logs._log import Array, Log, Series, TextFormat, collected
 from pamrs.recordings.logs._tables import series_of_matrix
 from pamrs.recordings.logs._words import understood_unit
 
-__all__ = ["read_matlab"]
-
 _DEEPEST = 12  # structs in structs
 
 
