@@ -209,8 +209,8 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     """``lu=10:60 mm`` and so on; the unit of the second number serves for the first where that has
     none.
     """
+    from pamrs._checks import refused
     from pamrs.design import LENGTHS, SYMBOLS
-    from pamrs.errors import ParameterError
 
     names = {**dict(zip(SYMBOLS, LENGTHS, strict=True)), **{name: name for name in LENGTHS}}
     found: dict[str, tuple[float, float]] = {}
@@ -224,7 +224,7 @@ def _bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
                 if key in found
                 else "LENGTH=LOW:HIGH is needed, like 'lu=10:60 mm', with lu, ru, ll or rl"
             )
-            raise ParameterError(f"--bounds = {text!r} is not allowed: {reason}")
+            raise refused("--bounds", text, reason)
         unit = high.strip().lstrip("+-0123456789.eE").strip()
         bare = not low.strip().lstrip("+-0123456789.eE").strip()
         found[key] = (

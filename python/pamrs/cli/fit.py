@@ -438,16 +438,15 @@ def _loops(context: typer.Context) -> ForceMap:
 
 def _prior(text: str | None) -> dict[str, float]:
     """Standard deviations of moduli, ``NAME=NUMBER UNIT`` with commas between."""
-    from pamrs.errors import ParameterError
+    from pamrs._checks import refused
     from pamrs.fit import COEFFICIENTS
 
     known: dict[str, float] = {}
     for part in [] if text is None else text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in COEFFICIENTS:
-            raise ParameterError(
-                f"--prior = {part.strip()!r} is not allowed: NAME=VALUE with a name of "
-                f"{', '.join(COEFFICIENTS)}"
+            raise refused(
+                "--prior", part.strip(), f"NAME=VALUE with a name of {', '.join(COEFFICIENTS)}"
             )
         known[name] = quantity(
             "prior",
@@ -465,11 +464,11 @@ def _noise(text: str, data: ForceMap) -> float:
 
 
 def _filter(text: str) -> tuple[str, str]:
-    from pamrs.errors import ParameterError
+    from pamrs._checks import refused
 
     column, equals, value = text.partition("=")
     if not (column.strip() and equals and value.strip()):
-        raise ParameterError(f"--where = {text!r} is not allowed: COLUMN=VALUE is needed")
+        raise refused("--where", text, "COLUMN=VALUE is needed")
     return column.strip(), value.strip()
 
 

@@ -93,15 +93,11 @@ def _loaded(place: Path, rig: Path | None, allow_outside: bool) -> tuple[Case, R
 
 def _chosen(case: Case, name: str) -> list[Recording]:
     """The recordings that are wanted."""
-    from pamrs.errors import ParameterError
+    from pamrs._checks import one_of
 
-    found = [r for r in case.recordings if name in ("", r.name)]
-    if not found:
-        raise ParameterError(
-            f"--recording = {name!r} is not allowed: one of "
-            f"{', '.join(r.name for r in case.recordings)} is needed"
-        )
-    return found
+    if name:
+        one_of("--recording", name, [r.name for r in case.recordings])
+    return [r for r in case.recordings if name in ("", r.name)]
 
 
 def _run(rig: Rig, recording: Recording) -> Simulation | None:

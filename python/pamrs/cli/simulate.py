@@ -163,6 +163,7 @@ def _steps(
     """Simulate under signals of steps."""
     import numpy as np
 
+    from pamrs._checks import refused
     from pamrs.errors import ParameterError
     from pamrs.simulation import initial_names, input_names, simulate
 
@@ -178,7 +179,7 @@ def _steps(
         name, values = _held(text, time, known)
         head, _, block = name.partition(".")
         if (head == "length" and "length" in drive) or block in drive.get(head, {}):
-            raise ParameterError(f"--hold = {text!r} is not allowed: {name} is given twice")
+            raise refused("--hold", text, f"{name} is given twice")
         if head == "length":
             drive["length"] = values
         else:
@@ -206,7 +207,8 @@ def _held(
     """
     import numpy as np
 
-    from pamrs.errors import ParameterError, meant
+    from pamrs._checks import refused
+    from pamrs.errors import meant
 
     name, steps = _parted("hold", text, "a signal like 'valve_command = 5 V, 8 V @ 1 s'")
     same = [one for one in known if channel_of(one) == name]
@@ -214,23 +216,19 @@ def _held(
         name = same[0]  # the only one is meant
     if name not in known:
         hint = f"there are: {', '.join(same)}" if same else meant(name, known)
-        raise ParameterError(
-            f"--hold = {text!r} is not allowed: the rig takes no signal {name!r}; {hint}"
-        )
+        raise refused("--hold", text, f"the rig takes no signal {name!r}; {hint}")
     dimension = _DIMENSIONS[channel_of(name)]
     values, last = np.zeros(time.size), 0.0
     for k, step in enumerate(steps.split(",")):
         value, at, when = step.partition("@")
         if (k > 0) != bool(at):
-            raise ParameterError(
-                f"--hold = {text!r} is not allowed: every value but the first needs its time, like "
-                "'8 V @ 1 s'"
+            raise refused(
+                "--hold", text, "every value but the first needs its time, like '8 V @ 1 s'"
             )
         begin = exact("hold", when, "time") if at else last
         if k > 0 and not last < begin <= time[-1]:
-            raise ParameterError(
-                f"--hold = {text!r} is not allowed: times that rise from 0 to {time[-1]:g} s "
-                "(--duration) are needed"
+            raise refused(
+                "--hold", text, f"times that rise from 0 to {time[-1]:g} s (--duration) are needed"
             )
         last = begin
         values[time >= begin - 1e-9] = exact("hold", value, dimension)
@@ -239,11 +237,11 @@ def _held(
 
 def _parted(option: str, text: str, example: str) -> tuple[str, str]:
     """What stands before and behind ``=``."""
-    from pamrs.errors import ParameterError
+    from pamrs._checks import refused
 
     name, equals, value = text.partition("=")
     if not equals:
-        raise ParameterError(f"--{option} = {text!r} is not allowed: {example} is needed")
+        raise refused(f"--{option}", text, f"{example} is needed")
     return name.strip(), value
 
 
@@ -251,13 +249,13 @@ def _began(text: str, known: list[str]) -> tuple[str, float]:
     """An initial value from ``"muscle_pressure.elbow = 2 bar"``; ``known`` are the states that the
     rig has.
     """
-    from pamrs.errors import ParameterError, meant
+    from pamrs._checks import refused
+    from pamrs.errors import meant
 
     name, value = _parted("initial", text, "a state like 'muscle_pressure = 2 bar'")
     if name not in known:
-        raise ParameterError(
-            f"--initial = {text!r} is not allowed: the rig has no state {name!r} to begin from; "
-            f"{meant(name, known)}"
+        raise refused(
+            "--initial", text, f"the rig has no state {name!r} to begin from; {meant(name, known)}"
         )
     return name, exact("initial", value, _INITIAL[unit_of(name)])
 

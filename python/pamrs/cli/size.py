@@ -134,6 +134,7 @@ def _measures(text: str, unit: str) -> bool:
 
 def _requirement(points: Sequence[str]) -> Requirement:
     """Points ``POSITION:FORCE``; all positions are strokes, or all are contractions."""
+    from pamrs._checks import refused
     from pamrs.design.sizing import Requirement
     from pamrs.errors import ParameterError
 
@@ -141,9 +142,7 @@ def _requirement(points: Sequence[str]) -> Requirement:
     for text in points:
         position, colon, force = text.partition(":")
         if not colon:
-            raise ParameterError(
-                f"--point = {text!r} is not allowed: POSITION:FORCE is needed, like '30 mm:7 kN'"
-            )
+            raise refused("--point", text, "POSITION:FORCE is needed, like '30 mm:7 kN'")
         pairs.append((position, force))
     kind = "contraction" if _measures(pairs[0][0], "1") else "stroke"
     if any(_measures(position, "1") != (kind == "contraction") for position, _ in pairs):

@@ -24,7 +24,7 @@ from typing import Any, ClassVar, Final
 
 import numpy as np
 
-from pamrs._checks import one_of
+from pamrs._checks import one_of, refused
 from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
@@ -242,9 +242,7 @@ def _bounds(
     for parameter, pair in zip(parameters, pairs, strict=True):
         low, high, start = float(pair[0]), float(pair[1]), np.asarray(parameter.value)
         if not (low < high and np.all(start >= low) and np.all(start <= high)):
-            raise ParameterError(
-                f"bounds[{parameter.name}] = {(low, high)} is not allowed: rising, with the start "
-                f"{start.tolist()} within"
-            )
+            needed = f"rising, with the start {start.tolist()} within"
+            raise refused(f"bounds[{parameter.name}]", (low, high), needed)
         checked.append((low, high))
     return tuple(checked)

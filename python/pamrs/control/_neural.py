@@ -25,7 +25,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import one_of, whole
+from pamrs._checks import one_of, refused, whole
 from pamrs._writing import write_atomically
 from pamrs.control._adaptive import dead, held
 from pamrs.control._model import JointModel
@@ -125,9 +125,7 @@ class Neural(SlidingController):
         if chosen is not None and not (
             len(chosen) == 3 and all(isinstance(b, (int, float)) and b > 0.0 for b in chosen)
         ):
-            raise ParameterError(
-                f"bounds = {bounds!r} is not allowed: 'default', three numbers above zero or None"
-            )
+            raise refused("bounds", bounds, "'default', three numbers above zero or None")
         self._bounds: tuple[float, ...] | None = (
             None if chosen is None else tuple(float(b) for b in chosen)
         )

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from pamrs._checks import check_names, one_of, refused
 from pamrs.channels import unit_of
 from pamrs.control._air import AirModel
 from pamrs.control._at_rest import SAMPLE, after, closed, kept, resting, slowest
@@ -78,10 +79,8 @@ class _Law(Stateful):
         plants = 1 if batch is None else batch
         allowed = (None, batch) if self.joints == 1 else (None, self.joints * plants)
         if batch != -1 and own not in allowed:
-            raise ParameterError(
-                f"{where}.batch = {own!r} is not allowed: {self.joints * plants} rows are needed "
-                f"for {self.joints} joints of {plants} plants"
-            )
+            rows = f"{self.joints * plants} rows are needed for {self.joints} joints"
+            raise refused(f"{where}.batch", own, f"{rows} of {plants} plants")
 
 
 class _Named(Stateful):
@@ -166,7 +165,7 @@ class RigController(SampledController):
         self.law = _Law(law, len(model.joints))
         self._commanded = getattr(law, "motion", "measured") == "commanded"
         given = {model.joints[0]: shares} if isinstance(shares, Share) else dict(shares or {})
-        self._check_names("shares", given, model.joints)
+        check_names("shares", given, model.joints)
         self._shares = [self._share(name, given.get(name), stiffness) for name in model.joints]
         self.shares = _Named(dict(zip(model.joints, self._shares, strict=True)))
         chosen = ("flow" if self._commanded else "loop") if air is None else air
@@ -197,17 +196,9 @@ class RigController(SampledController):
 
     # ------------------------------------------------------------------ made
 
-    @staticmethod
-    def _check_names(what: str, given: Mapping[str, Any], known: Sequence[str]) -> None:
-        for name in given:
-            if name not in known:
-                raise ParameterError(
-                    f"{what} has {name!r}; the rig has {', '.join(map(repr, known))}"
-                )
-
     def _share(self, joint: str, given: Share | None, stiffness: Any) -> Share:
         if isinstance(stiffness, Mapping):
-            self._check_names("stiffness", stiffness, self.joints)
+            check_names("stiffness", stiffness, self.joints)
             stiffness = stiffness.get(joint)
         torques, limit = self.model.torques_of(joint), self.model.pressure_limit
         if given is not None:
@@ -231,14 +222,11 @@ class RigController(SampledController):
     ) -> Any:
         model, feed = self.model, group.feed
         if isinstance(chosen, Mapping):
-            self._check_names("air", chosen, [g.chamber for g in model.groups])
+            check_names("air", chosen, [g.chamber for g in model.groups])
             if group.chamber in chosen:
                 return chosen[group.chamber]
             chosen = "flow" if self._commanded else "loop"
-        if chosen not in ("loop", "flow"):
-            raise ParameterError(
-                f"air = {chosen!r} is not allowed: 'loop', 'flow' or a way for each chamber"
-            )
+        one_of("air", chosen, ("loop", "flow"), also=", or a way for each chamber")
         if feed.input != "valve_command":
             if lead == "lag":
                 supply = model.rig.tables("supply").get(feed.supply or "", {})
@@ -469,9 +457,7 @@ class RigController(SampledController):
             )
             what = "angle" if rest_length is None else "length"
             at_given = np.asarray(angle).tolist()
-            raise ParameterError(
-                f"{what} = {at_given} is not allowed: one number each is needed, {ends}"
-            )
+            raise refused(what, at_given, f"one number each is needed, {ends}")
         return float(at.ravel()[0]) if joints == 1 else at.ravel()
 
     def _check_drive(self, drive: Value, rows: Value, angle: ArrayLike) -> None:

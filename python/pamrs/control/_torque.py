@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import one_of
 from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure, named
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
@@ -576,10 +577,8 @@ def joint_torque(
         "simplified": SimplifiedTorque.fit,
         "gaylord": GaylordTorque,
     }
-    if isinstance(torque, str) and torque not in makers:
-        raise ParameterError(
-            f"torque = {torque!r} is not allowed: one of {', '.join(makers)}, or a model"
-        )
+    if isinstance(torque, str):
+        one_of("torque", torque, makers, also=", or a model")
     alone = whole and len(rig.tables("muscle")) == len(rig.tables("joint")) == 1
     if alone:
         chosen: TorqueModel = makers[torque](rig) if isinstance(torque, str) else torque

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from pamrs._checks import checked_number, one_of, rising
+from pamrs._checks import checked_number, one_of, refused, rising
 from pamrs.control._protocol import Value
 from pamrs.errors import ParameterError
 
@@ -46,9 +46,7 @@ def as_value(
     try:
         array = np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError):
-        raise ParameterError(
-            f"{name} = {value!r} is not allowed: a number or an array of shape (n,) is needed"
-        ) from None
+        raise refused(name, value, "a number or an array of shape (n,) is needed") from None
     if array.ndim > 1 or array.size == 0:
         raise ParameterError(
             f"{name} has shape {array.shape}: a number or an array of shape (n,) is needed"

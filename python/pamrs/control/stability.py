@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive
+from pamrs._checks import as_column, one_of, positive, refused
 from pamrs.control._protocol import Controller
 from pamrs.control.linear import (
     SIDES,
@@ -294,12 +294,8 @@ def _command(controller: LinearController, command: str | None) -> int:
     """Number of the command at which a loop is opened."""
     if command is None and len(controller.outputs) == 1:
         return 0
-    if command not in controller.outputs:
-        raise ParameterError(
-            f"command = {command!r} is not allowed: one of {', '.join(controller.outputs)}, or "
-            "margins_of_each"
-        )
-    return controller.outputs.index(command)
+    chosen: str = one_of("command", command, controller.outputs, also=" (or margins_of_each)")
+    return controller.outputs.index(chosen)
 
 
 def _response(
@@ -385,13 +381,10 @@ def stable_region(
     ParameterError
         As :func:`pamrs.control.linear.linearise`, or if an axis is empty.
     """
-    grid = {name: np.asarray(values, dtype=np.float64) for name, values in axes.items()}
-    masses = np.asarray(payloads, dtype=np.float64)
-    for name, values in {**grid, "payloads": masses}.items():
-        if values.ndim != 1 or values.size == 0:
-            raise ParameterError(f"{name} has the shape {values.shape}; (n,) with n >= 1 is needed")
+    grid = {name: as_column(name, values) for name, values in axes.items()}
+    masses = as_column("payloads", payloads)
     if not sides or any(side not in SIDES for side in sides):
-        raise ParameterError(f"sides = {tuple(sides)} is not allowed: some of {', '.join(SIDES)}")
+        raise refused("sides", tuple(sides), f"some of {', '.join(SIDES)}")
     radius = np.zeros((masses.size, *(values.size for values in grid.values())))
     period = 0.0
     for p, mass in enumerate(masses):

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pamrs._checks import positive, whole
+from pamrs._checks import positive, refused, whole
 from pamrs.design._evaluator import Genetic, Progress
 from pamrs.design._joint_design import AREA_TOLERANCE, JointDesign, optimise
 from pamrs.design._problem import JointProblem
@@ -229,9 +229,7 @@ def least_pressure(
         If an argument is not possible.
     """
     if not largest_size > 0.0:
-        raise ParameterError(
-            f"largest_size = {largest_size} is not allowed: a length above 0 m is needed"
-        )
+        raise refused("largest_size", largest_size, "a length above 0 m is needed")
 
     def objective(points: Array) -> Array:
         needed = problem.needed_pressure(points)

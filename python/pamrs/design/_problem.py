@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of, positive, whole
+from pamrs._checks import one_of, positive, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -357,14 +357,11 @@ def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple
     for name in LENGTHS:
         pair = given.get(name, DEFAULT_BOUNDS[name])
         if len(pair) != 2 or not all(math.isfinite(value) for value in pair) or pair[0] > pair[1]:
-            raise ParameterError(
-                f"bounds[{name!r}] = {pair} is not allowed: two finite lengths, the lower one "
-                "first, are needed"
+            raise refused(
+                f"bounds[{name!r}]", pair, "two finite lengths, the lower one first, are needed"
             )
         if name.endswith("axial") and pair[0] <= 0.0:
-            raise ParameterError(
-                f"bounds[{name!r}] = {pair} is not allowed: this length must be above 0 m"
-            )
+            raise refused(f"bounds[{name!r}]", pair, "this length must be above 0 m")
         bounds[name] = (float(pair[0]), float(pair[1]))
     return bounds
 

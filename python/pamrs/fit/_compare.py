@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import refused
 from pamrs.errors import FitError, ParameterError
 from pamrs.fit._cautions import FAR
 from pamrs.fit._design import CONSTANTS, template
@@ -219,7 +220,7 @@ def compare_models(
     wanted = sorted({int(order) for order in orders})
     unknown = [name for name in chosen if name not in MODELS]
     if unknown or not chosen:
-        raise ParameterError(f"models = {chosen} is not allowed: of {', '.join(MODELS)}")
+        raise refused("models", chosen, f"of {', '.join(MODELS)}")
     pairs = [
         (name, order)
         for name in chosen

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import quantities
+from pamrs._checks import quantities, refused
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
     FORCE_HIGH,
     PRESSURE_HIGH,
     absolute_pressures,
     check_forces,
+    check_rest_length,
     check_units,
     reachable,
 )
@@ -367,10 +368,7 @@ class ForceMap:
         count = len(self.levels)
         strange = [index for index in levels if not -count <= index < count]
         if strange or not len(levels):
-            raise ParameterError(
-                f"levels = {list(levels)} is not allowed: indices from 0 to {count - 1}, one at "
-                "least"
-            )
+            raise refused("levels", list(levels), f"indices from 0 to {count - 1}, one at least")
         chosen = np.unique(np.asarray(levels, dtype=np.intp) % count)
         return self._without(~np.isin(self.level, chosen), LEFT_OUT)
 
@@ -447,12 +445,7 @@ class ForceMap:
             If the forces are beyond three times or below a hundredth of what the gas could do (a
             wrong unit), or fewer than two rows are left.
         """
-        rest = float(muscle.parameters["rest_length"])
-        if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
-            raise ParameterError(
-                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
-                "the same is needed"
-            )
+        check_rest_length(muscle, self.rest_length)
         low, high = muscle.contraction_limits
         e = self.contraction
         map_ = self._without(self.used & ~((e >= low) & (e <= high)), "beyond the braid")

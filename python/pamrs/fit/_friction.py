@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from pamrs._checks import refused
 from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._data import ForceMap
@@ -315,7 +316,7 @@ def fit_friction(data: ForceMap, *, floor: float = 0.01) -> FrictionFit:
         If no direction is known or can be told, or fewer than two pressures have both branches.
     """
     if not (math.isfinite(floor) and 0.0 <= floor < 1.0):
-        raise ParameterError(f"floor = {floor!r} is not allowed: at least 0 and below 1")
+        raise refused("floor", floor, "at least 0 and below 1")
     data = data.with_directions()
     gas, e, _, _, way = data.used_rows()
     if not np.any(way):

@@ -17,8 +17,10 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from pamrs._checks import contraction_of, refused
 from pamrs._views import Panels, View
-from pamrs.errors import ParameterError, RecordingError
+from pamrs.errors import RecordingError
+from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
 
 if TYPE_CHECKING:
@@ -120,11 +122,8 @@ class MapFit(View):
         ParameterError
             If not one of contraction and length is given.
         """
-        if (contraction is None) == (length is None):
-            raise ParameterError("give contraction or length, one of the two")
-        if contraction is None:
-            contraction = 1.0 - np.asarray(length, dtype=np.float64) / self.rest_length
-        return _predict(self.pressure, self.contraction, self.force, pressure, contraction)
+        asked = contraction_of(contraction, length, self.rest_length)
+        return _predict(self.pressure, self.contraction, self.force, pressure, asked)
 
     def to_muscle(self, muscle: Muscle) -> Muscle:
         """A muscle with this table.
@@ -144,12 +143,7 @@ class MapFit(View):
         ParameterError
             If its rest length is another.
         """
-        rest = float(muscle.parameters["rest_length"])
-        if not math.isclose(rest, self.rest_length, rel_tol=1e-6):
-            raise ParameterError(
-                f"rest_length: the muscle has {rest:g} m, the force map {self.rest_length:g} m; "
-                "the same is needed"
-            )
+        check_rest_length(muscle, self.rest_length)
         return muscle.replace(
             model="map",
             geometry=muscle.geometry,
@@ -251,7 +245,7 @@ def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
         If there are fewer than two pressures or fewer than three contractions.
     """
     if not 3 <= int(nodes) <= _MOST_NODES:
-        raise ParameterError(f"nodes = {nodes!r} is not allowed: from 3 to {_MOST_NODES}")
+        raise refused("nodes", nodes, f"from 3 to {_MOST_NODES}")
     data = data.with_directions()
     gas, e, pull, _, way = data.used_rows()
     pressure = _levels(data)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import quantities
+from pamrs._checks import contraction_of, one_of, quantities
 from pamrs._views import Panels, View
 from pamrs.errors import ParameterError
 from pamrs.fit._design import friction_factor
@@ -96,9 +96,8 @@ class MuscleFit(View, FitStatistics):
             None when there is no such row.
         """
         masks = {"fitted": self._rows, "held_out": ~self._rows, "all": np.ones_like(self._rows)}
-        if rows not in masks:
-            raise ParameterError(f"rows = {rows!r} is not allowed: one of {', '.join(masks)}")
-        return summary(self.all_residuals[masks[rows]], float(self._problem.force.max()))
+        chosen = masks[one_of("rows", rows, masks)]
+        return summary(self.all_residuals[chosen], float(self._problem.force.max()))
 
     @property
     def rms_error(self) -> float:
@@ -143,14 +142,8 @@ class MuscleFit(View, FitStatistics):
         direction: ArrayLike | None,
     ) -> tuple[Array, Array, Array]:
         """Pressure, contraction, direction in one shape; direction NaN-free, 0 where none."""
-        if (contraction is None) == (length is None):
-            raise ParameterError("give contraction or length, one of the two")
-        if length is not None:
-            contraction = (
-                1.0
-                - np.asarray(length, dtype=np.float64)
-                / self._estimate.blank.parameters["rest_length"]
-            )
+        rest = self._estimate.blank.parameters["rest_length"]
+        contraction = contraction_of(contraction, length, rest)
         way = 0.0 if direction is None else direction
         p, e, d = np.broadcast_arrays(
             *(np.asarray(v, dtype=np.float64) for v in (pressure, contraction, way))

@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from pamrs._checks import refused
 from pamrs._views import decimate
 from pamrs.channels import channel_of, dotted, laboratory_unit, recorded_as
 from pamrs.errors import ParameterError
@@ -210,7 +211,7 @@ def write_animation(result: Simulation, path: Path, *, speed: float = 1.0) -> Pa
             f"{result.time.size} sample is not enough to draw a motion: two at least"
         )
     if not (math.isfinite(speed) and speed > 0.0):
-        raise ParameterError(f"speed = {speed} is not allowed: a finite number above zero")
+        raise refused("speed", speed, "a finite number above zero")
     if not _SLOWEST <= speed <= 1.0 / _SLOWEST:
         raise ParameterError(
             f"speed = {speed:g} is not allowed: from {_SLOWEST:g} to {1.0 / _SLOWEST:g}"
