@@ -23,9 +23,8 @@ def write_atomically(path: str | os.PathLike[str], content: str | bytes) -> Path
     """
     target = Path(os.path.realpath(path))  # through a symbolic link, not over it
     data = content.encode("utf-8") if isinstance(content, str) else content
-    if (
-        target.exists() and not target.is_file()
-    ):  # a pipe or a terminal: nothing there to keep whole
+    # a pipe or a terminal: nothing there to keep whole
+    if target.exists() and not target.is_file():
         Path(path).write_bytes(data)
         return Path(path)
     temporary = target.with_name(f".{target.name[:40]}.{secrets.token_hex(8)}.tmp")

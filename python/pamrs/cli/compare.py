@@ -10,8 +10,6 @@ import typer
 from pamrs._writing import check_writable
 from pamrs.cli._shared import document, file_of, json_help, write
 
-__all__ = ["compare_command"]
-
 
 def compare_command(
     first: Annotated[

@@ -11,8 +11,6 @@ from pamrs._writing import check_writable
 from pamrs.cli._shared import write
 from pamrs.cli.completion import muscle_names
 
-__all__ = ["library_command"]
-
 
 def library_command(
     name: Annotated[

@@ -17,8 +17,7 @@ from pamrs.cli._shared import (
     rig_named,
     write,
 )
-
-__all__ = ["lift_command"]
+from pamrs.errors import ParameterError
 
 SCHEMA: Final = "pamrs.lift/1"
 
@@ -48,7 +47,6 @@ def lift_command(
     """
     check_writable(png, file_of(json))
     from pamrs.design import lift
-    from pamrs.errors import ParameterError
 
     loaded = rig_named(rig)
     if payload is not None:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from pamrs._writing import check_writable
+from pamrs._checks import refused
+from pamrs._writing import check_writable, write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit, unit_of
 from pamrs.cli._shared import (
     Contents,
@@ -19,6 +20,7 @@ from pamrs.cli._shared import (
     usable_samples,
     write,
 )
+from pamrs.errors import ParameterError, RecordingError, meant
 from pamrs.units import with_unit
 
 if TYPE_CHECKING:
@@ -28,8 +30,6 @@ if TYPE_CHECKING:
     from pamrs.recordings import Recording
     from pamrs.rig import Rig
     from pamrs.simulation import Simulation
-
-__all__ = ["simulate_command"]
 
 _DIMENSIONS = {
     "valve_command": "voltage",
@@ -128,7 +128,6 @@ def simulate_command(
 
 def _recorded(path: Path) -> Recording:
     """A recording of inputs; what a laboratory wrote is played by another command."""
-    from pamrs.errors import RecordingError
     from pamrs.recordings import load_recording
 
     try:
@@ -163,8 +162,6 @@ def _steps(
     """Simulate under signals of steps."""
     import numpy as np
 
-    from pamrs._checks import refused
-    from pamrs.errors import ParameterError
     from pamrs.simulation import initial_names, input_names, simulate
 
     if not (0.0 < sample_time <= duration and duration / sample_time < 1e8):
@@ -207,9 +204,6 @@ def _held(
     """
     import numpy as np
 
-    from pamrs._checks import refused
-    from pamrs.errors import meant
-
     name, steps = _parted("hold", text, "a signal like 'valve_command = 5 V, 8 V @ 1 s'")
     same = [one for one in known if channel_of(one) == name]
     if name not in known and len(same) == 1:
@@ -237,8 +231,6 @@ def _held(
 
 def _parted(option: str, text: str, example: str) -> tuple[str, str]:
     """What stands before and behind ``=``."""
-    from pamrs._checks import refused
-
     name, equals, value = text.partition("=")
     if not equals:
         raise refused(f"--{option}", text, f"{example} is needed")
@@ -249,9 +241,6 @@ def _began(text: str, known: list[str]) -> tuple[str, float]:
     """An initial value from ``"muscle_pressure.elbow = 2 bar"``; ``known`` are the states that the
     rig has.
     """
-    from pamrs._checks import refused
-    from pamrs.errors import meant
-
     name, value = _parted("initial", text, "a state like 'muscle_pressure = 2 bar'")
     if name not in known:
         raise refused(
@@ -262,8 +251,6 @@ def _began(text: str, known: list[str]) -> tuple[str, float]:
 
 def _write_csv(path: Path, columns: Simulation) -> None:
     """Write channels in SI units under headers that carry the unit."""
-    from pamrs._writing import write_atomically
-
     names = list(columns)
     lines = [",".join(f"{name} [{unit_of(name)}]" for name in names)]
     for row in zip(*(columns[name].tolist() for name in names), strict=True):

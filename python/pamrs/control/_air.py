@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pamrs import _core
-from pamrs.control._groups import Group, groups_of, named
+from pamrs.channels import dotted
+from pamrs.control._groups import Group, groups_of
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._torque import _parts
@@ -25,9 +26,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_LAMINAR: Final = (
-    0.999  # pressure ratio above which the orifice law is a line (physics reference, section 3)
-)
+# pressure ratio above which the orifice law is a line (physics reference, section 3)
+_LAMINAR: Final = 0.999
 _WAYS: Final = ("fill", "vent")
 _LEAST_FLOW: Final = 1e-12  # of the choked one: nothing flows, and any area is as good
 
@@ -192,7 +192,7 @@ class AirModel:
             )
             volume = volume + int(muscle.parameters["count"]) * muscle.air_volume(contraction)
         self.volume = Spline(low, high, volume)
-        self._fill, self._vent = _paths(rig.name, named("valve", group.feed.name), valve, gas)
+        self._fill, self._vent = _paths(rig.name, dotted("valve", group.feed.name), valve, gas)
         self.null, self.half_range = float(valve["null_voltage"]), float(valve["half_range"])
         self._fraction, self._opening = _inverse(valve)
 

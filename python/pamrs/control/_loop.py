@@ -251,9 +251,8 @@ def closed_loop(
     )
     finite("start", start)
     act = actuation_of(simulator.rig, controller) if actuation is None else actuation
-    began = (
-        round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
-    )  # a restart at the same float
+    # a restart at the same float
+    began = round(start / dt) if abs(round(start / dt) * dt - start) < 1e-9 * dt else start / dt
     alias = measured_by(controller, measured)
     tracked = _angles(simulator.rig, controller, alias)
     by_length = tracked[0] == "length"

@@ -193,11 +193,9 @@ class Neural(SlidingController):
 
     def _start(self) -> dict[str, Any]:
         # of several joints they become arrays with the first sample, which says of how many plants
-        return (
-            {name: list(weights) for name, weights in self._initial.items()}
-            if self._single
-            else dict.fromkeys(NETWORKS)
-        )
+        if self._single:
+            return {name: list(weights) for name, weights in self._initial.items()}
+        return dict.fromkeys(NETWORKS)
 
     def _row_shape(self, name: str, start: Any) -> tuple[int, ...]:
         return (self._nodes,)

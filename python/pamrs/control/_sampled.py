@@ -354,11 +354,9 @@ class SampledController(Stateful, Controller):
         if angle.__class__ is float and rate.__class__ is float and acceleration.__class__ is float:
             total = angle + rate + acceleration
             if total - total == 0.0:
-                return (
-                    reference
-                    if reference.__class__ is Reference
-                    else Reference(angle, rate, acceleration)
-                )
+                if reference.__class__ is Reference:
+                    return reference
+                return Reference(angle, rate, acceleration)
         return Reference(
             *(
                 self._sized(f"reference.{name}", value)

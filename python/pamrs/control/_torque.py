@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pamrs._checks import one_of
-from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure, named
+from pamrs.channels import dotted
+from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._values import clip, positive_gain, where
@@ -27,9 +28,8 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-_NODES: Final = (
-    1025  # of a table over the joint's range; makes its error some 1e-9 of the largest value
-)
+# of a table over the joint's range; makes its error some 1e-9 of the largest value
+_NODES: Final = 1025
 _STRUT: Final = 1e9  # buckling load of a muscle that pushes, whatever it is pushed with [N]
 _LEAST_SLOPE: Final = 0.01  # of the largest C1: below it a pressure says nothing about the torque
 _INCH: Final = 0.0254
@@ -590,7 +590,7 @@ def joint_torque(
         )
     each = tuple(group_torques(rig, [g for g in groups if g.joint == joint]).values())
     if all(group.sign < 0 for group in each):
-        where = named("joint", joint)
+        where = dotted("joint", joint)
         raise ParameterError(
             f"rig {rig.name!r}: no muscle in use raises the angle of {where}, so that no pressure "
             "can be asked for"

@@ -57,11 +57,9 @@ def as_value(
     if np.any(wrong):
         first = np.atleast_1d(array)[np.atleast_1d(wrong)][0]
         bound = f"above {lower:g}" if above else f"from {lower:g}"
-        allowed = (
-            "finite"
-            if lower == -math.inf and upper == math.inf
-            else f"finite, {bound} to {upper:g}"
-        )
+        allowed = "finite"
+        if lower > -math.inf or upper < math.inf:
+            allowed = f"finite, {bound} to {upper:g}"
         raise ParameterError(f"{name} = {first:g} is not allowed: {allowed} is needed")
     if array.ndim == 0:
         return float(array)

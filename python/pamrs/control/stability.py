@@ -77,21 +77,17 @@ class Margins:
 
     def __str__(self) -> str:
         """What the margins say, with units."""
-        factor = (
-            f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
-            if math.isfinite(self.gain)
-            else "no gain"
-        )
+        factor = "no gain"
+        if math.isfinite(self.gain):
+            factor = f"all gains times {self.gain:.3g} (at {self.gain_frequency:.3g} rad/s)"
         eigenvalue = f"largest eigenvalue {self.radius:.6g} per sample"
         if self.phase is None or self.delay is None:
             return (
                 f"unstable ({eigenvalue}): no margin of phase or delay; nearest boundary: {factor}"
             )
-        phase = (
-            f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)"
-            if math.isfinite(self.phase)
-            else "any"
-        )
+        phase = "any"
+        if math.isfinite(self.phase):
+            phase = f"{math.degrees(self.phase):.3g} deg (at {self.phase_frequency:.3g} rad/s)"
         delay = f"{self.delay:.3g} s" if math.isfinite(self.delay) else "any"
         return (
             f"stable ({eigenvalue}): phase to spare {phase}, delay to spare {delay}; nearest "
@@ -239,9 +235,8 @@ def margins(
     opened = library.frd(response, frequencies, smooth=True)
     gain, phase, _, at_gain, at_phase, _ = library.stability_margins(opened)
     last = float(response[-1].real)
-    nyquist = (
-        1.0 / abs(last) if last < 0.0 else math.inf
-    )  # the curve ends there on the real axis, which no crossing shows
+    # the curve ends there on the real axis, which no crossing shows
+    nyquist = 1.0 / abs(last) if last < 0.0 else math.inf
     if abs(math.log(nyquist)) < (
         math.inf if gain is None or math.isinf(gain) else abs(math.log(gain))
     ):

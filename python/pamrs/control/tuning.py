@@ -584,9 +584,8 @@ def _optuna(
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", optuna.exceptions.ExperimentalWarning
-            )  # of constant_liar
+            # of constant_liar
+            warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
             sampler = optuna.samplers.TPESampler(seed=int(rng.integers(2**31)), constant_liar=True)
         study = optuna.create_study(sampler=sampler)
         if begin is not None:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from pamrs._checks import checked_number, doubt_pascals, quantities, whole
 from pamrs._views import Panels, View
+from pamrs._writing import write_atomically
 from pamrs.effects import ports_of
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
@@ -218,7 +219,6 @@ class Lift(View):
         Path
             The file written.
         """
-        from pamrs._writing import write_atomically
         from pamrs.design._lifting_figure import lift_png
 
         return write_atomically(path, lift_png(self))
@@ -275,9 +275,8 @@ def lift(
             f"rig {rig.name!r} has an arm of several links: what it lifts is found for a one-link "
             "arm only"
         )
-    core_rig(
-        rig
-    )  # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+    # refuses lengths that the muscle cannot have, and angles that the tendon does not reach
+    core_rig(rig)
     pressure = _pressure(rig, pressure)
     joint = next(iter(rig.tables("joint").values()))
     low, high = float(joint["min_angle"]), float(joint["max_angle"])

@@ -247,11 +247,9 @@ def least_pressure(
         seed=seed,
         progress=progress,
     )
-    return (
-        JointDesign(problem.replace(pressure=found.value), found.point, found)
-        if found.value < 1e10
-        else None
-    )
+    if found.value < 1e10:
+        return JointDesign(problem.replace(pressure=found.value), found.point, found)
+    return None
 
 
 @dataclass(frozen=True)

@@ -35,9 +35,8 @@ DEFAULT_BOUNDS: Final[dict[str, tuple[float, float]]] = {
     "lower_offset": (-0.0127, 0.0254),
 }
 
-_HOPELESS: Final = (
-    1e10  # [Pa], stands for "no pressure is enough"; larger the less of the range is reached
-)
+# [Pa], stands for "no pressure is enough"; larger the less of the range is reached
+_HOPELESS: Final = 1e10
 
 
 @dataclass(frozen=True)

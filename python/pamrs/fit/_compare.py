@@ -405,9 +405,8 @@ def effective_size(fit: MuscleFit) -> float:
     level, length, way = fit.data.level[rows], fit.data.length[rows], fit.data.direction[rows]
     order = np.lexsort((length, level, way))
     level, length, way, residual = level[order], length[order], way[order], fit.residual[order]
-    same = (level[1:] == level[:-1]) & (
-        way[1:] == way[:-1]
-    )  # neighbours on one branch: the branches of a loop lie apart
+    # neighbours on one branch: the branches of a loop lie apart
+    same = (level[1:] == level[:-1]) & (way[1:] == way[:-1])
     along = _correlation(residual[1:][same], residual[:-1][same])
     below, above = [np.empty(0)], [np.empty(0)]
     for branch in np.unique(way):

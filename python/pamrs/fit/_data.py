@@ -299,11 +299,9 @@ class ForceMap:
 
     def _found(self, why: str, rows: Sequence[int]) -> str:
         one, several, rest = _WORDS.get(why, ("is", "are", why))
-        return (
-            f"1 row of {len(self)} {one} {rest}"
-            if len(rows) == 1
-            else f"{len(rows)} rows of {len(self)} {several} {rest}"
-        )
+        if len(rows) == 1:
+            return f"1 row of {len(self)} {one} {rest}"
+        return f"{len(rows)} rows of {len(self)} {several} {rest}"
 
     def _places(self, rows: Sequence[int]) -> str:
         """The first of some rows, by their number in the file or else by their index."""

@@ -27,14 +27,8 @@ _NUMBERS: Final = (
 def fit_report(fit: MuscleFit) -> str:
     """What :meth:`MuscleFit.fit_report` returns."""
     order = "" if fit.order is None else f", order {fit.order}"
-    moduli = (
-        ""
-        if not fit.nvarys
-        else (
-            ", moduli "
-            f"{'linear in pressure' if fit.moduli_kind == 'linear' else 'free at each level'}"
-        )
-    )
+    law = "linear in pressure" if fit.moduli_kind == "linear" else "free at each level"
+    moduli = f", moduli {law}" if fit.nvarys else ""
     rms, worst = fit.errors_of("fitted") or (0.0, 0.0)
     lines = [
         f"{fit.data.label}: {fit.model}{order}{moduli}",

@@ -61,9 +61,8 @@ _DIRECTIONS: Final = {
 _HEADING = re.compile(r"^(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*(?:\([^()]*\))?)[\])]\s*$")
 _NUMERIC = re.compile(r"[-+]?(\d[\d.,]*|[.,]\d+)([eE][-+]?\d+)?")
 _NARROW: Final = 0.006  # a map of contractions from 0 to less than 0.6 % is one of fractions
-_SET_POINTS: Final = (
-    50  # a pressure with fewer distinct values in a time series is a set point, not a sensor
-)
+# a pressure with fewer distinct values in a time series is a set point, not a sensor
+_SET_POINTS: Final = 50
 
 
 class _Column(NamedTuple):

@@ -32,15 +32,12 @@ Mask = NDArray[np.bool_]
 
 _FEWEST: Final = 4  # rows of a branch
 _BINS: Final = 200  # of a branch's contraction: rows nearer than that are averaged
-_BLOCKS: Final = (
-    8  # stretches of contraction whose coefficients are compared for the standard error
-)
-_SLACK: Final = (
-    0.05  # of a level's largest mean force: below it a loop tells nothing about the ratio
-)
-_HALFWAY: Final = (
-    2.0 / 7.0
-)  # of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+# stretches of contraction whose coefficients are compared for the standard error
+_BLOCKS: Final = 8
+# of a level's largest mean force: below it a loop tells nothing about the ratio
+_SLACK: Final = 0.05
+# of the presliding distance, where slip elements of 1/8, 1/4, 1/2 and 1 of it average to zero
+_HALFWAY: Final = 2.0 / 7.0
 _PART_WAY: Final = 0.95  # of the way to either branch: rows within are in transition
 _RESOLVED: Final = 3  # rows in transition that a reversal needs
 _NEAR_TURN: Final = 0.05  # of the range of a pressure cycle, where the force is between branches

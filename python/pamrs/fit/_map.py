@@ -189,11 +189,9 @@ class MapFit(View):
     def fit_report(self) -> str:
         """The result as text."""
         p, e = self.pressure / 1e3, 100.0 * self.contraction
-        between = (
-            "not determinable, fewer than three levels"
-            if math.isnan(self.between)
-            else f"{self.between:.3g} N rms"
-        )
+        between = "not determinable, fewer than three levels"
+        if not math.isnan(self.between):
+            between = f"{self.between:.3g} N rms"
         lines = [
             "force table of the muscle: monotone in pressure and contraction",
             f"  {len(p)} pressures from {p[0]:.4g} to {p[-1]:.4g} kPa, {len(e)} contractions from "

@@ -306,9 +306,8 @@ class MuscleFit(View, FitStatistics):
         used = chosen.used
         way = chosen.direction[used] if np.any(self._problem.direction) else None
         if way is not None and self.model == "elbow_linear":
-            way = np.where(
-                way == 0, -1, way
-            )  # as in the fit: rows of unknown direction are on the contracting branch
+            # as in the fit: rows of unknown direction are on the contracting branch
+            way = np.where(way == 0, -1, way)
         force = self.predict(chosen.pressure[used], length=chosen.length[used], direction=way)
         return determination(chosen.force[used], force)
 

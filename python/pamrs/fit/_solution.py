@@ -7,7 +7,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,11 +203,9 @@ def level_indices(data: ForceMap, levels: Sequence[float]) -> list[int]:
 
 def _chosen(data: ForceMap, levels: Sequence[float] | None) -> Mask:
     level = data.level[data.used]
-    return (
-        np.ones(len(level), dtype=bool)
-        if levels is None
-        else np.isin(level, level_indices(data, levels))
-    )
+    if levels is None:
+        return np.ones(len(level), dtype=bool)
+    return np.isin(level, level_indices(data, levels))
 
 
 def _free(blank: Muscle, names: tuple[str, ...], tolerance: dict[str, float]) -> tuple[Free, ...]:
@@ -274,22 +272,19 @@ def _problem(
     used = data.used
     pressure, _, force, level, way = data.used_rows()
     steps = way.astype(np.float64) if direction == "data" else np.zeros(len(force))
-    arrays: dict[str, Any] = {
-        "pressure": pressure,
-        "length": data.length[used],
-        "force": force,
-        "level": level,
-        "direction": steps,
-        "levels": data.levels,
-    }
     return Problem(
         blank=blank,
         moduli=moduli,
         free=free,
         known=known,
         noise=noise,
+        pressure=pressure,
+        length=data.length[used],
+        force=force,
+        level=level,
+        direction=steps,
         weight=np.ones(len(force)),
-        **arrays,
+        levels=data.levels,
     )
 
 

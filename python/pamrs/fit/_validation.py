@@ -61,11 +61,9 @@ class PressureErrors:
 
     def __repr__(self) -> str:
         left = f", {len(self.weak)} left out" if len(self.weak) else ""
-        worst = (
-            f", rms at most {100 * self.rms.max():.2f} % of the level's largest force"
-            if len(self.rms)
-            else ""
-        )
+        worst = ""
+        if len(self.rms):
+            worst = f", rms at most {100 * self.rms.max():.2f} % of the level's largest force"
         return f"PressureErrors({len(self.levels)} levels{left}{worst})"
 
     @classmethod

@@ -109,9 +109,8 @@ def wiring(model: Mapping[str, Any], ports: Ports) -> list[str]:
         way = [ends["from"], qualified("valve", name), ends["to"]]
         if ends["to"] in inner:
             way.append(inner[ends["to"]]["to"])
-        lines.append(
-            way if way[-1] == "ambient" else [*way, "ambient"]
-        )  # a valve also vents what it fills
+        # a valve also vents what it fills
+        lines.append(way if way[-1] == "ambient" else [*way, "ambient"])
     lines += [[ends["from"], name, ends["to"]] for name, ends in inner.items() if ends["from"]]
     lines = [[fronts[way[0]], *way] if way[0] in fronts else way for way in lines]
     for way in lines:
@@ -311,9 +310,8 @@ class _Connector:
             if "from" not in self.given.get(label, {}):
                 if label in ends:
                     self.ports["line"][name]["from"] = ""
-                    if (
-                        kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0
-                    ):  # its pressure would have no rate
+                    # its pressure would have no rate
+                    if kind_of("line", table) == "orifice" and table.get("inlet_volume") == 0.0:
                         self.problems.append(
                             f"{label}.inlet_volume = 0 m3 is not allowed: more is needed between "
                             "an orifice and the valves that feed it"

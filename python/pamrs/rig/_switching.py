@@ -71,6 +71,11 @@ def _checked(
     return chosen, problems
 
 
+def kind_of_entry(entry: Mapping[str, Any]) -> tuple[str, str, str]:
+    """What an effect is beside its numbers."""
+    return entry["id"], entry.get("at", ""), entry.get("form", "")
+
+
 def placed(entries: Iterable[Entry], entry: Entry) -> list[Entry]:
     """The effects of a rig with one more, in the place of the first of those that it replaces."""
     place, found, first = entry.get("at", ""), [], None

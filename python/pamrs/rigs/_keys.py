@@ -69,11 +69,9 @@ def _line(key: Key, *, inner: bool) -> str:
 def _numbers(key: Key) -> str:
     what = {"vector": "list", "count": "whole number"}.get(key.kind, "number")
     unit = "" if key.unit == "1" else f" [{key.unit}]"
-    bounds = (
-        f" from {key.lower:.4g} to {key.upper:.4g}"
-        if math.isfinite(key.lower) and math.isfinite(key.upper)
-        else ""
-    )
+    bounds = ""
+    if math.isfinite(key.lower) and math.isfinite(key.upper):
+        bounds = f" from {key.lower:.4g} to {key.upper:.4g}"
     return f"{what}{unit}{bounds}"
 
 

@@ -20,6 +20,7 @@ from pamrs._checks import check_kind, doubt_pascals, positive, quantities, refus
 from pamrs._tables import Columns, Tabular
 from pamrs._tables import over_time as columns_over_time
 from pamrs._views import Panels, View, in_laboratory_units, over_time
+from pamrs._writing import write_atomically
 from pamrs.channels import channel_of, dotted, laboratory_unit
 from pamrs.errors import PamrsError, ParameterError, meant
 from pamrs.rig import Rig
@@ -152,11 +153,10 @@ class Balance:
         share = (
             f" ({100.0 * self.muscle_work / self.exergy:.1f} % of it)" if self.exergy > 0.0 else ""
         )
-        walls = (
-            ""
-            if self.heat is None or self.gas_work is None
-            else f"\nheat from the walls {self.heat:.4g} J, work of the gas {self.gas_work:.4g} J"
-        )
+        walls = ""
+        if self.heat is not None and self.gas_work is not None:
+            walls = f"\nheat from the walls {self.heat:.4g} J"
+            walls += f", work of the gas {self.gas_work:.4g} J"
         return (
             f"{air}{walls}\nair's energy R T m {self.energy:.4g} J, exergy {self.exergy:.4g} J; "
             f"net work of the muscles {self.muscle_work:.4g} J"
@@ -487,8 +487,6 @@ class Simulation(View, Tabular, Mapping[str, Array]):
         Path
             The file written.
         """
-        from pamrs._writing import write_atomically
-
         return write_atomically(path, _motion().channels_png(self, recorded, nominal))
 
     def animate(self, path: str | os.PathLike[str], *, speed: float = 1.0) -> Path:
