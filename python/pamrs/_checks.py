@@ -49,7 +49,7 @@ def check_names(what: str, names: Iterable[str], known: Iterable[str]) -> None:
     there = list(known)
     for name in names:
         if name not in there:
-            listed = ", ".join(map(str, there)) or "none"
+            listed = ", ".join(map(repr, there)) or "none"
             raise ParameterError(f"{what} has {name!r}, which is not there; there are: {listed}")
 
 

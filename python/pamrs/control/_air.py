@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pamrs import _core
 from pamrs.channels import dotted
-from pamrs.control._groups import Group, groups_of
+from pamrs.control._groups import Group, check_single, groups_of
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._torque import _parts
@@ -313,12 +313,8 @@ def _group(rig: Rig, chamber: str | None) -> Group:
     """The muscles of a chamber that a valve feeds from a supply."""
     groups = groups_of(rig)
     if chamber is None:
-        for block in ("valve", "chamber", "supply"):
-            if len(rig.tables(block)) != 1:
-                raise ParameterError(
-                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
-                    "model needs exactly one, or the name of a chamber"
-                )
+        needed = "needs exactly one, or the name of a chamber"
+        check_single(rig, ("valve", "chamber", "supply"), needed)
     found = [group for group in groups if chamber in (None, group.chamber)]
     if not found:
         there = ", ".join(repr(group.chamber) for group in groups) or "none"

@@ -13,6 +13,15 @@ if TYPE_CHECKING:
     from pamrs.rig import Rig
 
 
+def check_single(rig: Rig, blocks: tuple[str, ...], needed: str) -> None:
+    """Refuse a rig with none or several of a kind of block."""
+    for block in blocks:
+        if (count := len(rig.tables(block))) != 1:
+            raise ParameterError(
+                f"rig {rig.name!r} has {count} [{block}]: a controller's model {needed}"
+            )
+
+
 def beyond_sine(rig: Rig, joint: str) -> tuple[str, ...]:
     """What makes the torque that holds a joint other than the sine of its angle times a number, as
     ``key = value``.

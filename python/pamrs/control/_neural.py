@@ -32,7 +32,7 @@ from pamrs.control._model import JointModel
 from pamrs.control._protocol import Measurement, Reference, Value
 from pamrs.control._sampled import Fixed
 from pamrs.control._sliding import SlidingController
-from pamrs.control._values import as_value, clip
+from pamrs.control._values import as_value, clip, gains_of
 from pamrs.errors import ParameterError
 
 Array = NDArray[np.float64]
@@ -110,14 +110,7 @@ class Neural(SlidingController):
     ) -> None:
         one_of("start", start, ("zero", "model"))
         whole("nodes", nodes, 2, 10_000)
-        if len(gains) != 3:
-            raise ParameterError(
-                f"gains has {len(gains)} entries: three are needed, for H, C and G"
-            )
-        pairs = zip(NETWORKS, gains, strict=True)
-        self._gains: tuple[Value, ...] = tuple(
-            as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs
-        )
+        self._gains = gains_of(NETWORKS, gains)
         self._deadband, self._nodes = as_value("deadband", deadband, lower=0.0), nodes
         self.hold_at_limit = bool(hold_at_limit)
         limit = arm.pressure_limit

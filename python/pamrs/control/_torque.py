@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of
+from pamrs._checks import check_names, one_of
 from pamrs.channels import dotted
-from pamrs.control._groups import Group, beyond_sine, groups_of, highest_pressure
+from pamrs.control._groups import Group, beyond_sine, check_single, groups_of, highest_pressure
 from pamrs.control._protocol import Value
 from pamrs.control._spline import Spline
 from pamrs.control._values import clip, positive_gain, where
@@ -91,12 +91,7 @@ def _parts(rig: Rig, muscle: str | None = None) -> tuple[Muscle, Any, dict[str, 
         ends = {"min_angle": rest - load["max_length"], "max_angle": rest - load["min_length"]}
         return rig.muscle_of(muscle), _Straight(), ends
     if muscle is None:
-        for block in ("muscle", "joint", "arm"):
-            if len(rig.tables(block)) != 1:
-                raise ParameterError(
-                    f"rig {rig.name!r} has {len(rig.tables(block))} [{block}]: a controller's "
-                    "model of one muscle needs exactly one"
-                )
+        check_single(rig, ("muscle", "joint", "arm"), "of one muscle needs exactly one")
         arm = next(iter(rig.tables("arm").values()))
         if arm["kind"] != "one_link":
             raise ParameterError(
@@ -503,12 +498,7 @@ def active_groups(rig: Rig, active: Sequence[str] | None) -> tuple[Group, ...]:
     if active is None:
         return groups
     there = [group.chamber for group in groups]
-    for name in active:
-        if name not in there:
-            raise ParameterError(
-                f"active has {name!r}, and rig {rig.name!r} has no such chamber with muscles; it "
-                f"has: {', '.join(map(repr, there))}"
-            )
+    check_names("active", active, there)
     return tuple(group for group in groups if group.chamber in active)
 
 

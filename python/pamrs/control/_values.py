@@ -5,6 +5,7 @@ floats.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -67,6 +68,16 @@ def as_value(
     kept = array.copy()
     kept.flags.writeable = False
     return kept
+
+
+def gains_of(names: Sequence[str], gains: Sequence[Any]) -> tuple[Value, ...]:
+    """A gain from zero on for each of some names, see :func:`as_value`."""
+    if len(gains) != len(names):
+        raise ParameterError(
+            f"gains has {len(gains)} entries: {len(names)} are needed, for {', '.join(names)}"
+        )
+    pairs = zip(names, gains, strict=True)
+    return tuple(as_value(f"gains[{name}]", value, lower=0.0) for name, value in pairs)
 
 
 def positive_gain(name: str, value: Any) -> Value:

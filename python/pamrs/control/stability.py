@@ -222,11 +222,7 @@ def margins(
         If python-control is not installed.
     """
     library = python_control()
-    linear = (
-        controller
-        if isinstance(controller, LinearController)
-        else linear_controller(controller, model.point)
-    )
+    linear = _linear(model, controller)
     radius = spectral_radius(model, linear, delay=delay)
     opened_at = _command(linear, command)
     period = linear.period
@@ -274,15 +270,17 @@ def margins_of_each(
     ParameterError, MissingPackageError
         As :func:`margins`.
     """
-    linear = (
-        controller
-        if isinstance(controller, LinearController)
-        else linear_controller(controller, model.point)
-    )
+    linear = _linear(model, controller)
     return {
         name or model.inputs[0]: margins(model, linear, command=name, delay=delay, points=points)
         for name in linear.outputs
     }
+
+
+def _linear(model: LinearModel, controller: Controller | LinearController) -> LinearController:
+    if isinstance(controller, LinearController):
+        return controller
+    return linear_controller(controller, model.point)
 
 
 def _command(controller: LinearController, command: str | None) -> int:

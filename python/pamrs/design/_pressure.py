@@ -272,11 +272,7 @@ class ParetoFront:
 
     def to_dict(self) -> dict[str, Any]:
         """Numbers in SI units, ready for JSON."""
-        return {
-            "size": self.size.tolist(),
-            "pressure": self.pressure.tolist(),
-            "lengths": self.lengths.tolist(),
-        }
+        return {name: values.tolist() for name, values in vars(self).items()}
 
 
 def pareto_front(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import one_of, positive, refused, whole
+from pamrs._checks import check_names, one_of, positive, refused, whole
 from pamrs.errors import ParameterError
 from pamrs.rig import Joint
 
@@ -324,10 +324,8 @@ class JointProblem:
         for index, row in enumerate(rows):
             try:
                 joint = self.joint(row)
-            except (
-                ParameterError
-            ):  # the tendon would be folded over at the least angle: out of reach
-                continue
+            except ParameterError:
+                continue  # the tendon would be folded over at the least angle: out of reach
             reached = joint.reaches(angles)
             contraction[index, reached] = joint.shortening(angles[reached]) / length
             arm[index, reached] = joint.moment_arm(angles[reached])
@@ -347,11 +345,7 @@ class JointProblem:
 
 def _checked_bounds(given: Mapping[str, tuple[float, float]]) -> dict[str, tuple[float, float]]:
     """Every length with its bounds."""
-    for name in given:
-        if name not in LENGTHS:
-            raise ParameterError(
-                f"bounds has {name!r}, which is not a length of the joint: {', '.join(LENGTHS)}"
-            )
+    check_names("bounds", given, LENGTHS)
     bounds = {}
     for name in LENGTHS:
         pair = given.get(name, DEFAULT_BOUNDS[name])

@@ -339,9 +339,8 @@ def size(
             count, reason = _count(candidate, requirement, supply, max_count)
             if not reason:
                 rows.append(_row(candidate, count, requirement, supply, core))
-        except (
-            ParameterError
-        ) as error:  # its geometry has no solution at a length that is asked for
+        except ParameterError as error:
+            # its geometry has no solution at a length that is asked for
             reason = str(error)
         if reason:
             hint = ""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from pamrs._checks import quantities, refused
+from pamrs._checks import positive, quantities, refused
 from pamrs.errors import ParameterError, RecordingError
 from pamrs.fit._checks import (
     FORCE_HIGH,
@@ -181,13 +181,8 @@ class ForceMap:
             )
         long, gas, pull = columns.values()
         rest = _rest_length(rest_length)
-        if level_tolerance is not None and not (
-            math.isfinite(level_tolerance) and level_tolerance > 0.0
-        ):
-            raise ParameterError(
-                f"level_tolerance = {level_tolerance!r} Pa is not allowed: a positive number is "
-                "needed"
-            )
+        if level_tolerance is not None:
+            positive("level_tolerance", level_tolerance)
         given = dict(units or {})
         finite = np.isfinite(long) & np.isfinite(gas) & np.isfinite(pull)
         check_units(label, long[finite], gas[finite], rest, given)

@@ -121,11 +121,8 @@ class Problem:
         """
         values, variance = np.zeros(len(design.names)), np.zeros(len(design.names))
         for i, parts in enumerate(design.kinds):
-            for (
-                kind,
-                place,
-                factor,
-            ) in parts:  # one, or slope and offset of a modulus at one pressure
+            # one, or slope and offset of a modulus at one pressure
+            for kind, place, factor in parts:
                 if factor == 0.0:  # a slope at no pressure
                     continue
                 known = self.known.get(kind, _UNKNOWN)

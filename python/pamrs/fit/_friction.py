@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from pamrs._checks import refused
 from pamrs._views import Panels, View
 from pamrs.errors import ParameterError, RecordingError
+from pamrs.findings import to_plain
 from pamrs.fit._data import ForceMap
 from pamrs.fit._validation import WEAK
 from pamrs.fit._ways import held_lengths
@@ -43,6 +44,15 @@ _RESOLVED: Final = 3  # rows in transition that a reversal needs
 _NEAR_TURN: Final = 0.05  # of the range of a pressure cycle, where the force is between branches
 _SIGNIFICANT: Final = 0.05
 _SURE: Final = 4.0  # standard errors, for a friction that nobody asked about
+_OF_A_LEVEL: Final = (
+    *("pressure", "coefficient", "stderr", "law", "at_floor", "rows"),
+    *("contraction", "force", "half_width"),
+)
+_TOLD: Final = (
+    *("parameters", "floor", "presliding", "presliding_reason", "levels", "residual", "ndata"),
+    *("nvarys", "nfree", "redchi", "between", "covar", "slope_pvalue", "slope_significant"),
+    *("isometric", "issues"),
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,28 +268,14 @@ class FrictionFit(View):
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
-        plain = ("pressure", "coefficient", "stderr", "law", "at_floor", "rows")
-        arrays = ("contraction", "force", "half_width")
         levels = [
-            {
-                **{key: law if key == "law" else getattr(level, key) for key in plain},
-                **{key: getattr(level, key).tolist() for key in arrays},
-            }
+            {key: law if key == "law" else getattr(level, key) for key in _OF_A_LEVEL}
             for level, law in zip(self.levels, self.best_fit.tolist(), strict=True)
         ]
-        return {
-            "parameters": [
-                {**asdict(item), "stderr": _or_none(item.stderr)} for item in self.params.values()
-            ],
-            **{key: getattr(self, key) for key in ("floor", "presliding", "presliding_reason")},
-            "levels": levels,
-            "residual": self.residual.tolist(),
-            **{key: getattr(self, key) for key in ("ndata", "nvarys", "nfree")},
-            **{key: _or_none(getattr(self, key)) for key in ("redchi", "between")},
-            "covar": [[_or_none(value) for value in row] for row in self.covar.tolist()],
-            "slope_pvalue": _or_none(self.slope_pvalue),
-            **{key: getattr(self, key) for key in ("slope_significant", "isometric", "issues")},
-        }
+        own = {"parameters": [asdict(item) for item in self.params.values()], "levels": levels}
+        plain = {key: own[key] if key in own else getattr(self, key) for key in _TOLD}
+        found: dict[str, Any] = to_plain(plain)
+        return found
 
     def _slope_words(self) -> str:
         if math.isnan(self.slope_pvalue):
@@ -472,10 +468,6 @@ def _doubts(levels: list[FrictionLevel], above: Mask, floor: float) -> list[str]
             "pressure"
         )
     return found
-
-
-def _or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
 
 
 def _loop(

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from pamrs._checks import contraction_of, refused
 from pamrs._views import Panels, View
 from pamrs.errors import RecordingError
+from pamrs.findings import to_plain
 from pamrs.fit._checks import check_rest_length
 from pamrs.fit._data import ForceMap
 
@@ -209,14 +210,8 @@ class MapFit(View):
 
     def to_dict(self) -> dict[str, Any]:
         """The result as plain data, SI units; None where a number is not determinable."""
-        return {
-            name: value.tolist()
-            if isinstance(value, np.ndarray)
-            else None
-            if isinstance(value, float) and math.isnan(value)
-            else value
-            for name, value in vars(self).items()
-        }
+        found: dict[str, Any] = to_plain(vars(self))
+        return found
 
 
 def fit_map(data: ForceMap, *, nodes: int = _NODES) -> MapFit:
